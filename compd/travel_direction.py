@@ -87,9 +87,11 @@ class RowDirections:
             if not self._travels or session_number != self._session:
                 self._travels, self._session = [_UNMOVED] * links, session_number
             for link in range(links):
-                for row, travel in enumerate(follow(scale_mm[begin:end, link].tolist(), self._travels[link]), begin):
-                    direction[row, link] = travel.direction
-                    self._travels[link] = travel
+                directions = []
+                for travel in follow(scale_mm[begin:end, link].tolist(), self._travels[link]):
+                    directions.append(travel.direction)
+                direction[begin:end, link] = directions
+                self._travels[link] = travel
         direction[direction == 0.0] = np.nan
         return direction
 

@@ -13,16 +13,16 @@ from compd.comparison.stream.sample import SAMPLE_ROWS, draw_sample
 from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.configuration.shipped import Machine
 
-# Called with the number of rows that were gone through, block after block.
-Advance = Callable[[int], None]
+# Called with the number of rows that are done, block after block.
+Progress = Callable[[int], None]
 
 
-def _silent(rows: int) -> None:
+def _silent(done: int) -> None:
     """Nobody watches."""
 
 
 def compare_stream(
-    path: str | Path, model: Model = None, *, machine: Machine | None = None, advance: Advance = _silent
+    path: str | Path, model: Model = None, *, machine: Machine | None = None, progress: Progress = _silent
 ) -> StreamedComparison:
     """Compare a recording of any length with the model of its machine, in constant memory; nothing is fitted.
 
@@ -36,8 +36,8 @@ def compare_stream(
         As for `compare`.
     machine : str, Path or Configuration, optional
         As for `open_recording`.
-    advance : callable
-        Called with a number of rows after each block of either pass: twice the recording's rows in all.
+    progress : callable
+        Called with the number of rows that are done, after each block: twice the recording's rows at the end.
 
     Returns
     -------
@@ -63,13 +63,15 @@ def compare_stream(
     0.82
     """
     stream = open_stream(Path(path), machine)
-    sample = draw_sample(stream, advance=advance)
+    sample = draw_sample(stream, progress=progress)
     file = opened_model(model, sample.aligned)
-    return compare_blocks(stream, sample, file.fitted, file.covariance, advance=advance)
+    return compare_blocks(
+        stream, sample, file.fitted, file.covariance, progress=lambda done: progress(sample.rows + done)
+    )
 
 
 def open_sample(
-    path: str | Path, machine: Machine | None = None, *, rows: int = SAMPLE_ROWS, advance: Advance = _silent
+    path: str | Path, machine: Machine | None = None, *, rows: int = SAMPLE_ROWS, progress: Progress = _silent
 ) -> AlignedRecording:
     """Open a sample of a recording of any length, spread evenly; `diagnose`, `compare` and `add_effect` take it.
 
@@ -81,8 +83,8 @@ def open_sample(
         As for `open_recording`.
     rows : int
         How many rows the sample has, about: rows of one visit stay together.
-    advance : callable
-        Called with a number of rows after each block.
+    progress : callable
+        Called with the number of rows that are done, after each block.
 
     Returns
     -------
@@ -99,4 +101,4 @@ def open_sample(
     >>> compd.open_sample("monday.csv", rows=100).recording.rows
     100
     """
-    return draw_sample(open_stream(Path(path), machine), rows, advance=advance).aligned
+    return draw_sample(open_stream(Path(path), machine), rows, progress=progress).aligned

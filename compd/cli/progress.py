@@ -27,15 +27,16 @@ def steps_shown(quiet: bool = False) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def rows_shown(what: str, rows: int, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """A function that is told how many rows more are done, of so many; the bar is as that of `steps_shown`."""
+def rows_shown(total: int, description: str) -> Iterator[Callable[[int], None]]:
+    """A function that is told how many of `total` rows are done; the bar goes to standard error, gone at the end."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (BarColumn(bar_width=20), TaskProgressColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet) as bar:
-        task = bar.add_task(what, total=rows)
-        yield lambda more: bar.update(task, advance=more)
+    console = Console(stderr=True)
+    columns = (BarColumn(bar_width=20), TextColumn(description), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda done: bar.update(task, completed=done)
 
 
 class ElapsedShown:

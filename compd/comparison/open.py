@@ -29,8 +29,8 @@ def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedR
     Parameters
     ----------
     path : str or Path
-        The recording NAME.csv; its sidecar NAME.yaml lies beside it. The sidecar says which machine it is, and what
-        the reference instrument measured.
+        The recording, NAME.csv or NAME.parquet; its sidecar NAME.yaml lies beside it. The sidecar says which machine
+        it is, and what the reference instrument measured.
     machine : str, Path or Configuration, optional
         The machine as `load_machine` takes it. Left out, the configuration that comes with compd under the name in
         the sidecar; with ``machine: external`` in the sidecar there is none, and the prediction of your own model is

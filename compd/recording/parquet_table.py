@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -58,12 +57,12 @@ class ParquetTable:
         self._types = arrow.types
         try:
             self._file = parquet.ParquetFile(path, buffer_size=_READ_AHEAD_BYTES, page_checksum_verification=True)
+            self._names: list[str] = self._file.schema_arrow.names
         except OSError as error:
             raise RecordingError(_unreadable(path, error)) from error
-        except arrow.ArrowException as error:
+        except (ValueError, arrow.ArrowException) as error:  # of a name that is no text, too
             raise RecordingError(_damaged(path)) from error
         self._faults = (OSError, arrow.ArrowException)
-        self._names: list[str] = self._file.schema_arrow.names
         if problems := self._wrong_columns(id_columns):
             raise RecordingError(problems)
 
@@ -76,17 +75,19 @@ class ParquetTable:
         """All rows; what is wrong goes to `problems`. Raises RecordingError for a damaged file."""
         rows = max(self.row_count, 1)
         empty = self._file.schema_arrow.empty_table()
-        return self._block(next(self._batches(rows), empty), FIRST_ROW, problems)
+        labels = self._labels()
+        return self._block(next(self._batches(rows), empty), FIRST_ROW, labels, problems)
 
     def blocks(self, rows: int) -> Iterator[TableBlock]:
         """The rows, so many at a time at most, in the order of the file.
 
         Raises RecordingError for a damaged file.
         """
+        labels = self._labels()  # before the rows: the file has one place at which it is read
         first_row = FIRST_ROW
         for batch in self._batches(rows):
             problems = ProblemList(self._path)
-            yield TableBlock(self._block(batch, first_row, problems), problems)
+            yield TableBlock(self._block(batch, first_row, labels, problems), problems)
             first_row += batch.num_rows
         if first_row == FIRST_ROW:
             problems = ProblemList(self._path)
@@ -95,6 +96,8 @@ class ParquetTable:
     def _batches(self, rows: int, names: Sequence[str] | None = None) -> Iterator[Any]:
         try:
             yield from self._file.iter_batches(rows, columns=names, use_threads=False)
+        except MemoryError as error:
+            raise RecordingError(_too_large(self._path)) from error
         except self._faults as error:
             raise RecordingError(_damaged(self._path)) from error
 
@@ -129,7 +132,6 @@ class ParquetTable:
         text = kind.value_type if types.is_dictionary(kind) else kind
         return bool(types.is_string(text) or types.is_large_string(text) or types.is_string_view(text))
 
-    @cached_property
     def _labels(self) -> Mapping[str, tuple[str, ...]]:
         """Column of ids -> its different texts in the whole file; only of columns that hold more than numbers."""
         kinds = zip(self._names, self._file.schema_arrow.types, strict=True)
@@ -140,9 +142,9 @@ class ParquetTable:
                 texts[name].update(_cells(batch.column(name).unique()))
         return {name: id_labels(cells) for name, cells in texts.items() if plain_numbers(sorted(cells)) is None}
 
-    def _block(self, batch: Any, first_row: int, problems: ProblemList) -> Table:
+    def _block(self, batch: Any, first_row: int, labels: Mapping[str, tuple[str, ...]], problems: ProblemList) -> Table:
         row = np.arange(first_row, first_row + batch.num_rows, dtype=np.int64)
-        columns = {name: self._values(name, batch.column(name)) for name in self._names}
+        columns = {name: self._values(batch.column(name), labels.get(name)) for name in self._names}
         filled = np.zeros(len(row), dtype=bool)
         wrong = set()
         for name, values in columns.items():
@@ -164,16 +166,16 @@ class ParquetTable:
             dict.fromkeys(self._names, ""),
             {name: values[filled] for name, values in columns.items()},
             row,
-            dict(self._labels),
+            dict(labels),
             frozenset(wrong),
         )
 
-    def _values(self, name: str, column: Any) -> FloatArray:
-        """(N,) numbers, nan for null; the codes of texts."""
+    def _values(self, column: Any, labels: Sequence[str] | None) -> FloatArray:
+        """(N,) numbers, nan for null; of texts the index among `labels`, where they are more than numbers."""
         if self._is_text(column.type):
             cells = _cells(column)
-            if name in self._labels:
-                return id_codes(cells, self._labels[name])
+            if labels is not None:
+                return id_codes(cells, labels)
             numbers = plain_numbers(cells)
             assert numbers is not None
             return numbers
@@ -188,6 +190,14 @@ def _cells(column: Any) -> list[str]:
 def _unreadable(path: Path, error: OSError) -> Problem:
     what = f"cannot be read: {os.strerror(error.errno) if error.errno else error}"
     return Problem(where=str(path), what=what, next_step="give the path of a Parquet file")
+
+
+def _too_large(path: Path) -> Problem:
+    return Problem(
+        where=str(path),
+        what="needs more memory than there is, or is damaged",
+        next_step="divide it into several recordings, or copy it again",
+    )
 
 
 def _damaged(path: Path) -> Problem:

@@ -43,7 +43,7 @@ class Recording:
 
     Attributes
     ----------
-    path, sha256 : the CSV file; hash of it, its sidecar and its ball plate, for provenance.
+    path, sha256 : the table's file; hash of it, its sidecar and its ball plate, for provenance.
     sidecar : what the sidecar says; `machine` and `reference` are short for its own.
     row : (N,) row as a spreadsheet shows it, the header being row 1.
     time_s : (N,) seconds from the start, strictly rising, never nan; without `has_time` the number of the row.

@@ -33,6 +33,11 @@ def table_path(path: Path) -> Path:
     return tables[0] if tables else path.with_suffix(CSV)
 
 
+def written_path(path: Path) -> Path:
+    """Where a recording is written that is to be `path`: NAME.csv where that has no suffix of a table."""
+    return path if path.suffix in SUFFIXES else path.with_name(f"{path.name}{CSV}")
+
+
 def read_table_file(path: Path, problems: ProblemList, id_columns: Collection[str]) -> Table | None:
     """All rows; what is wrong goes to `problems`. None where there is no table at all.
 

@@ -20,7 +20,9 @@ MOST_SENTENCES = 6
 def compare(
     recordings: Annotated[
         list[Path],
-        typer.Argument(metavar="RECORDING...", help="The recordings: NAME.csv, each with NAME.yaml beside it."),
+        typer.Argument(
+            metavar="RECORDING...", help="The recordings: NAME.csv or NAME.parquet, each with NAME.yaml beside it."
+        ),
     ],
     machine: MachineOption = None,
     model: Annotated[
@@ -43,7 +45,7 @@ def compare(
     comparisons: list[Comparison] = []
     for path in recordings:
         try:
-            comparisons.append(_compare(path, machine, model, quiet=as_json))
+            comparisons.append(_compare(path, machine, model))
         except CompdError as error:
             problems += error.problems
     if problems:
@@ -61,7 +63,7 @@ def compare(
         typer.echo(f"The same as pictures: {html}")
 
 
-def _compare(path: Path, machine: Path | None, model: Path | None, quiet: bool) -> Comparison:
+def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison:
     """In memory, or block by block where the recording is too long for it."""
     from compd.comparison.stream.recording_stream import is_long
 
@@ -75,8 +77,8 @@ def _compare(path: Path, machine: Path | None, model: Path | None, quiet: bool) 
     from compd.recording.blocks import row_count
 
     # read twice: for the sample, then row by row
-    with rows_shown(f"comparing {path.name}", 2 * row_count(path), quiet) as advance:
-        return compare_stream(path, model, machine=machine, advance=advance)
+    with rows_shown(2 * row_count(path), f"comparing {path.name}") as progress:
+        return compare_stream(path, model, machine=machine, progress=progress)
 
 
 def print_comparisons(comparisons: list[Comparison]) -> None:

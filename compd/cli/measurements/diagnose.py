@@ -19,7 +19,8 @@ def diagnose(
         list[Path],
         typer.Argument(
             metavar="RECORDING [SEALED...]",
-            help="NAME.csv to learn from; any others stay sealed until the end, when the result is tried on them once.",
+            help="NAME.csv or NAME.parquet to learn from; any others stay sealed until the end, when the result is "
+            "tried on them once.",
         ),
     ],
     machine: MachineOption = None,
@@ -43,8 +44,8 @@ def diagnose(
         from compd.report.page import check_page_path
 
         check_page_path(html, overwrite)
-    sealed = [_open(path, machine, quiet=as_json)[0] for path in recordings[1:]]
-    aligned, all_rows = _open(recordings[0], machine, quiet=as_json)
+    sealed = [_open(path, machine)[0] for path in recordings[1:]]
+    aligned, all_rows = _open(recordings[0], machine)
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]
@@ -65,7 +66,7 @@ def diagnose(
         typer.echo(f"The same as pictures: {html}")
 
 
-def _open(path: Path, machine: Path | None, quiet: bool) -> tuple[AlignedRecording, int]:
+def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, int]:
     """The recording and 0; of one that is too long for the memory a sample, and the number of its rows."""
     from compd.comparison.open import open_recording
     from compd.comparison.stream.recording_stream import is_long
@@ -77,5 +78,5 @@ def _open(path: Path, machine: Path | None, quiet: bool) -> tuple[AlignedRecordi
     from compd.recording.blocks import row_count
 
     rows = row_count(path)
-    with rows_shown(f"drawing a sample of {path.name}", rows, quiet) as advance:
-        return open_sample(path, machine, advance=advance), rows
+    with rows_shown(rows, f"drawing a sample of {path.name}") as progress:
+        return open_sample(path, machine, progress=progress), rows

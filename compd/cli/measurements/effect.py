@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from compd.model_file import ModelFile
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
-RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv.")]
+RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv or NAME.parquet.")]
 DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show what would happen; write nothing.")]
 EFFECT_HELP = "An id from `compd effect list`; FILE.yaml with one effect, or FILE.yaml:ID; FILE.py:NAME."
 

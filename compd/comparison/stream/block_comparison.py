@@ -31,11 +31,11 @@ def compare_blocks(
     fitted: Sequence[FittedEffect] = (),
     covariance: FloatArray | None = None,
     criteria: ComparisonCriteria = ComparisonCriteria(),
-    advance: Callable[[int], None] = lambda rows: None,
+    progress: Callable[[int], None] = lambda rows: None,
 ) -> StreamedComparison:
     """Compare a recording of any length with the model and its effects, as `compare` does one in memory.
 
-    sample : of the stream.  advance : called with the number of rows after each block.  Others as of `compare`.
+    sample : of the stream.  progress : called with the number of rows that are done, after each block.  Others as of `compare`.
     Raises CompdError and RecordingError as `compare` does.
     """
     comparison = compare(sample.aligned, fitted, covariance, criteria)
@@ -52,7 +52,7 @@ def compare_blocks(
 
     for residuals in computed_blocks(stream.blocks(), compute, NOTHING_CARRIED):
         totals.add(residuals)
-        advance(residuals.rows)
+        progress(totals.rows)
     return StreamedComparison.of_sample(comparison, totals)
 
 

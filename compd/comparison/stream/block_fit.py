@@ -46,12 +46,12 @@ def fit_blocks(
     start: FitResult,
     weight_sigma_um: FloatArray,
     criteria: ComparisonCriteria = ComparisonCriteria(),
-    advance: Callable[[int], None] = lambda rows: None,
+    progress: Callable[[int], None] = lambda rows: None,
 ) -> FitResult:
     """Fit the effects of a fit on the sample to all rows; nonlinear constants stay as they are.
 
     sample : of the stream.  start : the fit on it.  weight_sigma_um : (m,) that it was weighed by.
-    advance : called with the number of rows after each block of each pass; there are two or three.
+    progress : called with the number of rows of a pass that are done, after each block; there are two passes or three.
 
     Parameters, covariance and clusters of the result are of all rows, its residual and the rows used of the sample.
     Raises RecordingError with the problems of the recording.
@@ -60,7 +60,7 @@ def fit_blocks(
     theta = np.concatenate([np.zeros(0), *(effect.theta for effect in start.fitted)])
     nuisance = system.start_nuisance
     for _ in range(STEPS):
-        normals = _normals(stream, sample, system, start.fitted, theta, nuisance, advance)
+        normals = _normals(stream, sample, system, start.fitted, theta, nuisance, progress)
         step, change = normals.step(len(theta))
         theta, nuisance = theta + step[: len(theta)], nuisance + step[len(theta) :]
         if change <= CONVERGED * max(np.sqrt(normals.squares / normals.values), LEAST_RMS_UM):
@@ -129,7 +129,7 @@ def _normals(
     fitted: Sequence[FittedEffect],
     theta: FloatArray,
     nuisance: FloatArray,
-    advance: Callable[[int], None],
+    progress: Callable[[int], None],
 ) -> NormalEquations:
     """The normal equations at these parameters, over all rows."""
     ends = np.cumsum([0, *(len(effect.theta) for effect in fitted)])
@@ -150,10 +150,11 @@ def _normals(
         session = session_places(sample.starts_s, aligned.rows.time_s)
         return _block_normals(aligned, effects, rows, system, nuisance, cluster, session), aligned.recording.rows
 
-    totals = NormalEquations()
+    totals, done = NormalEquations(), 0
     for normals, rows in computed_blocks(numbered(), compute, NOTHING_CARRIED):
         totals.add(normals)
-        advance(rows)
+        done += rows
+        progress(done)
     return totals
 
 

@@ -48,11 +48,11 @@ def draw_sample(
     stream: RecordingStream,
     most_rows: int = SAMPLE_ROWS,
     criteria: ComparisonCriteria = ComparisonCriteria(),
-    advance: Callable[[int], None] = lambda rows: None,
+    progress: Callable[[int], None] = lambda rows: None,
 ) -> Sample:
     """Draw the sample: of every so many rows one, and of its visit as many rows as noise is estimated from.
 
-    advance : called with the number of rows after each block.
+    progress : called with the number of rows that are done, after each block.
     Raises RecordingError with the problems of the recording.
     """
     model = None
@@ -82,7 +82,7 @@ def draw_sample(
         starts_s += part.time_s[started].tolist()
         count += part.rows
         end_s = float(part.time_s[-1])
-        advance(part.rows)
+        progress(count)
     if not recordings:
         raise RecordingError(Problem(where=str(stream.path), what="has no rows", next_step="record some"))
     recording = replace(recordings[0].extended_by(*recordings[1:]), left_out=dict(left_out))
