@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from compd.api.arguments import Model, opened_model
+from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.fit import FitResult
 from compd.comparison.stream.block_comparison import compare_blocks
-from compd.comparison.stream.recording_stream import open_stream
-from compd.comparison.stream.sample import SAMPLE_ROWS, draw_sample
+from compd.comparison.stream.block_fit import fit_blocks
+from compd.comparison.stream.recording_stream import RecordingStream, open_stream
+from compd.comparison.stream.sample import SAMPLE_ROWS, Sample, draw_sample
 from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.configuration.shipped import Machine
+from compd.diagnosis import model_changes
+from compd.model_file import ModelFile
 
 # Called with the number of rows that are done, block after block.
 Progress = Callable[[int], None]
@@ -19,6 +25,23 @@ Progress = Callable[[int], None]
 
 def _silent(done: int) -> None:
     """Nobody watches."""
+
+
+class LongRecording(NamedTuple):
+    """A recording that is too long for the memory, and its sample."""
+
+    stream: RecordingStream
+    sample: Sample
+
+    def refine(self, result: FitResult, sigma_um: FloatArray) -> FitResult:
+        """A fit on the sample, with weights sigma_um (m,), fitted to all rows."""
+        return fit_blocks(self.stream, self.sample, result, sigma_um)
+
+
+def open_long(path: Path, machine: Machine | None = None, progress: Progress = _silent) -> LongRecording:
+    """Draw the sample of a recording; arguments and errors as of `open_sample`."""
+    stream = open_stream(path, machine)
+    return LongRecording(stream, draw_sample(stream, progress=progress))
 
 
 def compare_stream(
@@ -62,8 +85,7 @@ def compare_stream(
     >>> round(comparison.rms_um, 2)
     0.82
     """
-    stream = open_stream(Path(path), machine)
-    sample = draw_sample(stream, progress=progress)
+    stream, sample = open_long(Path(path), machine, progress)
     file = opened_model(model, sample.aligned)
     return compare_blocks(
         stream, sample, file.fitted, file.covariance, progress=lambda done: progress(sample.rows + done)
@@ -102,3 +124,43 @@ def open_sample(
     100
     """
     return draw_sample(open_stream(Path(path), machine), rows, progress=progress).aligned
+
+
+def fit_stream(
+    path: str | Path, model: ModelFile | str | Path, *, machine: Machine | None = None, progress: Progress = _silent
+) -> ModelFile:
+    """Fit all effects of a model again, to all rows of a recording of any length, in constant memory.
+
+    Nonlinear constants stay as they are. `add_effect` adds an effect on a sample (`open_sample`), which this refines.
+
+    Parameters
+    ----------
+    path : str or Path
+        As for `compare_stream`.
+    model : ModelFile, str or Path
+        The model; it is not changed, nor is its file.
+    machine : str, Path or Configuration, optional
+        As for `open_recording`.
+    progress : callable
+        Called with the number of rows of the sample's pass that are done.
+
+    Returns
+    -------
+    ModelFile
+        The model with the new numbers, their standard errors and joint covariance. The errors in its ledger are of the
+        sample.
+
+    Raises
+    ------
+    RecordingError, StateError, CompdError
+        As `compare_stream`, and where the model has no effect.
+
+    Examples
+    --------
+    >>> import compd
+    >>> model = compd.add_effect(None, "link_expansion", compd.open_sample("monday.csv", rows=200))
+    >>> [round(number.value, 2) for number in compd.fit_stream("monday.csv", model).numbers()]
+    [1.11]
+    """
+    long = open_long(Path(path), machine, progress)
+    return model_changes.refit(opened_model(model, long.sample.aligned), long.sample.aligned, long.refine)

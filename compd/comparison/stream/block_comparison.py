@@ -35,7 +35,8 @@ def compare_blocks(
 ) -> StreamedComparison:
     """Compare a recording of any length with the model and its effects, as `compare` does one in memory.
 
-    sample : of the stream.  progress : called with the number of rows that are done, after each block.  Others as of `compare`.
+    sample : of the stream.  progress : called with the number of rows that are done, after each block.  Others as of
+    `compare`.
     Raises CompdError and RecordingError as `compare` does.
     """
     comparison = compare(sample.aligned, fitted, covariance, criteria)

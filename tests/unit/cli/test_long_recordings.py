@@ -5,19 +5,24 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
 
+import compd
 from compd.cli.measurements.compare import compare
 from compd.cli.measurements.diagnose import diagnose
+from compd.cli.measurements.effect import add, fit
 from compd.comparison.stream import recording_stream
+from compd.comparison.stream.sample import draw_sample
+from compd.model_file import read_model_file
 from tests.support.measured import gauges, hidden, record
 
 ROWS = 400
 
 app = typer.Typer()
-for command in (compare, diagnose):
+for command in (compare, diagnose, add, fit):
     app.command()(command)
 
 
@@ -59,3 +64,17 @@ def test_a_recording_with_fixed_pins_is_read_whole(recorded: Path) -> None:
     sidecar = recorded.with_suffix(".yaml")
     sidecar.write_text("machine: tripod-cmm\nreference: {quantity: fixed_point}\n", encoding="utf-8")
     assert not recording_stream.is_long(recorded)
+
+
+def test_effects_are_fitted_to_all_rows(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(draw_sample, "__defaults__", (100, *(draw_sample.__defaults__ or ())[1:]))
+    model = tmp_path / "run.model.yaml"
+    assert f"Fitted to {ROWS} rows" in run("add", "link_expansion", "--recording", recorded, "--model", model)
+    (long,) = read_model_file(model, "tripod-cmm", 3).fitted
+    (whole,) = compd.add_effect(None, "link_expansion", compd.open_recording(recorded)).fitted
+    # the sample's noise floor, by which coordinates are weighed, is another
+    assert abs(long.theta[0] - whole.theta[0]) < 0.3 * np.sqrt(whole.covariance[0, 0])
+    np.testing.assert_allclose(long.covariance, whole.covariance, rtol=0.2)
+    run("fit", "--recording", recorded, "--model", model)
+    (again,) = read_model_file(model, "tripod-cmm", 3).fitted
+    assert again.theta[0] == pytest.approx(long.theta[0], rel=1e-6)
