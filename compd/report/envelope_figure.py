@@ -20,7 +20,8 @@ def plot_envelope(comparison: StreamedComparison) -> Figure:
     aligned, envelope = comparison.aligned, comparison.totals.envelope
     figure = make_subplots(len(aligned.labels), 1, shared_xaxes=True, vertical_spacing=0.06)
     style_figure(figure, "", "", 110 + ROW_PX * len(aligned.labels)).update_layout(showlegend=False)
-    hours = (envelope.middle_s / SECONDS_PER_HOUR).astype(np.float32)
+    has_time = aligned.recording.has_time
+    x = (envelope.middle_s / SECONDS_PER_HOUR if has_time else envelope.middle_s).astype(np.float32)
     for k, label in enumerate(aligned.labels):
         colour = SERIES_COLOURS[k % len(SERIES_COLOURS)]
         # the largest first, and the smallest filled up to it
@@ -29,8 +30,7 @@ def plot_envelope(comparison: StreamedComparison) -> Figure:
             (envelope.smallest, {"width": 0.5, "color": colour}, "tonexty"),
             (envelope.mean, {"width": 1.5, "color": "black"}, None),
         ):
-            trace = Scatter(x=hours, y=values[:, k].astype(np.float32), mode="lines", line=line, fill=fill)
+            trace = Scatter(x=x, y=values[:, k].astype(np.float32), mode="lines", line=line, fill=fill)
             figure.add_trace(trace, row=k + 1, col=1)
         figure.update_yaxes(title_text=f"residual in {label}, {aligned.unit_of(label)}", row=k + 1, col=1)
-    time = "time, h" if aligned.recording.has_time else "row / 3600"
-    return figure.update_xaxes(title_text=time, row=len(aligned.labels), col=1)
+    return figure.update_xaxes(title_text="time, h" if has_time else "row", row=len(aligned.labels), col=1)

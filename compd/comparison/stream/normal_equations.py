@@ -76,7 +76,7 @@ class NormalEquations:
         basis = _beside(total.normal, parameters)
         normal = basis.T @ total.normal @ basis
         step = solve_normal(normal, basis.T @ total.score)
-        return basis @ step, float(np.sqrt(max(step @ normal @ step, 0.0) / self.values))
+        return basis @ step, float(np.sqrt(max(float(step @ normal @ step), 0.0) / self.values))
 
     def covariance(self, parameters: int) -> FloatArray:
         """(P, P) of the first P parameters, as `cluster_covariance` gives it."""

@@ -77,4 +77,4 @@ def test_effects_are_fitted_to_all_rows(recorded: Path, tmp_path: Path, monkeypa
     np.testing.assert_allclose(long.covariance, whole.covariance, rtol=0.2)
     run("fit", "--recording", recorded, "--model", model)
     (again,) = read_model_file(model, "tripod-cmm", 3).fitted
-    assert again.theta[0] == pytest.approx(long.theta[0], rel=1e-6)
+    assert again.theta[0] == pytest.approx(long.theta[0], rel=1e-4)
