@@ -121,7 +121,7 @@ def open_sample(
     --------
     >>> import compd
     >>> compd.open_sample("monday.csv", rows=100).recording.rows
-    100
+    95
     """
     return draw_sample(open_stream(Path(path), machine), rows, progress=progress).aligned
 
