@@ -56,7 +56,10 @@ class ParquetTable:
         arrow, parquet = arrow_modules(path)
         self._types = arrow.types
         try:
-            self._file = parquet.ParquetFile(path, buffer_size=_READ_AHEAD_BYTES, page_checksum_verification=True)
+            # what is read ahead by row groups would be kept to the end of the file
+            self._file = parquet.ParquetFile(
+                path, pre_buffer=False, buffer_size=_READ_AHEAD_BYTES, page_checksum_verification=True
+            )
             self._names: list[str] = self._file.schema_arrow.names
         except OSError as error:
             raise RecordingError(_unreadable(path, error)) from error

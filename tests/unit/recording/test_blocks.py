@@ -5,13 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from compd.errors import RecordingError
 from compd.recording.blocks import recording_blocks, row_count
 from compd.recording.convert import convert_recording
 from compd.recording.reader import read_recording
-from tests.support.recordings import SIDECAR, Edit, csv_text, drop_columns, set_cell, set_column, write_recording_files
+from tests.support.recordings import (
+    HEADER,
+    SIDECAR,
+    Edit,
+    csv_text,
+    drop_columns,
+    set_cell,
+    set_column,
+    write_recording_files,
+)
 
 PINS = "machine: tripod-cmm\nreference: {quantity: fixed_point}\n"
 NO_TIP = drop_columns("reference_x_mm", "reference_y_mm", "reference_z_mm")
@@ -66,6 +77,17 @@ def test_blocks_are_the_whole(tmp_path: Path, name: str, suffix: str) -> None:
             left_out[reason] = left_out.get(reason, 0) + count
     assert left_out == whole.left_out
     assert row_count(path) == whole.row[-1] - 1
+
+
+def test_of_parquet_no_more_than_a_block_is_in_the_memory(tmp_path: Path) -> None:
+    rows = 40_000
+    columns = {name: np.random.default_rng(1).uniform(-60.0, 60.0, rows) for name in HEADER}
+    columns |= {"time_s": np.arange(rows, dtype=float), "session": np.ones(rows), "visit": np.arange(rows, dtype=float)}
+    path = write_recording_files(tmp_path, "").with_suffix(".parquet")
+    pq.write_table(pa.table(columns), path, row_group_size=1000)
+    held = [pa.total_allocated_bytes() for _ in recording_blocks(path, rows=1000)]
+    assert len(held) == 40
+    assert max(held) < path.stat().st_size / 4
 
 
 def test_rows_without_time_are_numbered_on(tmp_path: Path) -> None:
