@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from compd.api.diagnosis import compare as compare
     from compd.api.diagnosis import diagnose as diagnose
+    from compd.api.long_recordings import compare_stream as compare_stream
+    from compd.api.long_recordings import fit_stream as fit_stream
+    from compd.api.long_recordings import open_sample as open_sample
     from compd.api.measurements import plan_measurement as plan_measurement
     from compd.api.models import add_effect as add_effect
     from compd.api.models import open_model as open_model
@@ -38,6 +41,9 @@ _MODULES = {
     "load_effects": "compd.model.library.effects_file",
     "add_effect": "compd.api.models",
     "open_model": "compd.api.models",
+    "compare_stream": "compd.api.long_recordings",
+    "open_sample": "compd.api.long_recordings",
+    "fit_stream": "compd.api.long_recordings",
     "plan_measurement": "compd.api.measurements",
     "connect": "compd.client",
     "Effect": "compd.model.effect",

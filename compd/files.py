@@ -6,11 +6,15 @@ import errno
 import os
 import secrets
 import stat
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import BinaryIO, TypeAlias
+
+# What a file is to hold: text (as UTF-8), bytes, or, where it is long, a function that writes it.
+Content: TypeAlias = str | bytes | Callable[[BinaryIO], None]
 
 
-def write_files(contents: Mapping[Path, str | bytes], mode: int | None = None) -> None:
+def write_files(contents: Mapping[Path, Content], mode: int | None = None) -> None:
     """Write all of these files, or leave every one as it was.
 
     Each file is written under a temporary name in its own directory, synced to the disk and then renamed over its
@@ -19,7 +23,8 @@ def write_files(contents: Mapping[Path, str | bytes], mode: int | None = None) -
 
     Parameters
     ----------
-    contents : path -> what the file is to hold; text is encoded as UTF-8, line ends are written as they are.
+    contents : path -> what the file is to hold; text is encoded as UTF-8, line ends are written as they are. What a
+        function raises is raised, and then every file is as it was.
     mode : permission bits of the files; None for those that the umask gives.
 
     Raises
@@ -89,10 +94,13 @@ def read_descriptor(descriptor: int, limit_bytes: int) -> bytes:
     return content
 
 
-def write_new_file(path: Path, content: str | bytes) -> None:
+def write_new_file(path: Path, content: Content) -> None:
     """Write a file that must not exist yet, and sync it to the disk. Raises OSError (FileExistsError)."""
     with path.open("xb") as file:
-        file.write(content.encode() if isinstance(content, str) else content)
+        if callable(content):
+            content(file)
+        else:
+            file.write(content.encode() if isinstance(content, str) else content)
         file.flush()
         os.fsync(file.fileno())
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,9 @@ class Travel(NamedTuple):
     direction: float = 0.0
 
 
+_UNMOVED = Travel()
+
+
 def advance(travel: Travel, position_mm: float) -> Travel:
     """The state after one more reading of the scale, in mm. A reading that is nan changes nothing."""
     turning_mm, direction = travel
@@ -45,34 +49,53 @@ def advance(travel: Travel, position_mm: float) -> Travel:
     return Travel(position_mm, direction) if since_mm * direction > 0.0 else travel
 
 
-def follow(positions_mm: Iterable[float]) -> Iterator[Travel]:
-    """The state after each of a link's positions, in the order of time."""
-    travel = Travel()
+def follow(positions_mm: Iterable[float], travel: Travel = _UNMOVED) -> Iterator[Travel]:
+    """The state after each of a link's positions, in the order of time. travel : the state before the first."""
     for position_mm in positions_mm:
         travel = advance(travel, position_mm)
         yield travel
 
 
-def row_directions(scale_mm: FloatArray, session: IntArray | None) -> FloatArray:
-    """Direction of travel of each link in every row of a recording.
+class RowDirections:
+    """Direction of travel of each link in every row of a recording, also where its rows come block by block.
 
     What happened between two rows is not known: a link that went out and came back looks as if it stood still. Where
     that matters, record the `approach` columns.
-
-    Parameters
-    ----------
-    scale_mm : (N, n), nan where there is no value.
-    session : (N,) or None. Every session begins anew.
-
-    Returns
-    -------
-    (N, n) +1 or -1; nan before a link's first movement in a session.
     """
-    begins = [0] if session is None else [0, *(np.flatnonzero(np.diff(session)) + 1).tolist()]
-    direction = np.zeros(scale_mm.shape)
-    for begin, end in zip(begins, [*begins[1:], len(scale_mm)], strict=True):
-        for link in range(scale_mm.shape[1]):
-            column = scale_mm[begin:end, link].tolist()
-            direction[begin:end, link] = [travel.direction for travel in follow(column)]
-    direction[direction == 0.0] = np.nan
-    return direction
+
+    def __init__(self) -> None:
+        self._travels: list[Travel] = []
+        self._session: int | None = None
+
+    def of_block(self, scale_mm: FloatArray, session: IntArray | None) -> FloatArray:
+        """The directions in the rows that follow those of the last call.
+
+        Parameters
+        ----------
+        scale_mm : (N, n), nan where there is no value.
+        session : (N,) or None. Every session begins anew.
+
+        Returns
+        -------
+        (N, n) +1 or -1; nan before a link's first movement in a session.
+        """
+        rows, links = scale_mm.shape
+        direction = np.zeros(scale_mm.shape)
+        begins = [0] if session is None else [0, *(np.flatnonzero(np.diff(session)) + 1).tolist()]
+        for begin, end in pairwise([*begins, rows] if rows else []):
+            session_number = None if session is None else int(session[begin])
+            if not self._travels or session_number != self._session:
+                self._travels, self._session = [_UNMOVED] * links, session_number
+            for link in range(links):
+                directions = []
+                for travel in follow(scale_mm[begin:end, link].tolist(), self._travels[link]):
+                    directions.append(travel.direction)
+                direction[begin:end, link] = directions
+                self._travels[link] = travel
+        direction[direction == 0.0] = np.nan
+        return direction
+
+
+def row_directions(scale_mm: FloatArray, session: IntArray | None) -> FloatArray:
+    """Direction of travel of each link in every row of a whole recording: arguments and result of `RowDirections`."""
+    return RowDirections().of_block(scale_mm, session)

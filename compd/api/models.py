@@ -64,6 +64,7 @@ def add_effect(
     recording: Recorded,
     *,
     effects: Effects = (),
+    refine: model_changes.Refinement = model_changes.unrefined,
 ) -> ModelFile:
     """Add an effect to a model: all its effects are fitted together on a recording, and the ledger gets a line.
 
@@ -79,6 +80,8 @@ def add_effect(
         What to fit on.
     effects : str, Path, Effect, or a sequence of these
         Effects of your own beside those that are installed, as for `diagnose`.
+    refine : callable
+        Makes of the fit a better one: of a sample the fit to all rows, as `fit_stream` has it.
 
     Returns
     -------
@@ -106,7 +109,7 @@ def add_effect(
     found = _found(effect, gather_effects(effects))
     declared = found.declared if isinstance(found.declared, str) else dict(found.declared)
     aligned = opened_recording(recording)
-    return model_changes.add(opened_model(model, aligned), declared or found.id, found, aligned)
+    return model_changes.add(opened_model(model, aligned), declared or found.id, found, aligned, refine)
 
 
 def _found(effect: Effect | str | Path | Mapping[str, Any], given: Mapping[str, Effect]) -> Effect:

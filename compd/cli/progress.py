@@ -26,6 +26,19 @@ def steps_shown(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         yield lambda said: bar.update(task, description=said)
 
 
+@contextmanager
+def rows_shown(total: int, description: str) -> Iterator[Callable[[int], None]]:
+    """A function that is told how many of `total` rows are done; the bar goes to standard error, gone at the end."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (BarColumn(bar_width=20), TextColumn(description), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda done: bar.update(task, completed=done)
+
+
 class ElapsedShown:
     """How far a measurement is that takes a given time, or goes on until Ctrl-C; a context manager."""
 

@@ -34,17 +34,36 @@ def align_recording(
 
     Raises RecordingError where there is no reference, or where nothing can be computed from any row.
     """
-    where = str(recording.path)
+    model = None if configuration is None else build_model(configuration.geometry, configuration.wiring)
+    geometry_hash = "" if configuration is None else configuration.geometry_hash
+    return align_observations(recording, model, recorded_observations(recording, model), geometry_hash, criteria)
+
+
+def recorded_observations(recording: Recording, model: MachineModel | None) -> Observations:
+    """Every row of the recording, as effects take it.  model : None for an external one.
+
+    Raises RecordingError as `align_recording` does.
+    """
     if recording.reference is None:
+        where = str(recording.path)
         raise RecordingError(Problem(where=where, what="names no reference", next_step="add one with `compd join`"))
-    starts = _session_starts(recording)
-    if configuration is None:
-        model, geometry_hash = None, ""
-        observations = external_observations(recording, starts)
-    else:
-        model = build_model(configuration.geometry, configuration.wiring)
-        geometry_hash = configuration.geometry_hash
-        observations = _observations(recording, model, starts)
+    starts = session_starts(recording)
+    return external_observations(recording, starts) if model is None else _observations(recording, model, starts)
+
+
+def align_observations(
+    recording: Recording,
+    model: MachineModel | None,
+    observations: Observations,
+    geometry_hash: str = "",
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    part_of: AlignedRecording | None = None,
+) -> AlignedRecording:
+    """As `align_recording`, for rows that are observed already.
+
+    part_of : of a block of a long recording the sample of it that places the instrument's frame.
+    """
+    assert recording.reference is not None
     if recording.reference_link_mm is not None:
         labels = tuple(f"link {i}" for i in recording.reference_links)
         links = tuple(i - 1 for i in recording.reference_links)
@@ -67,10 +86,12 @@ def align_recording(
         )
     measured_mm = recording.reference_mm
     if measured_mm is None:
-        raise RecordingError(Problem(where=where, what="has no column of the reference"))
+        raise RecordingError(Problem(where=str(recording.path), what="has no column of the reference"))
     axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
-    registration = None
-    if recording.reference.frame == "instrument":
+    registration = None if part_of is None else part_of.registration
+    if registration is not None:
+        measured_mm = registration.into_M(_in_space(measured_mm, axes))[:, list(axes)]
+    elif recording.reference.frame == "instrument" and part_of is None:
         registration, measured_mm = _registered(recording, measured_mm, observations.tip_M_mm, axes, criteria)
     labels = recording.reference_axes
     # without a known noise nothing says what a urad counts beside a um: the attitude is compared, and fits no effect
@@ -80,7 +101,9 @@ def align_recording(
         attitude = measured_attitude(recording.reference_rotation_rad, nominal, registration)
         measured_mm = np.concatenate([measured_mm, attitude_mm(attitude, nominal)], axis=1)
         labels = (*labels, *ATTITUDE_LABELS)
-    return AlignedRecording(recording, model, observations, labels, axes, measured_mm, registration, geometry_hash)
+    return AlignedRecording(
+        recording, model, observations, labels, axes, measured_mm, registration, geometry_hash, part_of=part_of
+    )
 
 
 def _at_fixed_ends(aligned: AlignedRecording, end: IntArray) -> AlignedRecording:
@@ -112,8 +135,7 @@ def _registered(
     in_plane = axes == (0, 1) and not np.isfinite(tip_M_mm[:, 2]).any()
     if len(axes) < 3 and not in_plane:
         return None, measured_mm
-    points, predicted = np.zeros((len(measured_mm), 3)), np.zeros((len(measured_mm), 3))
-    points[:, list(axes)], predicted[:, list(axes)] = measured_mm, tip_M_mm[:, list(axes)]
+    points, predicted = _in_space(measured_mm, axes), _in_space(tip_M_mm[:, list(axes)], axes)
     registration = register(np.where(recording.excluded[:, None], np.nan, points), predicted, criteria)
     if registration is not None:
         measured_mm = registration.into_M(points)[:, list(axes)]
@@ -157,10 +179,17 @@ def _observations(recording: Recording, model: MachineModel, starts: BoolArray) 
     )
 
 
-def _session_starts(recording: Recording) -> BoolArray:
+def session_starts(recording: Recording) -> BoolArray:
     """(N,) rows without a history: the first of each session."""
     starts = np.zeros(recording.rows, dtype=bool)
     starts[:1] = True
     if recording.session is not None:
         starts[1:] = recording.session[1:] != recording.session[:-1]
     return starts
+
+
+def _in_space(values_mm: FloatArray, axes: tuple[int, ...]) -> FloatArray:
+    """(N, 3) coordinates along `axes` (N, m), the others 0."""
+    points = np.zeros((len(values_mm), 3))
+    points[:, list(axes)] = values_mm
+    return points

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.display_unit import in_place_unit
 from compd.comparison.external_machine import external_change, external_prediction
 from compd.comparison.fixed_ends import FixedEnds
@@ -70,6 +70,8 @@ class AlignedRecording:
         Of distances and pins the fixed balls or pins, whose places are always fitted along; None for others.
     geometry_hash : str
         Of the configuration that the model was built from; ``""`` for ``machine: external``.
+    part_of : AlignedRecording or None
+        Of a block of a long recording the sample of it that places the instrument's frame; None for a whole recording.
     """
 
     recording: Recording
@@ -81,6 +83,7 @@ class AlignedRecording:
     registration: Registration | None
     geometry_hash: str = ""
     ends: FixedEnds | None = None
+    part_of: AlignedRecording | None = None
     _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
 
     @property
@@ -167,6 +170,17 @@ class AlignedRecording:
             return change
         return np.asarray(self.ends.directions(self.nominal_tip_mm) @ change)
 
+    def select(self, index: IntArray | slice) -> AlignedRecording:
+        """The rows of this index (R,), in its order; of a slice without a copy."""
+        return replace(
+            self,
+            recording=self.recording.select(index),
+            rows=self.rows.select(index),
+            measured_mm=self.measured_mm[index],
+            ends=None if self.ends is None else self.ends.select(index),
+            _by_port={},
+        )
+
     def sensitivity(self, ports: Collection[Port]) -> Mapping[Port, Sensitivity]:
         """Derivatives of the prediction by what is added at `ports`; each is computed once."""
         new = [port for port in ports if port not in self._by_port]
@@ -197,12 +211,12 @@ class AlignedRecording:
         """
         if self.ends is not None:
             return self.ends.columns(self.nominal_tip_mm)
-        if self.registered and self.with_attitude:
-            tip_M_mm = self.rows.tip_M_mm
-            of_tip, spread_mm = registration_columns(tip_M_mm, self.axes), points_spread_mm(tip_M_mm)
-            return attitude_registration_columns(of_tip, self.rows.rotation_M_P, spread_mm)
         if self.registered:
-            return registration_columns(self.rows.tip_M_mm, self.axes)
+            points_M_mm = self.rows.tip_M_mm if self.part_of is None else self.part_of.rows.tip_M_mm
+            columns = registration_columns(self.rows.tip_M_mm, self.axes, points_M_mm)
+            if not self.with_attitude:
+                return columns
+            return attitude_registration_columns(columns, self.rows.rotation_M_P, points_spread_mm(points_M_mm))
         if self.model is None:
             return displacement_columns(*self.measured_mm.shape)
         return np.zeros((*self.measured_mm.shape, 0))
@@ -226,7 +240,9 @@ class AlignedRecording:
         needed = [*recording.gauge_columns, *recording.reference_columns, *recording.model_columns]
         mask, left, reason = recording.usable(needed)
         left_out = {**recording.left_out, **left}
-        nowhere = mask & ~np.isfinite(self.predicted_mm({})).all(axis=1)
+        at_pose = self.model is not None and self.ends is None
+        predicted = self.rows.origin_M_mm if at_pose else self.predicted_mm({})
+        nowhere = mask & ~np.isfinite(predicted).all(axis=1)
         if nowhere.any():
             why = self._why_no_pose(nowhere)
             left_out[why] = int(nowhere.sum())

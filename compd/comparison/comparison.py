@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.special import fdtri
@@ -34,6 +34,14 @@ NO_QUANTITY = "a quantity that an effect needs is empty"
 OUTLIER = "beyond all noise"
 # Trends that a notebook shows.
 MOST_TRENDS = 4
+
+
+class Size(NamedTuple):
+    """Of amounts: root mean square, what 95 % stay below, and the largest; um."""
+
+    rms_um: float
+    p95_um: float
+    largest_um: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,6 +105,52 @@ class Comparison:
         """(m,) root mean square of each coordinate over the rows used."""
         return np.asarray(np.sqrt(np.mean(self.residual_um[self.used] ** 2, axis=0)))
 
+    @cached_property
+    def mean_by_axis_um(self) -> FloatArray:
+        """(m,) mean of each coordinate over the rows used."""
+        return np.asarray(self.residual_um[self.used].mean(axis=0))
+
+    @cached_property
+    def p95_by_axis_um(self) -> FloatArray:
+        """(m,) what 95 % of the rows used stay below, by amount."""
+        return np.asarray(np.quantile(np.abs(self.residual_um[self.used]), 0.95, axis=0))
+
+    @cached_property
+    def largest_by_axis_um(self) -> FloatArray:
+        """(m,) the largest amount of each coordinate among the rows used."""
+        return np.asarray(np.abs(self.residual_um[self.used]).max(axis=0))
+
+    @cached_property
+    def distance_size(self) -> Size:
+        """Of `distance_um`, over the rows used."""
+        distance_um = self.distance_um[self.used]
+        return Size(rms(distance_um), float(np.quantile(distance_um, 0.95)), float(distance_um.max()))
+
+    @property
+    def rows(self) -> int:
+        """N."""
+        return self.aligned.recording.rows
+
+    @cached_property
+    def rows_used(self) -> int:
+        """How many rows count."""
+        return int(self.used.sum())
+
+    @cached_property
+    def outlier_count(self) -> int:
+        """How many rows no noise explains."""
+        return int(self.outlier.sum())
+
+    @cached_property
+    def outlier_rows(self) -> list[int]:
+        """These rows, as a spreadsheet shows them."""
+        return [int(row) for row in self.aligned.recording.row[self.outlier]]
+
+    @property
+    def basis(self) -> str:
+        """Which numbers rest on fewer rows than all, in a sentence; "" where all rest on all."""
+        return ""
+
     @property
     def rms_um(self) -> float:
         """Root mean square per coordinate, over rows and axes that are lengths; `attitude_rms_urad` is apart."""
@@ -137,7 +191,7 @@ class Comparison:
         """
         if not self.floor.known:
             return False
-        numbers = float(self.used.sum() * len(self.aligned.labels))
+        numbers = float(self.rows_used * len(self.aligned.labels))
         dof = min(self.floor.dof, 1e9)
         return self.floor_ratio <= float(fdtri(numbers, dof, self.criteria.at_floor_confidence))
 
@@ -199,17 +253,17 @@ class Comparison:
         )
 
     def _repr_html_(self) -> str:
-        size_um, ending = np.abs(self.residual_um[self.used]), residual_ending(self.aligned.unit)
+        ending = residual_ending(self.aligned.unit)
         table = {
             "coordinate": self.aligned.labels,
             f"rms_{ending}": self.rms_by_axis_um.tolist(),
             f"noise_floor_{ending}": self.floor.by_axis_um.tolist(),
-            f"95_percent_{ending}": np.quantile(size_um, 0.95, axis=0).tolist(),
-            f"largest_{ending}": size_um.max(axis=0).tolist(),
+            f"95_percent_{ending}": self.p95_by_axis_um.tolist(),
+            f"largest_{ending}": self.largest_by_axis_um.tolist(),
         }
         remarks = [
-            f"{int(self.used.sum())} rows used, {len(self.used) - int(self.used.sum())} not. "
-            f"Noise floor: {self.floor.how}.",
+            f"{self.rows_used} rows used, {self.rows - self.rows_used} not. Noise floor: {self.floor.how}.",
+            *([self.basis] if self.basis else []),
             *([self.floor.contradiction] if self.floor.contradiction else []),
             *(trend.text for trend in self.trends[:MOST_TRENDS]),
         ]
@@ -224,9 +278,7 @@ class Comparison:
         Keys that end in `_um` hold numbers in `unit`, which is um unless the sidecar names another.
         """
         recording = self.aligned.recording
-        size = np.abs(self.residual_um[self.used])
-        distance = self.distance_um[self.used]
-        excluded = recording.rows - int(self.used.sum()) + sum(recording.left_out.values())
+        excluded = self.rows - self.rows_used + sum(recording.left_out.values())
         report: dict[str, Any] = {
             "recording": str(recording.path),
             "sha256": recording.sha256,
@@ -237,13 +289,13 @@ class Comparison:
             "residual_rms_um": self.rms_um,
             "residual_rms_xyz_um": self._by_axis(self.rms_by_axis_um),
             "constant_xyz_um": self._by_axis(self.constant_um),
-            "residual_mean_xyz_um": self._by_axis(self.residual_um[self.used].mean(axis=0)),
-            "residual_p95_xyz_um": self._by_axis(np.quantile(size, 0.95, axis=0)),
-            "residual_max_xyz_um": self._by_axis(size.max(axis=0)),
+            "residual_mean_xyz_um": self._by_axis(self.mean_by_axis_um),
+            "residual_p95_xyz_um": self._by_axis(self.p95_by_axis_um),
+            "residual_max_xyz_um": self._by_axis(self.largest_by_axis_um),
             "residual_3d_um": {
-                "rms": rms(distance),
-                "p95": float(np.quantile(distance, 0.95)),
-                "max": float(distance.max()),
+                "rms": self.distance_size.rms_um,
+                "p95": self.distance_size.p95_um,
+                "max": self.distance_size.largest_um,
             },
             "noise_floor_um": self.floor.um,
             "noise_floor_xyz_um": self._by_axis(self.floor.by_axis_um),
@@ -252,10 +304,10 @@ class Comparison:
             "noise_floor_remark": self.floor.contradiction,
             "floor_ratio": self.floor_ratio,
             "at_floor": self.at_floor,
-            "rows_used": int(self.used.sum()),
+            "rows_used": self.rows_used,
             "rows_excluded": excluded,
             "excluded_by_reason": {**self.left_out, **self._outlier_count()},
-            "outlier_rows": recording.row[self.outlier].tolist(),
+            "outlier_rows": self.outlier_rows,
             "contributions": {source: part._asdict() for source, part in self.contributions.items()},
             "prediction_std_um": {
                 "total": rms(self.uncertainty.total_um[self.used][:, self.aligned.lengths]),
@@ -278,8 +330,7 @@ class Comparison:
         return {label: float(value) for label, value in zip(self.aligned.labels, values, strict=True)}
 
     def _outlier_count(self) -> dict[str, int]:
-        count = int(self.outlier.sum())
-        return {OUTLIER: count} if count else {}
+        return {OUTLIER: self.outlier_count} if self.outlier_count else {}
 
     def _registration(self) -> dict[str, Any]:
         registration, ends = self.aligned.registration, self.aligned.ends

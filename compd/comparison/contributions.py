@@ -31,17 +31,9 @@ def contributions(
     A source is switched off by predicting again without it: comparators as if unmoved, the effect left out of the sum.
     Nuisance terms are fitted anew without each source, as a user without it would have done.
     """
-    total = sum_deltas(list(by_effect.values()))
-    predicted_mm = aligned.predicted_mm(total)
-    without_source: dict[str, Deltas] = {}
-    if aligned.model is not None and aligned.recording.joint_mm is not None:
-        without_source["joints"] = {**total, "joint": -aligned.rows.joint_mm}
-    if aligned.model is not None and aligned.recording.frame_mm is not None:
-        without_source["frame"] = {**total, "frame": -aligned.rows.frame_mm}
-    for name in by_effect:
-        without_source[name] = sum_deltas([added for other, added in by_effect.items() if other != name])
+    predicted_mm = aligned.predicted_mm(sum_deltas(list(by_effect.values())))
     result: dict[str, Contribution] = {}
-    for name, added in without_source.items():
+    for name, added in deltas_without(aligned, by_effect).items():
         without_mm = aligned.predicted_mm(added)
         rows = used & np.isfinite(without_mm).all(axis=1)
         residual_um = (aligned.measured_mm - without_mm) * UM_PER_MM
@@ -50,3 +42,16 @@ def contributions(
         moved_um = ((predicted_mm - without_mm) * UM_PER_MM)[rows][:, aligned.lengths]
         result[name] = Contribution(rms(moved_um), rms(residual_um[rows][:, aligned.lengths]))
     return result
+
+
+def deltas_without(aligned: AlignedRecording, by_effect: Mapping[str, Deltas]) -> dict[str, Deltas]:
+    """What is added at the ports with each source switched off, by the names of `contributions`."""
+    total = sum_deltas(list(by_effect.values()))
+    without: dict[str, Deltas] = {}
+    if aligned.model is not None and aligned.recording.joint_mm is not None:
+        without["joints"] = {**total, "joint": -aligned.rows.joint_mm}
+    if aligned.model is not None and aligned.recording.frame_mm is not None:
+        without["frame"] = {**total, "frame": -aligned.rows.frame_mm}
+    for name in by_effect:
+        without[name] = sum_deltas([added for other, added in by_effect.items() if other != name])
+    return without

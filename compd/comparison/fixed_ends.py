@@ -57,7 +57,7 @@ class FixedEnds:
         """How many numbers are always fitted along."""
         return len(self.name) * (PLACE_NUMBERS + (self.of_lengths and not self.absolute))
 
-    def select(self, index: IntArray) -> FixedEnds:
+    def select(self, index: IntArray | slice) -> FixedEnds:
         """The rows of this index (R,)."""
         return replace(self, of_row=self.of_row[index])
 

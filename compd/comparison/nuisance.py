@@ -62,19 +62,33 @@ def nuisance_beside(
     return np.asarray((columns_um / norms) @ combinations[sizes > LEAST_SHARE].T)
 
 
+def nuisance_parameters(
+    aligned: AlignedRecording, effects: Sequence[FittedEffect], residual_um: FloatArray, use: BoolArray
+) -> FloatArray:
+    """(Q,) the nuisance terms of a residual (N, m), fitted to the rows `use` (N,) by robust regression.
+
+    Zeros where no row is left.
+    """
+    return _fitted_parameters(aligned, nuisance_columns(aligned, effects), residual_um, use)
+
+
 def fit_along(
     aligned: AlignedRecording, effects: Sequence[FittedEffect], residual_um: FloatArray, use: BoolArray
 ) -> FittedAlong:
-    """What the nuisance terms explain of a residual (N, m), fitted to the rows `use` (N,) by robust regression.
-
-    Zeros where there are none, or where no row is left.
-    """
-    none = np.zeros_like(residual_um)
+    """What the nuisance terms explain of a residual (N, m), fitted as in `nuisance_parameters`; zeros without any."""
     G = nuisance_columns(aligned, effects)
-    if not G.shape[2] or not use.any():
+    if not G.shape[2]:
+        none = np.zeros_like(residual_um)
         return FittedAlong(none, none)
-    # of attitudes beside lengths each coordinate counts in its own scatter: urad and um have no size in common
-    size_um = np.maximum(trimmed_scale(residual_um[use]), LEAST_SIGMA) if aligned.with_attitude else np.ones(1)
-    theta = robust_regression(G[use] / size_um[:, None], residual_um[use] / size_um)
+    theta = _fitted_parameters(aligned, G, residual_um, use)
     count = aligned.registration_columns.shape[2]
     return FittedAlong(G[:, :, :count] @ theta[:count], G[:, :, count:] @ theta[count:])
+
+
+def _fitted_parameters(aligned: AlignedRecording, G: FloatArray, residual_um: FloatArray, use: BoolArray) -> FloatArray:
+    """(Q,) of the columns G (N, m, Q)."""
+    if not G.shape[2] or not use.any():
+        return np.zeros(G.shape[2])
+    # of attitudes beside lengths each coordinate counts in its own scatter: urad and um have no size in common
+    size_um = np.maximum(trimmed_scale(residual_um[use]), LEAST_SIGMA) if aligned.with_attitude else np.ones(1)
+    return robust_regression(G[use] / size_um[:, None], residual_um[use] / size_um)

@@ -29,8 +29,8 @@ def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedR
     Parameters
     ----------
     path : str or Path
-        The recording NAME.csv; its sidecar NAME.yaml lies beside it. The sidecar says which machine it is, and what
-        the reference instrument measured.
+        The recording, NAME.csv or NAME.parquet; its sidecar NAME.yaml lies beside it. The sidecar says which machine
+        it is, and what the reference instrument measured.
     machine : str, Path or Configuration, optional
         The machine as `load_machine` takes it. Left out, the configuration that comes with compd under the name in
         the sidecar; with ``machine: external`` in the sidecar there is none, and the prediction of your own model is
@@ -68,7 +68,7 @@ def read_with_machine(
     Raises RecordingError as `open_recording` does, CompdError where the file `machine` cannot be used.
     """
     problems: list[Problem] = []
-    configuration = _shipped(path.with_suffix(".yaml"), problems) if machine is None else load_machine(machine)
+    configuration = recorded_machine(path, machine, problems)
     try:
         recording = read_recording(path, configuration, needs_reference)
     except RecordingError as error:
@@ -76,6 +76,15 @@ def read_with_machine(
     if problems:
         raise RecordingError(problems)
     return recording, configuration
+
+
+def recorded_machine(path: Path, machine: Machine | None, problems: list[Problem]) -> Configuration | None:
+    """The configuration of a recording's machine: `machine`, else the one that its sidecar names; None for an external
+    model.
+
+    problems : gets one where no such configuration comes with compd.  Raises ConfigurationError as `load_machine`.
+    """
+    return _shipped(path.with_suffix(".yaml"), problems) if machine is None else load_machine(machine)
 
 
 def _shipped(sidecar_path: Path, problems: list[Problem]) -> Configuration | None:

@@ -2,12 +2,60 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.statistics.replicates import replicate_pairs
 from compd.comparison.statistics.robust import LEAST_SIGMA, robust_sigma, trimmed_scale
+
+
+class OutlierLimits(NamedTuple):
+    """Beyond which a residual is an outlier, (m,) each, um.
+
+    middle_um : median of each coordinate.  limit_um : how far from it a row may be.
+    near_um : how near a replicate must be to confirm a row; None without replicates.
+    """
+
+    middle_um: FloatArray
+    limit_um: FloatArray
+    near_um: FloatArray | None
+
+    def outliers(self, residual_um: FloatArray, use: BoolArray, visit: IntArray | None) -> BoolArray:
+        """(N,) outliers among the rows `use` (N,) of a residual (N, m); see `outlier_rows`."""
+        finite = np.isfinite(residual_um).all(axis=1)
+        outlier = use & finite & (np.abs(residual_um - self.middle_um) > self.limit_um).any(axis=1)
+        if visit is None or self.near_um is None:
+            return np.asarray(outlier)
+        for row in np.flatnonzero(outlier & (visit >= 0)):
+            others = np.flatnonzero(use & finite & (visit == visit[row]))
+            distance_um = np.abs(residual_um[others[others != row]] - residual_um[row])
+            outlier[row] = not (distance_um <= self.near_um).all(axis=1).any()
+        return np.asarray(outlier)
+
+
+def outlier_limits(
+    residual_um: FloatArray,
+    use: BoolArray,
+    visit: IntArray | None = None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> OutlierLimits:
+    """The limits by the rows `use` (N,) of a residual (N, m); infinite where these are too few."""
+    if use.sum() < criteria.fewest_rows:
+        nowhere = np.full(residual_um.shape[1], np.inf)
+        return OutlierLimits(np.zeros_like(nowhere), nowhere, None)
+    middle_um = np.median(residual_um[use], axis=0)
+    sigma_um = robust_sigma(residual_um[use] - middle_um)
+    limit_um = criteria.outlier_sigmas * np.maximum(sigma_um, LEAST_SIGMA)
+    pairs = replicate_pairs(use & np.isfinite(residual_um).all(axis=1), visit)
+    if pairs is None:
+        return OutlierLimits(middle_um, limit_um, None)
+    # of few repeats, an outlier among them makes most of the scatter, which then must not be its own measure
+    noise_um = np.minimum(trimmed_scale(pairs.difference(residual_um), pairs.weight), sigma_um)
+    near_um = criteria.outlier_sigmas * np.sqrt(2.0) * np.maximum(noise_um, LEAST_SIGMA)
+    return OutlierLimits(middle_um, limit_um, near_um)
 
 
 def outlier_rows(
@@ -22,22 +70,4 @@ def outlier_rows(
     visit : (N,) number of the visit, negative for none. A row that another row of the same visit repeats is no
     outlier: the machine really was there, and what the model lacks there is to be explained.
     """
-    outlier = np.zeros(len(residual_um), dtype=bool)
-    if use.sum() < criteria.fewest_rows:
-        return outlier
-    middle_um = np.median(residual_um[use], axis=0)
-    sigma_um = robust_sigma(residual_um[use] - middle_um)
-    limit_um = criteria.outlier_sigmas * np.maximum(sigma_um, LEAST_SIGMA)
-    finite = np.isfinite(residual_um).all(axis=1)
-    outlier = use & finite & (np.abs(residual_um - middle_um) > limit_um).any(axis=1)
-    pairs = replicate_pairs(use & finite, visit)
-    if visit is None or pairs is None or not outlier.any():
-        return outlier
-    # of few repeats, an outlier among them makes most of the scatter, which then must not be its own measure
-    noise_um = np.minimum(trimmed_scale(pairs.difference(residual_um), pairs.weight), sigma_um)
-    near_um = criteria.outlier_sigmas * np.sqrt(2.0) * np.maximum(noise_um, LEAST_SIGMA)
-    for row in np.flatnonzero(outlier & (visit >= 0)):
-        others = np.flatnonzero(use & finite & (visit == visit[row]))
-        distance_um = np.abs(residual_um[others[others != row]] - residual_um[row])
-        outlier[row] = not (distance_um <= near_um).all(axis=1).any()
-    return outlier
+    return outlier_limits(residual_um, use, visit, criteria).outliers(residual_um, use, visit)

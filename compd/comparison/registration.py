@@ -82,23 +82,26 @@ def _rigid_motion(measured_mm: FloatArray, predicted_mm: FloatArray) -> Registra
     return Registration(matrix, predicted_centroid_mm - matrix @ measured_centroid_mm, len(measured_mm))
 
 
-def registration_columns(tip_M_mm: FloatArray, axes: Sequence[int]) -> FloatArray:
+def registration_columns(
+    tip_M_mm: FloatArray, axes: Sequence[int], points_M_mm: FloatArray | None = None
+) -> FloatArray:
     """(N, m, m + 3 or fewer) derivatives of what the instrument shows by a small motion of its frame.
 
     tip_M_mm : (N, 3) modelled points, nan along axes that are not known.  axes : the m measured ones, 0, 1, 2 for
-        x, y, z.
+        x, y, z.  points_M_mm : (K, 3) the points about which rotations are counted; the N ones if None.
     The first m columns are displacements along `axes`: unit vectors. Then come small rotations about the centroid c of
     the points, phi x (p_i - c), divided by the points' spread s = rms of the coordinates of p_i - c: so all have one
     size and unit (mm). A rotation that moves a measured coordinate by one that is not known is left out: of points in a
     plane only the rotation in the plane is left.
     """
     columns = list(displacement_columns(len(tip_M_mm), len(axes)).transpose(2, 0, 1))
-    known: BoolArray = np.asarray(np.isfinite(tip_M_mm).any(axis=0))
-    rows = np.isfinite(tip_M_mm[:, known]).all(axis=1)
+    points_M_mm = tip_M_mm if points_M_mm is None else points_M_mm
+    known: BoolArray = np.asarray(np.isfinite(points_M_mm).any(axis=0))
+    rows = np.isfinite(points_M_mm[:, known]).all(axis=1)
     if not known.any() or not rows.any():
         return np.stack(columns, axis=2)
-    lever_mm = tip_M_mm - tip_M_mm[rows].mean(axis=0)
-    spread_mm = points_spread_mm(tip_M_mm)
+    lever_mm = tip_M_mm - points_M_mm[rows].mean(axis=0)
+    spread_mm = points_spread_mm(points_M_mm)
     for about in range(3):
         first, second = (about + 1) % 3, (about + 2) % 3
         # phi e_about x lever: the first axis moves by minus the second's lever, the second by the first's

@@ -22,20 +22,13 @@ def thinned(aligned: AlignedRecording, most_rows: int) -> AlignedRecording:
     if len(aligned.rows) <= most_rows:
         return aligned
     index = _evenly_drawn(aligned.recording, most_rows)
-    recording, rows = aligned.recording.select(index), aligned.rows.select(index)
     starts = np.zeros(len(index), dtype=bool)
     starts[:1] = True
     # a session whose first row was not kept starts with the next one
     session = np.cumsum(aligned.rows.session_start)[index]
     starts[1:] = session[1:] != session[:-1]
-    return replace(
-        aligned,
-        recording=recording,
-        rows=replace(rows, session_start=starts),
-        measured_mm=aligned.measured_mm[index],
-        ends=None if aligned.ends is None else aligned.ends.select(index),
-        _by_port={},
-    )
+    chosen = aligned.select(index)
+    return replace(chosen, rows=replace(chosen.rows, session_start=starts))
 
 
 def _evenly_drawn(recording: Recording, most_rows: int) -> IntArray:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
+from typing import TypeAlias
 
 import numpy as np
 
+from compd.arrays import FloatArray
 from compd.comparison.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.comparison import Comparison
@@ -21,11 +24,25 @@ from compd.model.library import load_library
 from compd.model_document import Declaration, Kind, ModelStep, StoredModel
 from compd.model_file import ModelFile
 
+# What makes of a fit, and the standard deviations (m,) of the noise that it was weighed by, a better one.
+Refinement: TypeAlias = Callable[[FitResult, FloatArray], FitResult]
 
-def add(model: ModelFile, declared: Declaration, effect: Effect, aligned: AlignedRecording) -> ModelFile:
+
+def unrefined(result: FitResult, sigma_um: FloatArray) -> FitResult:
+    """The fit as it is."""
+    return result
+
+
+def add(
+    model: ModelFile,
+    declared: Declaration,
+    effect: Effect,
+    aligned: AlignedRecording,
+    refine: Refinement = unrefined,
+) -> ModelFile:
     """Add an effect and fit all effects together; its nonlinear constants are searched.
 
-    declared : how the file declares the effect.
+    declared : how the file declares the effect.  refine : of a sample, to fit on all rows of its recording.
     Raises StateError where the model has the effect already, CompdError where it cannot be fitted on this recording.
     """
     if effect.id in [fitted.effect.id for fitted in model.fitted]:
@@ -39,11 +56,14 @@ def add(model: ModelFile, declared: Declaration, effect: Effect, aligned: Aligne
     before = compare(aligned, model.fitted, model.covariance)
     result = search_constants(aligned, model.fitted, effect, before.floor.by_axis_um)
     extended = replace(model, declared=(*model.declared, declared))
-    return _changed(extended, model, result, before, "add", effect.id)
+    return _changed(extended, model, refine(result, before.floor.by_axis_um), before, "add", effect.id)
 
 
-def remove(model: ModelFile, effect_id: str, aligned: AlignedRecording) -> ModelFile:
-    """Take an effect out and fit the others again. Raises StateError where the model has no such effect."""
+def remove(model: ModelFile, effect_id: str, aligned: AlignedRecording, refine: Refinement = unrefined) -> ModelFile:
+    """Take an effect out and fit the others again, `refine` as of `add`.
+
+    Raises StateError where the model has no such effect.
+    """
     ids = [fitted.effect.id for fitted in model.fitted]
     if effect_id not in ids:
         raise StateError(
@@ -57,17 +77,20 @@ def remove(model: ModelFile, effect_id: str, aligned: AlignedRecording) -> Model
     before = compare(aligned, model.fitted, model.covariance)
     result = fit(aligned, model.fitted[:k] + model.fitted[k + 1 :], before.floor.by_axis_um)
     reduced = replace(model, declared=model.declared[:k] + model.declared[k + 1 :])
-    return _changed(reduced, model, result, before, "remove", effect_id)
+    return _changed(reduced, model, refine(result, before.floor.by_axis_um), before, "remove", effect_id)
 
 
-def refit(model: ModelFile, aligned: AlignedRecording) -> ModelFile:
-    """Fit all effects again from zero, nonlinear constants as they are. Raises StateError where there are none."""
+def refit(model: ModelFile, aligned: AlignedRecording, refine: Refinement = unrefined) -> ModelFile:
+    """Fit all effects again from zero, nonlinear constants as they are, `refine` as of `add`.
+
+    Raises StateError where there are none.
+    """
     if not model.fitted:
         raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))
     before = compare(aligned, model.fitted, model.covariance)
     unfitted = [initial_effect(fitted.effect, fitted.constants, aligned.rows.links) for fitted in model.fitted]
     result = fit(aligned, unfitted, before.floor.by_axis_um)
-    return _changed(model, model, result, before, "fit", "")
+    return _changed(model, model, refine(result, before.floor.by_axis_um), before, "fit", "")
 
 
 def undo(stored: StoredModel, where: str) -> StoredModel:

@@ -85,7 +85,7 @@ def join_at_rest(
     by: By,
     plan: Path | None = None,
 ) -> RestJoin:
-    """Write `out` (NAME.csv and NAME.yaml): what `match_at_rest` puts together.
+    """Write `out` (NAME.csv or NAME.parquet, and NAME.yaml): what `match_at_rest` puts together.
 
     Raises RecordingError as it does, and where the files cannot be written.
     """

@@ -77,7 +77,7 @@ def join_reference(
     offset_s: float | None = None,
     moving: bool = False,
 ) -> JoinResult:
-    """Write `out` (NAME.csv and NAME.yaml): what `match_by_time` puts together.
+    """Write `out` (NAME.csv or NAME.parquet, and NAME.yaml): what `match_by_time` puts together.
 
     Raises RecordingError as it does, and where the files cannot be written.
     """

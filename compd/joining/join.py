@@ -84,7 +84,7 @@ def unfit_option(by: JoinBy, options: JoinOptions) -> str:
 def match_export(gauges: Path, export: InstrumentExport, options: JoinOptions) -> JoinResult | RestJoin:
     """What `compd join` writes, before it is written.
 
-    gauges : a recording of gauges alone, NAME.csv.
+    gauges : a recording of gauges alone, NAME.csv or NAME.parquet.
     Raises RecordingError with every reason why the two cannot be told to belong together, or an option is not fit.
     """
     by = choose_by(options.by, export)

@@ -118,8 +118,8 @@ class Observations:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def select(self, index: IntArray) -> Observations:
-        """The rows of this index (R,), in its order."""
+    def select(self, index: IntArray | slice) -> Observations:
+        """The rows of this index (R,), in its order; of a slice without a copy."""
         chosen: dict[str, Any] = {
             column.name: getattr(self, column.name)[index]
             for column in fields(self)
@@ -128,15 +128,16 @@ class Observations:
         quantities = {name: values[index] for name, values in self.quantities.items()}
         return replace(self, **chosen, quantities=quantities)
 
-    def extended_by(self, rows: Observations) -> Observations:
-        """These rows and then those of the same machine, with the quantities that both have."""
+    def extended_by(self, *later: Observations) -> Observations:
+        """These rows and then those of the same machine, with the quantities that all have."""
+        parts = (self, *later)
         joined: dict[str, Any] = {
-            column.name: np.concatenate([getattr(self, column.name), getattr(rows, column.name)])
+            column.name: np.concatenate([getattr(part, column.name) for part in parts])
             for column in fields(self)
             if isinstance(getattr(self, column.name), np.ndarray)
         }
-        names = [name for name in self.quantities if name in rows.quantities]
-        quantities = {name: np.concatenate([self.quantities[name], rows.quantities[name]]) for name in names}
+        names = [name for name in self.quantities if all(name in part.quantities for part in later)]
+        quantities = {name: np.concatenate([part.quantities[name] for part in parts]) for name in names}
         return replace(self, **joined, quantities=quantities)
 
     @property

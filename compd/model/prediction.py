@@ -9,7 +9,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.model.deltas import Deltas
 from compd.model.effect import Port
-from compd.model.frame import Frame, solve_frame
+from compd.model.frame import solve_frame
 from compd.model.kernels.joints import joint_shortening
 from compd.model.kernels.rotation import compose, rotation_matrix
 from compd.model.kinematics import Mechanism, forward_kinematics, link_length_mm
@@ -34,14 +34,13 @@ class Prediction(NamedTuple):
 class PerturbedMachine(NamedTuple):
     """The machine with something added at its ports, before any link length is known.
 
-    frame : by equation (3).  mechanism : with the base joints as they are now.
+    mechanism : with the base joints as they are now, by equation (3).
     tool_mm : (..., 3), in {P}; of a tool that stands on the plate, in {M}.
     joint_shortening_mm : (..., n), gB + gS of equation (1).
     reading_to_length_mm : (..., n), what the ports `scale` and `link` add between a scale's reading and its link.
     reason : (...), a Reason, of the frame and the joint comparators.
     """
 
-    frame: Frame
     mechanism: Mechanism
     tool_mm: FloatArray
     joint_shortening_mm: FloatArray
@@ -50,29 +49,38 @@ class PerturbedMachine(NamedTuple):
 
 
 def perturb_machine(
-    model: MachineModel, joint_mm: FloatArray, frame_mm: FloatArray, deltas: Deltas, nominal_frame: Frame | None = None
+    model: MachineModel,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    deltas: Deltas,
+    base_joints_M_mm: FloatArray | None = None,
 ) -> PerturbedMachine:
     """The machine with gauges and `deltas` accounted for; forward and inverse kinematics both start from it.
 
     joint_mm (..., k), frame_mm (..., 9): changes since machine zero.  deltas : (..., size) per port, in mm (rad for
-    directions); a port left out gets nothing.  nominal_frame : the frame without deltas, where it is solved already.
+    directions); a port left out gets nothing.  base_joints_M_mm : (..., n, 3) without deltas, where the frame is solved
+    already.
     """
-    frame = nominal_frame
-    if frame is None or "frame" in deltas or "plate" in deltas:
+    frame_reason: IntArray = np.zeros((), dtype=np.int64)
+    # a row without a frame is solved again: only that gives the reason
+    if base_joints_M_mm is None or {"frame", "plate"} & set(deltas) or not np.isfinite(base_joints_M_mm).all():
         geometry = model.frame._replace(
             plate_points_M_mm=_add_to_points(model.frame.plate_points_M_mm, "plate", deltas)
         )
-        distances_mm = model.zero.distances_mm + _add(frame_mm, "frame", deltas)
-        frame = solve_frame(geometry, distances_mm, None if nominal_frame is None else nominal_frame.supports_M_mm)
+        since_zero_mm = _add(frame_mm, "frame", deltas)
+        if "plate" not in deltas and since_zero_mm.ndim == 2 and (since_zero_mm == since_zero_mm[:1]).all():
+            since_zero_mm = since_zero_mm[:1]  # a frame that does not move is solved once
+        frame = solve_frame(geometry, model.zero.distances_mm + since_zero_mm)
+        base_joints_M_mm, frame_reason = frame.base_joints_M_mm, frame.reason
     shortening_mm, reason = joint_shortening(model.joint_weights, _add(joint_mm, "joint", deltas))
     mechanism = Mechanism(
-        _add_to_points(frame.base_joints_M_mm, "base_joint", deltas),
+        _add_to_points(base_joints_M_mm, "base_joint", deltas),
         _add_to_points(model.platform_joints_P_mm, "platform_joint", deltas),
         _add_to_points(model.revolute_axes_P, "revolute_axis", deltas),
     )
     tool_mm = _add(model.arrangement.tool_mm, "tool", deltas)
     to_length_mm = deltas.get("scale", 0.0) + deltas.get("link", 0.0)
-    return PerturbedMachine(frame, mechanism, tool_mm, shortening_mm, to_length_mm, np.maximum(reason, frame.reason))
+    return PerturbedMachine(mechanism, tool_mm, shortening_mm, to_length_mm, np.maximum(reason, frame_reason))
 
 
 def predict(model: MachineModel, rows: Observations, deltas: Deltas) -> Prediction:
@@ -87,7 +95,7 @@ def predict(model: MachineModel, rows: Observations, deltas: Deltas) -> Predicti
         longer = predict(model, rows, {"scale": np.full((len(rows), model.links), 1e-3)})
         change_um = (longer.tip_mm - nominal.tip_mm) * 1e3
     """
-    machine = perturb_machine(model, rows.joint_mm, rows.frame_mm, deltas)
+    machine = perturb_machine(model, rows.joint_mm, rows.frame_mm, deltas, rows.base_joints_M_mm)
     length_mm = link_length_mm(model.zero.link_length_mm, rows.scale_mm, machine.joint_shortening_mm)
     pose = forward_kinematics(
         machine.mechanism, length_mm + machine.reading_to_length_mm, rows.origin_M_mm, rows.rotation_M_P

@@ -9,7 +9,7 @@ from compd.recording.sidecar import read_sidecar
 
 
 def machine_of(recording: Path, machine: Path | None) -> Path | None:
-    """`machine` where the recording NAME.csv is of it; None for the shipped one that the recording names."""
+    """`machine` where the recording is of it; None for the shipped one that the recording names."""
     if machine is None:
         return None
     sidecar = read_sidecar(recording.with_suffix(".yaml"), [])

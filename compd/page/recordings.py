@@ -15,6 +15,9 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
+from compd.recording.open_part import ARROW
+from compd.recording.table_file import SUFFIXES
+
 # Of a recording: letters and digits, so that it is a file's name on every system and never a path.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 _END_WITHIN_S = 10.0
@@ -44,7 +47,7 @@ class Recordings:
     def listed(self) -> list[dict[str, Any]]:
         """Every part of every recording, the newest first."""
         found = []
-        for path in filter(_is_own, self.directory.glob("*.csv")):
+        for path in recording_tables(self.directory).values():
             try:
                 stat = path.stat()
             except FileNotFoundError:  # somebody has just removed it
@@ -75,7 +78,7 @@ class Recordings:
     async def _start(self, name: str, burst_s: float | None) -> str:
         if self.running is not None:
             return f"{self.running.name} is being recorded already"
-        if any(self.directory.glob(f"{name}-*.csv")):
+        if any(any(self.directory.glob(f"{name}-*{suffix}")) for suffix in (*SUFFIXES, ARROW)):
             return f"{name} is there already"
         self.directory.mkdir(parents=True, exist_ok=True)
         words = self.command(name, burst_s)
@@ -108,15 +111,21 @@ class Recordings:
         return _zipped(paths) if paths else None
 
     def _files_of(self, name: str) -> Sequence[Path]:
-        if not NAME.fullmatch(name) or not _is_own(self.directory / f"{name}.csv"):
+        if not NAME.fullmatch(name) or name not in recording_tables(self.directory):
             return []
-        return sorted(filter(_is_own, self.directory.glob(f"{name}.*")))
+        return sorted(filter(is_own, self.directory.glob(f"{name}.*")))
 
     async def _watch(self, running: Running) -> None:
         _, errors = await running.process.communicate()
         if running.process.returncode:
             self.last_words = errors.decode(errors="replace").strip()[-500:]
         self.running = None
+
+
+def recording_tables(directory: Path) -> dict[str, Path]:
+    """Name -> table of every recording in the directory; where there are CSV and Parquet of one name, CSV."""
+    paths = [path for suffix in reversed(SUFFIXES) for path in directory.glob(f"*{suffix}") if is_own(path)]
+    return {path.stem: path for path in paths}
 
 
 def _zipped(paths: Sequence[Path]) -> Iterator[bytes]:
@@ -129,6 +138,6 @@ def _zipped(paths: Sequence[Path]) -> Iterator[bytes]:
             yield piece
 
 
-def _is_own(path: Path) -> bool:
+def is_own(path: Path) -> bool:
     """Whether it is a file of the directory itself: a link leads anywhere."""
     return path.is_file() and not path.is_symlink()

@@ -1,6 +1,7 @@
 """A recording: raw readings of a machine beside an external reference, as files and as arrays.
 
-On disk a recording is NAME.csv (one row per instant, a header, `.` decimal, UTF-8) beside NAME.yaml, the sidecar.
+On disk a recording is NAME.csv (one row per instant, a header, `.` decimal, UTF-8), or NAME.parquet with the same
+columns, beside NAME.yaml, the sidecar.
 
 An empty cell is a missing value. A column's name ends in its unit. The format is described where it is checked:
 `columns.COLUMN_KINDS`, `sidecar.SECTIONS`, `checks.LIMITS`. For example, a sidecar:
@@ -15,5 +16,5 @@ An empty cell is a missing value. A column's name ends in its unit. The format i
     - {row: 17, reason: the tracker's beam was cut}
 
 Module `columns` has the names, units and decimals, `sidecar` the YAML; `writer` writes both files, `reader` reads and
-checks them.
+checks them, and `blocks` does so block by block; `convert` makes one table into the other.
 """

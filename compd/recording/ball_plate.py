@@ -11,8 +11,9 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.errors import Problem
 from compd.files import write_files
-from compd.recording.csv_table import CsvTable, read_table
+from compd.recording.csv_table import read_table
 from compd.recording.problem_list import ProblemList, rows_text, values_text
+from compd.recording.table import Table
 
 COLUMNS: Mapping[str, str] = {
     "ball": "number of the ball, each once",
@@ -26,11 +27,10 @@ _COLUMNS = tuple(COLUMNS)
 class BallPlate(NamedTuple):
     """A plate's calibration.
 
-    path, content : the file and its bytes. number : (B,) int, each once. position_mm : (B, 3) in the plate's own frame.
+    path : the file. number : (B,) int, each once. position_mm : (B, 3) in the plate's own frame.
     """
 
     path: Path
-    content: bytes
     number: IntArray
     position_mm: FloatArray
 
@@ -54,7 +54,7 @@ def read_plate(path: Path, problems: list[Problem]) -> BallPlate | None:
     if table is None or table_problems.problems:
         return None
     number = table.columns["ball"].astype(np.int64)
-    return BallPlate(path, table.content, number, np.column_stack([table.columns[name] for name in _COLUMNS[1:]]))
+    return BallPlate(path, number, np.column_stack([table.columns[name] for name in _COLUMNS[1:]]))
 
 
 def write_plate(path: Path, position_mm: FloatArray) -> None:
@@ -63,7 +63,7 @@ def write_plate(path: Path, position_mm: FloatArray) -> None:
     write_files({path: "\n".join([",".join(_COLUMNS), *lines]) + "\n"})
 
 
-def _check(table: CsvTable, problems: ProblemList) -> None:
+def _check(table: Table, problems: ProblemList) -> None:
     """Columns, cells and numbers of a plate's file."""
     if set(table.letters) != set(_COLUMNS):
         problems.add(
@@ -88,7 +88,7 @@ def _check(table: CsvTable, problems: ProblemList) -> None:
         problems.add(table.place("ball"), f"ball {repeated:g} comes twice", next_step="keep one")
 
 
-def check_balls(table: CsvTable, plate: BallPlate, problems: ProblemList) -> None:
+def check_balls(table: Table, plate: BallPlate, problems: ProblemList) -> None:
     """Every ball that a recording names must be on the plate."""
     ball = table.columns["ball"]
     unknown = ~np.isnan(ball) & ~np.isin(ball, plate.number)

@@ -17,6 +17,7 @@ ends in.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -24,8 +25,8 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.recording.columns import DISTANCE_COLUMN, ID_COLUMNS
-from compd.recording.csv_table import CsvTable
 from compd.recording.problem_list import ProblemList, rows_text, values_text
+from compd.recording.table import Table
 
 
 class Limit(NamedTuple):
@@ -87,10 +88,8 @@ LIMITS: tuple[Limit, ...] = tuple(
 _SMALLEST_JOINT_UM = 0.05
 
 
-def check_values(table: CsvTable, problems: ProblemList) -> None:
-    """Check every column: rules first (problems), then plausible limits (warnings)."""
-    if "time_s" in table.columns:
-        _check_time(table, problems)
+def check_values(table: Table, problems: ProblemList) -> None:
+    """Check every column but the time: rules first (problems), then plausible limits (warnings)."""
     for name in ID_COLUMNS:
         if name in table.columns and name not in table.labels:
             values = table.columns[name]
@@ -115,39 +114,61 @@ def check_values(table: CsvTable, problems: ProblemList) -> None:
     _check_limits(table, problems)
 
 
-def check_rows(table: CsvTable, excluded: BoolArray, needed: Iterable[str], problems: ProblemList) -> None:
-    """At least two rows must have everything; otherwise say where they went.
+class RowCount:
+    """How many rows have everything, counted block by block."""
 
-    A cell that was reported as wrong counts as filled, so that one mistake is reported once.
-    """
-    rows = len(table.row)
-    if rows < 2:
-        problems.add(
-            "",
-            "no rows" if rows == 0 else "only one row",
-            allowed="two rows or more",
-            next_step="record more, or give the right file",
-        )
-        return
-    usable = ~excluded
-    reasons = [f"{int(excluded.sum())} excluded in the sidecar"] if excluded.any() else []
-    for name in needed:
-        if name in table.wrong:
-            continue
-        empty = usable & np.isnan(table.columns[name])
-        if empty.any():
-            reasons.append(f"{int(empty.sum())} without {name}")
+    def __init__(self) -> None:
+        self.rows = 0
+        self._usable = 0
+        self._left_out: Counter[str] = Counter()
+
+    def add(self, table: Table, excluded: BoolArray, needed: Iterable[str]) -> None:
+        """Count the rows of a block. excluded : (N,) by a person. needed : columns that a row must have.
+
+        A cell that was reported as wrong counts as filled, so that one mistake is reported once.
+        """
+        usable = ~excluded
+        self._left_out["excluded in the sidecar"] += int(excluded.sum())
+        for name in needed:
+            if name in table.wrong:
+                continue
+            empty = usable & np.isnan(table.columns[name])
+            self._left_out[f"without {name}"] += int(empty.sum())
             usable &= ~empty
-    if usable.sum() < 2:
-        problems.add(
-            "",
-            f"{'no' if not usable.any() else 'only one'} row of {rows} can be used: {', '.join(reasons)}",
-            allowed="two rows or more",
-            next_step="fill these columns, or delete those that were not measured",
-        )
+        self.rows += len(table.row)
+        self._usable += int(usable.sum())
+
+    def check(self, problems: ProblemList) -> None:
+        """At least two rows must have everything; otherwise say where they went."""
+        if self.rows < 2:
+            problems.add(
+                "",
+                "no rows" if self.rows == 0 else "only one row",
+                allowed="two rows or more",
+                next_step="record more, or give the right file",
+            )
+        elif self._usable < 2:
+            reasons = [f"{count} {reason}" for reason, count in self._left_out.items() if count]
+            problems.add(
+                "",
+                f"{'no' if not self._usable else 'only one'} row of {self.rows} can be used: {', '.join(reasons)}",
+                allowed="two rows or more",
+                next_step="fill these columns, or delete those that were not measured",
+            )
 
 
-def _check_time(table: CsvTable, problems: ProblemList) -> None:
+def check_rising_time(table: Table, after_s: float, problems: ProblemList) -> None:
+    """Every row of a block is later than the one before it; the first than `after_s`, the last of the block before."""
+    with_time = np.flatnonzero(~np.isnan(table.columns["time_s"]))
+    rows = np.zeros(len(table.row), dtype=bool)
+    rows[with_time] = np.diff(table.columns["time_s"][with_time], prepend=after_s) <= 0
+    next_step = "sort the rows by time_s; where a clock began again, let it run on"
+    _report(
+        table, "time_s", rows, problems, "does not rise", "rows in the order of time, to be read in blocks", next_step
+    )
+
+
+def check_time(table: Table, problems: ProblemList) -> None:
     """No two rows have one time, and rows in the order of time keep together the sessions that the file keeps together.
 
     Rows that are out of order make a warning: what was measured does not depend on how a file is sorted.
@@ -174,7 +195,7 @@ def _check_time(table: CsvTable, problems: ProblemList) -> None:
         report(backwards, "time runs backwards", "rows are taken in the order of time", next_step, warn=True)
 
 
-def _check_limits(table: CsvTable, problems: ProblemList) -> None:
+def _check_limits(table: Table, problems: ProblemList) -> None:
     """Warn of values that are implausible for their unit; the values are used all the same."""
     for name, values in table.columns.items():
         for limit in LIMITS:
@@ -192,8 +213,16 @@ def _check_limits(table: CsvTable, problems: ProblemList) -> None:
                     warn=True,
                 )
                 break
+
+
+def largest_joint_um(table: Table) -> float:
+    """The largest number that a joint comparator shows; 0 where none shows any."""
     joints = [values for name, values in table.columns.items() if re.fullmatch(r"joint_\d+_um", name)]
-    largest = max((float(np.nanmax(np.abs(v))) for v in joints if not np.isnan(v).all()), default=0.0)
+    return max((float(np.nanmax(np.abs(values))) for values in joints if not np.isnan(values).all()), default=0.0)
+
+
+def check_joint_unit(largest: float, problems: ProblemList) -> None:
+    """Warn where the joint comparators never move by what they can resolve. largest : of the whole recording, um."""
     if 0 < largest < _SMALLEST_JOINT_UM:
         problems.warn(
             "columns joint_<k>_um",
@@ -204,7 +233,7 @@ def _check_limits(table: CsvTable, problems: ProblemList) -> None:
 
 
 def _report(
-    table: CsvTable,
+    table: Table,
     name: str,
     wrong: BoolArray,
     problems: ProblemList,

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from compd.configuration.operation import FRAME_DISTANCES
-from compd.recording.csv_table import CsvTable
 from compd.recording.problem_list import ProblemList
+from compd.recording.table import Table
 from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")
@@ -262,7 +262,7 @@ def _convertible(unit: str, right: str) -> bool:
     return right == "degC" or bool(conversion_text(unit, right)) or unit == "1"
 
 
-def correct_names(table: CsvTable, problems: ProblemList) -> CsvTable:
+def correct_names(table: Table, problems: ProblemList) -> Table:
     """The table with the names that were meant; every name that is not the format's own is reported.
 
     A corrected name is a problem all the same: its values may be in another unit. It is corrected so that the same
@@ -293,14 +293,12 @@ def correct_names(table: CsvTable, problems: ProblemList) -> CsvTable:
                 "a column of the format, or <name>_<unit> in lower case for anything else measured",
                 "rename it, e.g. humidity_pct; a number without unit ends in _1; or delete it",
             )
-    return CsvTable(
+    return Table(
         table.path,
-        table.content,
         {names[name]: letters for name, letters in table.letters.items() if name in names},
         {names[name]: values for name, values in table.columns.items() if name in names},
         table.row,
         {names[name]: labels for name, labels in table.labels.items() if name in names},
-        table.blank_rows,
         frozenset(names[name] for name in table.wrong if name in names),
     )
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from compd.recording.problem_list import ProblemList, column_letters, rows_text, values_text
+from compd.recording.table import FIRST_ROW
 
 # (spreadsheet row, stripped cells)
 Row = tuple[int, list[str]]
@@ -88,25 +89,26 @@ class CsvCells(NamedTuple):
     ----------
     names : column name -> index of its cells in a row.
     rows : each as wide as the header; empty rows are left out.
-    blank_rows : how many empty rows stood between others.
     """
 
     names: Mapping[str, int]
     rows: Sequence[Row]
-    blank_rows: int
 
 
-def read_cells(content: bytes, problems: ProblemList, is_header: HeaderTest) -> CsvCells | None:
-    """Cells of the CSV file `content`; what is wrong goes to `problems`. None where no header can be found."""
-    all_rows = _rows(_decode(content, problems), problems)
+def read_cells(content: bytes, problems: ProblemList, is_header: HeaderTest, first_row: int) -> CsvCells | None:
+    """Cells of the CSV file `content`; what is wrong goes to `problems`. None where no header can be found.
+
+    first_row : the row that the first line under the header has in the file; more than 2 in a block of a file.
+    """
+    rows_before = first_row - FIRST_ROW
+    all_rows = _rows(_decode(content, problems, rows_before), problems, rows_before)
     header_index = _find_header(all_rows, problems, is_header)
     if header_index is None:
         return None
-    header_row, header = all_rows[header_index]
+    header = all_rows[header_index][1]
     names = _column_names(header, all_rows[header_index + 1 :], problems)
     rows = [(row, cells) for row, cells in all_rows[header_index + 1 :] if any(cells)]
-    blank_rows = rows[-1][0] - header_row - len(rows) if rows else 0
-    if rows and _is_units_row(rows):
+    if rows and not rows_before and _is_units_row(rows):
         problems.add(
             f"row {rows[0][0]}",
             "units or text under the header",
@@ -115,15 +117,16 @@ def read_cells(content: bytes, problems: ProblemList, is_header: HeaderTest) -> 
             "delete the row",
         )
         rows = rows[1:]
-    return CsvCells(names, _fit_to_header(rows, len(header), problems), blank_rows)
+    return CsvCells(names, _fit_to_header(rows, len(header), problems))
 
 
-def _decode(content: bytes, problems: ProblemList) -> str:
+def _decode(content: bytes, problems: ProblemList, rows_before: int) -> str:
     """The text; bytes that are not UTF-8 are reported and read as Windows-1252, a spreadsheet's usual encoding."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         row = content.count(b"\n", 0, error.start) + 1
+        row += rows_before * (row > 1)
         problems.add(
             f"row {row}",
             "not UTF-8",
@@ -134,7 +137,7 @@ def _decode(content: bytes, problems: ProblemList) -> str:
         return content.decode("cp1252", "replace")
 
 
-def _rows(text: str, problems: ProblemList) -> list[Row]:
+def _rows(text: str, problems: ProblemList, rows_before: int) -> list[Row]:
     """Every line; a separator other than a comma is reported once."""
     first_line = text.split("\n", 1)[0]
     separator = max(",;\t", key=first_line.count)
@@ -151,9 +154,13 @@ def _rows(text: str, problems: ProblemList) -> list[Row]:
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
     try:
         for number, cells in enumerate(reader, start=1):
-            rows.append((number, [cell.strip() for cell in cells]))
+            rows.append((number + rows_before * (number > 1), [cell.strip() for cell in cells]))
     except csv.Error as error:
-        problems.add(f"line {reader.line_num}", f"not CSV: {error}", next_step="mend the quotes in and above this line")
+        problems.add(
+            f"line {reader.line_num + rows_before}",
+            f"not CSV: {error}",
+            next_step="mend the quotes in and above this line",
+        )
     return rows
 
 

@@ -20,7 +20,8 @@ _KEY = "excluded_rows"
 def exclude_rows(recording: Path, rows: Collection[int], reason: str) -> None:
     """Leave rows out of a recording.
 
-    recording : NAME.csv, with NAME.yaml beside it.  rows : as a spreadsheet shows them; the header is row 1.
+    recording : NAME.csv or NAME.parquet, with NAME.yaml beside it.
+    rows : as a spreadsheet shows them; the header is row 1.
     reason : why; it must be written.
 
     A row that is left out already gets the new reason. Comments in the sidecar stay, and so does the order of its keys.

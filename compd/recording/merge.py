@@ -37,7 +37,7 @@ class MergeResult(NamedTuple):
 
 
 def merge_recordings(recordings: Sequence[Recording], path: Path, overwrite: bool = False) -> MergeResult:
-    """Write NAME.csv (`path`) and NAME.yaml with the rows of all recordings, in the order given.
+    """Write NAME.csv or NAME.parquet (`path`) and NAME.yaml with the rows of all recordings, in the order given.
 
     Sessions, visits and points are numbered on, so that none of two recordings is taken for the same. Columns that
     a recording does not have are empty in its rows. Raises RecordingError with everything in which the recordings do

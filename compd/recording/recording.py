@@ -43,7 +43,7 @@ class Recording:
 
     Attributes
     ----------
-    path, sha256 : the CSV file; hash of it, its sidecar and its ball plate, for provenance.
+    path, sha256 : the table's file; hash of it, its sidecar and its ball plate, for provenance.
     sidecar : what the sidecar says; `machine` and `reference` are short for its own.
     row : (N,) row as a spreadsheet shows it, the header being row 1.
     time_s : (N,) seconds from the start, strictly rising, never nan; without `has_time` the number of the row.
@@ -128,8 +128,8 @@ class Recording:
         """N."""
         return len(self.time_s)
 
-    def select(self, index: IntArray) -> Recording:
-        """The rows of this index (R,), in its order."""
+    def select(self, index: IntArray | slice) -> Recording:
+        """The rows of this index (R,), in its order; of a slice without a copy."""
         chosen: dict[str, Any] = {}
         for column in fields(self):
             value = getattr(self, column.name)
@@ -138,6 +138,18 @@ class Recording:
             elif column.name in ("quantities", "columns"):
                 chosen[column.name] = {name: values[index] for name, values in value.items()}
         return replace(self, **chosen)
+
+    def extended_by(self, *later: Recording) -> Recording:
+        """These rows and then those of later parts of the same file, which have the same columns."""
+        parts = (self, *later)
+        joined: dict[str, Any] = {}
+        for column in fields(self):
+            values = [getattr(part, column.name) for part in parts]
+            if isinstance(values[0], np.ndarray):
+                joined[column.name] = np.concatenate(values)
+            elif column.name in ("quantities", "columns"):
+                joined[column.name] = {name: np.concatenate([each[name] for each in values]) for name in values[0]}
+        return replace(self, **joined)
 
     @property
     def gauge_columns(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Writing a recording: both files whole, or neither."""
+"""Writing a recording, as CSV or as Parquet: both files whole, or neither."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.files import write_files
+from compd.files import Content, write_files
 from compd.recording.columns import decimals, is_covariate, number_text, parse_name
+from compd.recording.parquet_writer import arrow_batch, arrow_schema, write_parquet
 from compd.recording.sidecar import sidecar_text
+from compd.recording.table_file import PARQUET, SUFFIXES
 
 
 def write_recording(
     path: Path, columns: Mapping[str, ArrayLike], sidecar: Mapping[str, Any], overwrite: bool = False
 ) -> None:
-    """Write NAME.csv (`path`) and NAME.yaml beside it, both whole or neither.
+    """Write NAME.csv or NAME.parquet (`path`) and NAME.yaml beside it, both whole or neither.
 
     Parameters
     ----------
@@ -32,19 +34,27 @@ def write_recording(
     ------
     RecordingError
         For names that are not the format's, unequal lengths, infinite numbers, a time_s that is missing or does not
-        rise, an existing file without `overwrite`, and a disk that does not take the files.
+        rise, an existing file without `overwrite`, a disk that does not take the files, and Parquet without pyarrow.
     """
     arrays = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()}
     if problems := _problems(path, arrays, overwrite):
         raise RecordingError(problems)
-    cells = [_cells(name, values) for name, values in arrays.items()]
-    lines = [",".join(arrays), *map(",".join, zip(*cells, strict=True))]
-    csv_text = "\n".join(lines) + "\n"
+    rounded = {name: _rounded(name, values) for name, values in arrays.items()}
+    table = _parquet(path, rounded) if path.suffix == PARQUET else _csv_text(rounded)
+    write_recording_files({path.with_suffix(".yaml"): sidecar_text(sidecar), path: table})
+
+
+def write_recording_files(contents: Mapping[Path, Content]) -> None:
+    """Write files of a recording, all whole or none; the last names the directory in messages.
+
+    Raises RecordingError where the disk does not take them.
+    """
     try:
         # whoever works on the recording must be able to read it
-        write_files({path.with_suffix(".yaml"): sidecar_text(sidecar), path: csv_text}, mode=0o644)
+        write_files(contents, mode=0o644)
     except OSError as error:
-        raise RecordingError(Problem(where=str(path.parent), what=f"cannot be written to: {error.strerror}")) from error
+        directory = list(contents)[-1].parent
+        raise RecordingError(Problem(where=str(directory), what=f"cannot be written to: {error.strerror}")) from error
 
 
 def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> list[Problem]:
@@ -53,8 +63,9 @@ def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> 
         for target in (path, path.with_suffix(".yaml"))
         if target.exists() and not overwrite
     ]
-    if path.suffix != ".csv":
-        problems.append(Problem(where=str(path), what="a recording is NAME.csv", value=path.suffix, allowed=".csv"))
+    if path.suffix not in SUFFIXES:
+        what = "a recording is NAME.csv or NAME.parquet"
+        problems.append(Problem(where=str(path), what=what, value=path.suffix, allowed=", ".join(SUFFIXES)))
     for name, values in arrays.items():
         where = f"{path}: column {name}"
         if parse_name(name) is None and not is_covariate(name):
@@ -83,6 +94,17 @@ def _rounded(name: str, values: FloatArray) -> FloatArray:
     return values if places is None else np.round(values, places)
 
 
-def _cells(name: str, values: FloatArray) -> list[str]:
-    """The column's cells; empty for nan."""
-    return ["" if math.isnan(value) else number_text(value) for value in _rounded(name, values).tolist()]
+def _parquet(path: Path, columns: Mapping[str, FloatArray]) -> Content:
+    """What writes the columns as Parquet."""
+    schema = arrow_schema(path, columns)
+    return lambda file: write_parquet(file, path, schema, [arrow_batch(path, schema, columns)])
+
+
+def _csv_text(columns: Mapping[str, FloatArray]) -> str:
+    """The columns as CSV; a cell is empty for nan."""
+    cells = [_cells(values) for values in columns.values()]
+    return "\n".join([",".join(columns), *map(",".join, zip(*cells, strict=True))]) + "\n"
+
+
+def _cells(values: FloatArray) -> list[str]:
+    return ["" if math.isnan(value) else number_text(value) for value in values.tolist()]

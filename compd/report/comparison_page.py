@@ -12,8 +12,10 @@ from compd.arrays import rms
 from compd.comparison.comparison import Comparison
 from compd.comparison.covariates import covariates
 from compd.comparison.display_unit import format_error
+from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.model_file import parameter_estimates
 from compd.number_text import number_text
+from compd.report.envelope_figure import plot_envelope
 from compd.report.figures import (
     plot_contributions,
     plot_histogram,
@@ -50,8 +52,8 @@ def summary(comparisons: Sequence[Comparison]) -> PageTable:
     rows += [[f"rms without {name}", *(_without(comparison, name) for comparison in comparisons)] for name in sources]
     rows += [
         ["prediction's own uncertainty", *(_uncertainty(comparison) for comparison in comparisons)],
-        ["rows used", *(str(int(comparison.used.sum())) for comparison in comparisons)],
-        ["rows beyond all noise", *(str(int(comparison.outlier.sum())) for comparison in comparisons)],
+        ["rows used", *(str(comparison.rows_used) for comparison in comparisons)],
+        ["rows beyond all noise", *(str(comparison.outlier_count) for comparison in comparisons)],
         ["rows left out", *(str(sum(comparison.left_out.values())) for comparison in comparisons)],
     ]
     return PageTable(head, rows)
@@ -78,9 +80,9 @@ def write_comparison_page(path: Path, comparisons: Sequence[Comparison], shared_
         f"{name_of(comparison)}: {_verdict(comparison)}" if len(comparisons) > 1 else _verdict(comparison)
         for comparison in comparisons
     )
-    panels = [
-        Panel("In numbers", "A rms is per coordinate: root of the mean over rows and axes.", summary(comparisons))
-    ]
+    bases = dict.fromkeys(comparison.basis for comparison in comparisons if comparison.basis)
+    caption = " ".join(["A rms is per coordinate: root of the mean over rows and axes.", *map(_sentence, bases)])
+    panels = [Panel("In numbers", caption, summary(comparisons))]
     if comparisons[0].fitted:
         numbers = _effects(comparisons[0])
         panels.append(Panel("The model's effects", "Fitted numbers with their standard errors.", numbers))
@@ -135,6 +137,7 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
             )
             for group, names in groups.items()
         ),
+        *_over_time(comparison),
         Panel(
             "Residual pulled back to the links",
             "The errors of link lengths that would explain the residual at "
@@ -156,6 +159,14 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
     return [Panel(prefix + panel.title, panel.caption, panel.content) for panel in panels]
 
 
+def _over_time(comparison: Comparison) -> list[Panel]:
+    """Of a long recording all rows; of others the residual against time has them."""
+    if not isinstance(comparison, StreamedComparison):
+        return []
+    caption = f"Of all {comparison.rows_used} rows: the smallest, the mean and the largest value of each short time."
+    return [Panel("Residual over time", caption, plot_envelope(comparison))]
+
+
 def _verdict(comparison: Comparison) -> str:
     """The result, with the noise floor's remark: it says that the recording may be wrong."""
     remark = comparison.floor.contradiction
@@ -168,10 +179,11 @@ def _sentence(text: str) -> str:
 
 def _excluded(comparison: Comparison) -> PageTable:
     rows = [[reason, str(count)] for reason, count in comparison.left_out.items()]
-    numbers = comparison.aligned.recording.row[comparison.outlier].tolist()
+    numbers = comparison.outlier_rows
     if numbers:
-        shown = ", ".join(map(str, numbers[:40])) + (f" and {len(numbers) - 40} more" if len(numbers) > 40 else "")
-        rows.append([f"beyond all noise: rows {shown}", str(len(numbers))])
+        more = comparison.outlier_count - 40
+        shown = ", ".join(map(str, numbers[:40])) + (f" and {more} more" if more > 0 else "")
+        rows.append([f"beyond all noise: rows {shown}", str(comparison.outlier_count)])
     return PageTable(("reason", "rows"), rows or [["none", "0"]])
 
 
@@ -200,9 +212,9 @@ def _floor(comparison: Comparison) -> str:
 def _axis(comparison: Comparison, label: str) -> str:
     if label not in comparison.aligned.labels:
         return "-"
-    size = np.abs(comparison.residual_um[comparison.used, comparison.aligned.labels.index(label)])
-    largest = format_error(float(size.max()), comparison.aligned.unit_of(label), 3)
-    return f"{_three(rms(size))} / {_three(np.quantile(size, 0.95))} / {largest}"
+    k = comparison.aligned.labels.index(label)
+    largest = format_error(float(comparison.largest_by_axis_um[k]), comparison.aligned.unit_of(label), 3)
+    return f"{_three(comparison.rms_by_axis_um[k])} / {_three(comparison.p95_by_axis_um[k])} / {largest}"
 
 
 def _constant(comparison: Comparison) -> str:
@@ -215,8 +227,8 @@ def _constant(comparison: Comparison) -> str:
 def _distance(comparison: Comparison) -> str:
     if comparison.aligned.of_links or len(comparison.aligned.labels) < 3:
         return "-"
-    distance = comparison.distance_um[comparison.used]
-    return f"{_three(rms(distance))} / {_three(np.quantile(distance, 0.95))} / {_shown(comparison, distance.max())}"
+    size = comparison.distance_size
+    return f"{_three(size.rms_um)} / {_three(size.p95_um)} / {_shown(comparison, size.largest_um)}"
 
 
 def _without(comparison: Comparison, name: str) -> str:

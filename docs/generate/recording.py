@@ -15,14 +15,19 @@ from docs.generate.schema import ModelSchema
 
 INTRODUCTION = f"""\
 A {term("recording")} is what a machine's gauges showed, row by row, with or without a {term("reference")} instrument
-beside it. It is two files: `NAME.csv`, one row per instant, and `NAME.yaml`, the sidecar. A spreadsheet can write both;
-`compd record` writes them from the running daemon, and `compd join` adds an instrument's export. `compd recording check
-NAME.csv` reports every mistake at once. See [join an instrument](../how-to/join-an-instrument.md) and [record and
-replay](../how-to/record-and-replay.md).
+beside it. It is two files: `NAME.csv` or `NAME.parquet`, one row per instant, and `NAME.yaml`, the sidecar. A
+spreadsheet can write CSV; `compd record` writes either from the running daemon, and `compd join` adds an instrument's
+export. `compd recording check NAME.csv` reports every mistake at once. See [join an
+instrument](../how-to/join-an-instrument.md) and [record and replay](../how-to/record-and-replay.md).
 """
 TABLE_RULES = """\
 The CSV file has one header row, `,` between cells, `.` as the decimal mark, and is UTF-8. An empty cell is a missing
 value. A column's name ends in its unit.
+
+The Parquet file has the same columns: numbers (`double` is what compd writes), with `null` for an empty cell and the
+unit again in the field's metadata (`unit`); the schema's metadata has `compd.format`. Columns of ids that hold text are
+strings. Rows are numbered as in the CSV file, whose header is row 1. It needs `pip install 'compd[parquet]'`.
+`compd recording convert` makes one into the other; the numbers stay the same to the last bit.
 """
 EXTERNAL_MODEL = f"""\
 With `machine: {EXTERNAL}` in the sidecar a column `model_...` stands beside every column `reference_...`: the
@@ -36,6 +41,9 @@ CYCLES = f"""\
 row the [`READINGS`](#protocol-readings) message as it came, line for line. Each message has all that its cycle computed
 from, so `compd replay` computes the same setpoint again, bit for bit. Model files that were in use are copied beside
 it.
+
+`compd record --format parquet` writes the open part as `NAME.arrow`, an Arrow stream of the same columns, which can be
+read to its last whole batch whatever ends the process; a part that is closed is `NAME.parquet`.
 """
 
 

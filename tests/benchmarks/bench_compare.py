@@ -90,8 +90,13 @@ def main() -> None:
 
 def command(arguments: list[str]) -> Cost:
     """Run `compd` in a process of its own."""
+    return cost([sys.executable, "-c", COMMAND, *arguments])
+
+
+def cost(arguments: list[str]) -> Cost:
+    """Run a command in a process of its own."""
     begin = time.perf_counter()
-    process = subprocess.Popen([sys.executable, "-c", COMMAND, *arguments], stdout=subprocess.PIPE)
+    process = subprocess.Popen(arguments, stdout=subprocess.PIPE)
     assert process.stdout is not None
     output = process.stdout.read()
     _, status, usage = os.wait4(process.pid, 0)

@@ -28,6 +28,16 @@ BOMBS = (
 
 
 @st.composite
+def changed_binary(draw: st.DrawFn, original: bytes) -> bytes:
+    """The bytes after up to six of them were changed, most often near the end, perhaps cut off."""
+    content = bytearray(original)
+    for _ in range(draw(st.integers(1, 6))):
+        end = draw(st.sampled_from([len(content), min(2000, len(content))]))
+        content[-draw(st.integers(1, end))] = draw(st.integers(0, 255))
+    return bytes(content[: draw(st.just(len(content)) | st.integers(0, len(content)))])
+
+
+@st.composite
 def changed_text(draw: st.DrawFn, originals: Sequence[str]) -> str:
     """One of the texts after up to six changes of lines and characters."""
     lines = draw(st.sampled_from(originals)).split("\n")

@@ -12,9 +12,11 @@ from compd.configuration import load
 from compd.errors import CompdError, ConfigurationError, RecordingError
 from compd.model.library.effects_file import load_effects
 from compd.model_file import read_model_file
+from compd.recording.blocks import recording_blocks
+from compd.recording.convert import convert_recording
 from compd.recording.reader import read_recording
 from tests.fuzz.bounds import examples, is_told, refusal
-from tests.fuzz.mutations import ALIASES, BOMBS, changed_bytes
+from tests.fuzz.mutations import ALIASES, BOMBS, changed_binary, changed_bytes
 from tests.support.live_models import file_with
 from tests.support.paths import CONFIG
 from tests.support.recordings import SIDECAR, csv_text
@@ -58,6 +60,21 @@ def test_a_changed_recording_is_one_or_is_refused(folder: Path, table: bytes, si
     path.write_bytes(table)
     path.with_suffix(".yaml").write_bytes(sidecar)
     assert is_told(refusal(lambda: read_recording(path), RecordingError, ConfigurationError))
+
+
+@given(data=st.data())
+@examples(100)
+def test_a_changed_parquet_file_is_a_recording_or_is_refused(folder: Path, data: st.DataObject) -> None:
+    (folder / "whole.yaml").write_text(SIDECAR)
+    (folder / "whole.csv").write_text(csv_text())
+    path = folder / "binary.parquet"
+    if not path.exists():
+        convert_recording(folder / "whole.csv", path)
+    changed = folder / "changed.parquet"
+    changed.with_suffix(".yaml").write_text(SIDECAR)
+    changed.write_bytes(data.draw(changed_binary(path.read_bytes())))
+    assert is_told(refusal(lambda: read_recording(changed), RecordingError))
+    assert is_told(refusal(lambda: list(recording_blocks(changed, rows=7)), RecordingError))
 
 
 @given(data=st.data())

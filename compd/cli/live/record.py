@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
+from compd.recording.table_format import TableFormat
 
 _MB = 1_000_000
 _S_PER_H = 3600.0
@@ -25,7 +26,10 @@ class WhenFull(StrEnum):
 
 
 def record(
-    name: Annotated[Path, typer.Argument(help="Where to: NAME becomes NAME-0001.csv and so on.")],
+    name: Annotated[
+        Path,
+        typer.Argument(help="Where to: NAME becomes NAME-0001.csv and so on, with --format parquet NAME-0001.parquet."),
+    ],
     address: DaemonOption = DEFAULT_SOCKET,
     rate_hz: Annotated[float, typer.Option(min=0.001, help="Rows per second; the cycles between are left out.")] = 10.0,
     burst: Annotated[
@@ -38,8 +42,16 @@ def record(
     when_full: Annotated[
         WhenFull, typer.Option(help="At the limit: end the recording, or delete its oldest part and say so.")
     ] = WhenFull.STOP,
+    table_format: Annotated[
+        TableFormat,
+        typer.Option(
+            "--format",
+            help="Of the table. A part of Parquet is NAME-0001.arrow until it is closed; what a kill leaves of it is "
+            "closed by the next `compd record` of the name, or by `compd recording convert`.",
+        ),
+    ] = TableFormat.CSV,
 ) -> None:
-    """Record raw readings, never corrected ones, from the running daemon: CSV, sidecar, and all that a replay needs.
+    """Record raw readings, never corrected ones, from the running daemon: table, sidecar, and all that a replay needs.
 
     When the daemon ends and starts again, the recording goes on in a new part.
     """
@@ -62,7 +74,7 @@ def record(
             shown.say,
             clock,
         )
-        recorder = Recorder(name, *feed.first_messages, keeping, shown.say, clock)
+        recorder = Recorder(name, *feed.first_messages, keeping, shown.say, clock, table_format)
         recorder.start()
         try:
             recorder.follow(shown.show(feed.messages(for_s), lambda: f"{recorder.rows} rows"))

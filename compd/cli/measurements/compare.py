@@ -20,7 +20,9 @@ MOST_SENTENCES = 6
 def compare(
     recordings: Annotated[
         list[Path],
-        typer.Argument(metavar="RECORDING...", help="The recordings: NAME.csv, each with NAME.yaml beside it."),
+        typer.Argument(
+            metavar="RECORDING...", help="The recordings: NAME.csv or NAME.parquet, each with NAME.yaml beside it."
+        ),
     ],
     machine: MachineOption = None,
     model: Annotated[
@@ -33,8 +35,6 @@ def compare(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails."""
-    from compd.api.diagnosis import compare as compare_recording
-    from compd.comparison.open import open_recording
     from compd.errors import CompdError, Problem
 
     if html is not None:
@@ -45,7 +45,7 @@ def compare(
     comparisons: list[Comparison] = []
     for path in recordings:
         try:
-            comparisons.append(compare_recording(open_recording(path, machine), model))
+            comparisons.append(_compare(path, machine, model))
         except CompdError as error:
             problems += error.problems
     if problems:
@@ -61,6 +61,24 @@ def compare(
     print_comparisons(comparisons)
     if html is not None:
         typer.echo(f"The same as pictures: {html}")
+
+
+def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison:
+    """In memory, or block by block where the recording is too long for it."""
+    from compd.comparison.stream.recording_stream import is_long
+
+    if not is_long(path):
+        from compd.api.diagnosis import compare as compare_recording
+        from compd.comparison.open import open_recording
+
+        return compare_recording(open_recording(path, machine), model)
+    from compd.api.long_recordings import compare_stream
+    from compd.cli.progress import rows_shown
+    from compd.recording.blocks import row_count
+
+    # read twice: for the sample, then row by row
+    with rows_shown(2 * row_count(path), f"comparing {path.name}") as progress:
+        return compare_stream(path, model, machine=machine, progress=progress)
 
 
 def print_comparisons(comparisons: list[Comparison]) -> None:
@@ -92,9 +110,11 @@ def print_comparisons(comparisons: list[Comparison]) -> None:
             console.print(f"  - {trend.text}")
         if len(comparison.trends) > MOST_SENTENCES:
             console.print(f"  and {len(comparison.trends) - MOST_SENTENCES} weaker ones (--json and --html have all)")
-        rows = comparison.aligned.recording.row[comparison.outlier].tolist()
+        rows = comparison.outlier_rows
         if rows:
-            shown = ", ".join(map(str, rows[:20])) + (" ..." if len(rows) > 20 else "")
+            shown = ", ".join(map(str, rows[:20])) + (" ..." if comparison.outlier_count > 20 else "")
             console.print(f"Rows beyond all noise, not used: {shown}")
         for why, count in comparison.left_out.items():
             console.print(f"{count} rows left out: {why}")
+        if comparison.basis:
+            console.print(f"{comparison.basis}.")

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
+
+if TYPE_CHECKING:
+    from compd.comparison.aligned_recording import AlignedRecording
 
 
 def diagnose(
@@ -16,7 +19,8 @@ def diagnose(
         list[Path],
         typer.Argument(
             metavar="RECORDING [SEALED...]",
-            help="NAME.csv to learn from; any others stay sealed until the end, when the result is tried on them once.",
+            help="NAME.csv or NAME.parquet to learn from; any others stay sealed until the end, when the result is "
+            "tried on them once.",
         ),
     ],
     machine: MachineOption = None,
@@ -33,7 +37,6 @@ def diagnose(
 
     from compd.api.diagnosis import diagnose as diagnose_recording
     from compd.cli.progress import steps_shown
-    from compd.comparison.open import open_recording
     from compd.diagnosis.holdout import evaluate_holdout
     from compd.report.diagnosis_text import print_diagnosis
 
@@ -41,8 +44,8 @@ def diagnose(
         from compd.report.page import check_page_path
 
         check_page_path(html, overwrite)
-    sealed = [open_recording(path, machine) for path in recordings[1:]]
-    aligned = open_recording(recordings[0], machine)
+    sealed = [_open(path, machine)[0] for path in recordings[1:]]
+    aligned, all_rows = _open(recordings[0], machine)
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]
@@ -52,8 +55,28 @@ def diagnose(
         write_diagnosis_page(html, diagnosis, holdouts)
     if as_json:
         data: dict[str, Any] = {**diagnosis.as_json(), "sealed": [holdout.as_json() for holdout in holdouts]}
+        if all_rows:
+            data["sample"] = {"rows": aligned.recording.rows, "of": all_rows}
         typer.echo(json.dumps(data, indent=1, allow_nan=False))
         return
     print_diagnosis(Console(highlight=False), diagnosis, holdouts)
+    if all_rows:
+        typer.echo(f"From a sample of {aligned.recording.rows} rows of {all_rows}, spread evenly.")
     if html is not None:
         typer.echo(f"The same as pictures: {html}")
+
+
+def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, int]:
+    """The recording and 0; of one that is too long for the memory a sample, and the number of its rows."""
+    from compd.comparison.open import open_recording
+    from compd.comparison.stream.recording_stream import is_long
+
+    if not is_long(path):
+        return open_recording(path, machine), 0
+    from compd.api.long_recordings import open_sample
+    from compd.cli.progress import rows_shown
+    from compd.recording.blocks import row_count
+
+    rows = row_count(path)
+    with rows_shown(rows, f"drawing a sample of {path.name}") as progress:
+        return open_sample(path, machine, progress=progress), rows

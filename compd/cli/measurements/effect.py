@@ -14,13 +14,14 @@ if TYPE_CHECKING:
 
     from compd.comparison.aligned_recording import AlignedRecording
     from compd.configuration import Configuration
+    from compd.diagnosis.model_changes import Refinement
     from compd.errors import Problem
     from compd.model.effect import Effect
     from compd.model_document import Declaration
     from compd.model_file import ModelFile
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
-RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv.")]
+RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv or NAME.parquet.")]
 DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show what would happen; write nothing.")]
 EFFECT_HELP = "An id from `compd effect list`; FILE.yaml with one effect, or FILE.yaml:ID; FILE.py:NAME."
 
@@ -87,11 +88,10 @@ def add(
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
     from compd.api.models import add_effect
-    from compd.comparison.open import open_recording
 
-    aligned = open_recording(recording, machine)
+    aligned, refine = _open(recording, machine)
     before = _read_model(model, aligned) if model.exists() else None
-    changed = add_effect(before, name, aligned, effects=effects or ())
+    changed = add_effect(before, name, aligned, effects=effects or (), refine=refine)
     _finish(model, before, changed, aligned, f"added {changed.steps[-1].effect}", dry_run)
 
 
@@ -104,12 +104,11 @@ def remove(
     dry_run: DryRunOption = False,
 ) -> None:
     """Take an effect out of a model and fit the others again."""
-    from compd.comparison.open import open_recording
     from compd.diagnosis.model_changes import remove as remove_effect
 
-    aligned = open_recording(recording, machine)
+    aligned, refine = _open(recording, machine)
     before = _read_model(model, aligned)
-    _finish(model, before, remove_effect(before, name, aligned), aligned, f"removed {name}", dry_run)
+    _finish(model, before, remove_effect(before, name, aligned, refine), aligned, f"removed {name}", dry_run)
 
 
 @effect.command()
@@ -117,12 +116,11 @@ def fit(
     recording: RecordingOption, model: ModelOption, machine: MachineOption = None, dry_run: DryRunOption = False
 ) -> None:
     """Fit all effects of a model again, on another recording."""
-    from compd.comparison.open import open_recording
     from compd.diagnosis.model_changes import refit
 
-    aligned = open_recording(recording, machine)
+    aligned, refine = _open(recording, machine)
     before = _read_model(model, aligned)
-    _finish(model, before, refit(before, aligned), aligned, "fitted again", dry_run)
+    _finish(model, before, refit(before, aligned, refine), aligned, "fitted again", dry_run)
 
 
 @effect.command()
@@ -139,6 +137,26 @@ def undo(model: ModelOption) -> None:
 
 def _declared_id(declared: Declaration) -> str:
     return declared if isinstance(declared, str) else str(declared["id"])
+
+
+def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinement]:
+    """The recording; of one that is too long for the memory a sample, and what fits to all its rows."""
+    from compd.comparison.open import open_recording
+    from compd.comparison.stream.recording_stream import is_long
+    from compd.diagnosis.model_changes import unrefined
+
+    if not is_long(path):
+        return open_recording(path, machine), unrefined
+    from compd.api.long_recordings import open_long
+    from compd.cli.progress import rows_shown
+    from compd.recording.blocks import row_count
+
+    rows = row_count(path)
+    with rows_shown(rows, f"drawing a sample of {path.name}") as progress:
+        long = open_long(path, machine, progress)
+    aligned = long.sample.aligned
+    typer.echo(f"Fitted to {rows} rows; errors are of a sample of {aligned.recording.rows}, spread evenly.")
+    return aligned, long.refine
 
 
 def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:

@@ -39,9 +39,13 @@ class FrameChoice(StrEnum):
 
 
 def join(
-    gauges: Annotated[Path, typer.Argument(help="The recording of the gauges, NAME.csv with NAME.yaml.")],
+    gauges: Annotated[
+        Path, typer.Argument(help="The recording of the gauges, NAME.csv or NAME.parquet with NAME.yaml.")
+    ],
     export: Annotated[Path, typer.Argument(help="The instrument's export: text, SpatialAnalyzer, CARTO or Excel.")],
-    out: Annotated[Path, typer.Argument(help="The recording to write: NAME.csv, and NAME.yaml beside it.")],
+    out: Annotated[
+        Path, typer.Argument(help="The recording to write: NAME.csv or NAME.parquet, and NAME.yaml beside it.")
+    ],
     time: Annotated[str | None, typer.Option(help="The export's time column; guessed from its name.")] = None,
     x: Annotated[str | None, typer.Option(help="The export's column of x; guessed from its name.")] = None,
     y: Annotated[str | None, typer.Option(help="The export's column of y; guessed from its name.")] = None,

@@ -22,7 +22,9 @@ class PlanShape(StrEnum):
 
 
 def plan(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="What was measured so far: NAME.csv.")],
+    recording: Annotated[
+        Path, typer.Argument(metavar="RECORDING", help="What was measured so far: NAME.csv or NAME.parquet.")
+    ],
     rivals: Annotated[str, typer.Option(help="Two effects or more, by id: A,B,C.")],
     rows: Annotated[int, typer.Option(min=2, help="How many rows may be measured.")] = 40,
     out: Annotated[Path | None, typer.Option(help="Where to write the rows (CSV); on the screen if left out.")] = None,

@@ -25,7 +25,7 @@ def _recording() -> None:
 
 @recording.command()
 def check(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv, with NAME.yaml beside it.")],
+    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
     machine: Annotated[
         Path | None,
         typer.Option("--machine", help="The machine's configuration; one that comes with compd is found by its name."),
@@ -46,10 +46,13 @@ def merge(
     recordings: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RECORDING RECORDING...", help="The recordings, NAME.csv with NAME.yaml, in the order of time."
+            metavar="RECORDING RECORDING...",
+            help="The recordings, NAME.csv or NAME.parquet with NAME.yaml, in the order of time.",
         ),
     ],
-    out: Annotated[Path, typer.Option(help="The recording to write: NAME.csv, and NAME.yaml beside it.")],
+    out: Annotated[
+        Path, typer.Option(help="The recording to write: NAME.csv or NAME.parquet, and NAME.yaml beside it.")
+    ],
     machine: MachineOption = None,
     overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
 ) -> None:
@@ -57,6 +60,7 @@ def merge(
     from compd.comparison.open import read_with_machine
     from compd.errors import CompdError, Problem
     from compd.recording.merge import ASSUMED_GAP_S, merge_recordings
+    from compd.recording.table_file import written_path
 
     if len(recordings) < 2:
         raise CompdError(
@@ -71,12 +75,33 @@ def merge(
             problems += error.problems
     if problems:
         raise CompdError(list(dict.fromkeys(problems)))
-    path = out if out.suffix == ".csv" else out.with_name(f"{out.name}.csv")
+    path = written_path(out)
     merged = merge_recordings(parts, path, overwrite)
     if not merged.gap_known:
         typer.echo(f"when each began is not recorded: {ASSUMED_GAP_S / 3600:g} h is put between them")
     counts = ", ".join(f"{part.path} {rows}" for part, rows in zip(parts, merged.rows, strict=True))
     typer.echo(f"written: {path}, {sum(merged.rows)} rows ({counts})")
+
+
+@recording.command()
+def convert(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it; or NAME.arrow, left by a "
+            "`compd record` that was killed."
+        ),
+    ],
+    destination: Annotated[Path, typer.Argument(help="What to write: NAME.parquet or NAME.csv.")],
+    overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
+) -> None:
+    """Write a recording of any length as Parquet or as CSV: the same numbers in the same rows, the same sidecar."""
+    from compd.cli.progress import rows_shown
+    from compd.recording.convert import convert_recording, rows_to_convert
+
+    with rows_shown(rows_to_convert(source), "rows") as progress:
+        rows = convert_recording(source, destination, overwrite, progress)
+    typer.echo(f"written: {destination}, {rows} rows")
 
 
 RowsOption = Annotated[
@@ -86,7 +111,7 @@ RowsOption = Annotated[
 
 @recording.command()
 def exclude(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv, with NAME.yaml beside it.")],
+    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
     rows: RowsOption,
     reason: Annotated[str, typer.Option(help="Why they are left out; it is kept in NAME.yaml.")],
 ) -> None:
@@ -100,7 +125,7 @@ def exclude(
 
 @recording.command()
 def include(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv, with NAME.yaml beside it.")],
+    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
     rows: RowsOption,
 ) -> None:
     """Let rows count again that were left out."""

@@ -23,7 +23,9 @@ class ReferenceKind(StrEnum):
 
 def campaign(
     config: Annotated[Path, typer.Argument(help="The machine's configuration; it is read, never written.")],
-    out: Annotated[Path, typer.Option(help="The recording to write: NAME.csv, and NAME.yaml beside it.")],
+    out: Annotated[
+        Path, typer.Option(help="The recording to write: NAME.csv or NAME.parquet, and NAME.yaml beside it.")
+    ],
     seed: Annotated[int, typer.Option(min=0, help="Machine, weather, points and noise follow from it.")] = 1,
     effect: Annotated[
         list[str] | None,

@@ -24,8 +24,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import fdtri
 
-from compd.arrays import FloatArray, IntArray
-from compd.comparison.statistics.least_squares import RANK_CUT, column_norms, determined, normal_inverse
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.statistics.least_squares import (
+    RANK_CUT,
+    column_norms,
+    determined,
+    determined_by_normal,
+    normal_inverse,
+    normal_norms,
+)
 from compd.comparison.statistics.robust import P95_OF_NORMAL
 
 
@@ -49,7 +56,31 @@ def cluster_covariance(G: FloatArray, residual: FloatArray, block: IntArray) -> 
         return np.zeros((0, 0))
     A, e = G.reshape(-1, P), residual.ravel()
     independent = normal_inverse(A) * (float(e @ e) / (len(A) - P))
-    moved = _moved_without_each_block(A, e, np.repeat(block, m))
+    return _covariance(independent, _moved_without_each_block(A, e, np.repeat(block, m)), determined(A))
+
+
+def covariance_of_normals(normal: FloatArray, score: FloatArray, squares: float, values: int) -> FloatArray:
+    """As `cluster_covariance`, from sums over the rows of each block.
+
+    normal : (C, P, P) G_c^T G_c.  score : (C, P) G_c^T e_c.  squares : sum of e^2.  values : how many numbers e has.
+    """
+    P = normal.shape[1]
+    if not P:
+        return np.zeros((0, 0))
+    whole = normal.sum(axis=0)
+    norms = normal_norms(whole)
+    scales = np.outer(norms, norms)
+    independent = np.linalg.pinv(whole / scales, rcond=RANK_CUT**2, hermitian=True) / scales * squares / (values - P)
+    without = np.linalg.pinv((whole - normal) / scales, rcond=RANK_CUT**2, hermitian=True)
+    moved = (without @ (score / norms)[:, :, None])[:, :, 0] / norms
+    return _covariance(independent, moved, determined_by_normal(whole))
+
+
+def _covariance(independent: FloatArray, moved: FloatArray, known: BoolArray) -> FloatArray:
+    """The larger of both variances, with the correlations of independent errors.
+
+    independent : (P, P).  moved : (C, P) as of `_moved_without_each_block`.  known : (P,) determined parameters.
+    """
     clusters = len(moved)
     variance = (moved**2).sum(axis=0) * (clusters - 1) / clusters * _by_student(clusters)
 
@@ -57,9 +88,8 @@ def cluster_covariance(G: FloatArray, residual: FloatArray, block: IntArray) -> 
     std = np.sqrt(np.maximum(variance, np.diag(independent)))
     independent_std[independent_std == 0] = 1.0
     covariance = independent / np.outer(independent_std, independent_std) * np.outer(std, std)
-    unknown = ~determined(A)
-    covariance[unknown] = np.nan
-    covariance[:, unknown] = np.nan
+    covariance[~known] = np.nan
+    covariance[:, ~known] = np.nan
     return np.asarray(covariance)
 
 

@@ -75,9 +75,26 @@ def determined(A: FloatArray, rank_cut: float = RANK_CUT) -> BoolArray:
         return np.zeros(0, dtype=bool)
     norms = column_norms(A)
     scaled = A / norms
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    undetermined = vectors[:, values < rank_cut**2 * values.max()]
-    return np.asarray((A != 0).any(axis=0) & (np.abs(undetermined) < SHARE_OF_COMBINATION).all(axis=1))
+    return np.asarray((A != 0).any(axis=0) & _in_no_combination(scaled.T @ scaled, rank_cut))
+
+
+def normal_norms(normal: FloatArray) -> FloatArray:
+    """(P,) `column_norms` of the A of which this is A^T A (P, P)."""
+    norms = np.sqrt(np.diag(normal))
+    return np.asarray(np.where(norms > 0, norms, 1.0))
+
+
+def solve_normal(normal: FloatArray, right: FloatArray, rank_cut: float = RANK_CUT) -> FloatArray:
+    """(P,) or (P, K) what `solve_least_squares` gives, from A^T W A (P, P) and A^T W y."""
+    norms = normal_norms(normal)
+    inverse = np.linalg.pinv(normal / np.outer(norms, norms), rcond=rank_cut**2, hermitian=True)
+    return np.asarray(((inverse @ (right.T / norms).T).T / norms).T)
+
+
+def determined_by_normal(normal: FloatArray, rank_cut: float = RANK_CUT) -> BoolArray:
+    """(P,) as `determined`, from A^T A (P, P)."""
+    norms = normal_norms(normal)
+    return np.asarray((np.diag(normal) > 0) & _in_no_combination(normal / np.outer(norms, norms), rank_cut))
 
 
 def solve_ridge(normal: FloatArray, right: FloatArray, ridge: FloatArray) -> FloatArray:
@@ -97,6 +114,13 @@ def ridge_inverse(normal: FloatArray, ridge: FloatArray) -> FloatArray:
     """(..., P, P) inverse of N + diag(ridge), with normal (..., P, P) and ridge (..., P): covariance at unit noise."""
     scaled, norms = _held_by_ridge(normal, ridge)
     return np.asarray(np.linalg.inv(scaled) / (norms[..., :, None] * norms[..., None, :]))
+
+
+def _in_no_combination(scaled: FloatArray, rank_cut: float) -> BoolArray:
+    """(P,) parameters that are in no combination which the rank cut removes from a scaled normal matrix (P, P)."""
+    values, vectors = np.linalg.eigh(scaled)
+    undetermined = vectors[:, values < rank_cut**2 * values.max()]
+    return np.asarray((np.abs(undetermined) < SHARE_OF_COMBINATION).all(axis=1))
 
 
 def _scaled_inverse(scaled: FloatArray, rank_cut: float) -> FloatArray:

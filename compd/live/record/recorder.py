@@ -6,14 +6,16 @@ a bounded queue for it and drops it when it falls behind.
 
 A recording is written in parts, NAME-0001, NAME-0002 ..., each complete in itself:
 
-    NAME-0001.csv           one row per cycle in the recording format: readings less machine zero
+    NAME-0001.csv           one row per cycle in the recording format: readings less machine zero; or NAME-0001.parquet,
+                            which is NAME-0001.arrow until the part is closed
     NAME-0001.yaml          its sidecar; `provenance` holds machine zero and signs: raw = zero + sign * column
     NAME-0001.cycles.jsonl  the daemon's messages as they came, byte for byte, for `compd replay`
     NAME-0001.model-*.yaml  copies of the model files that were applied or ran as the shadow
 
 A new part begins when machine zero is taken anew, since the columns of a part have one zero, and when the daemon has
 started anew (`ReadingsFeed`). Whole lines are written and synchronised twice a second, so a power cut or SIGKILL costs
-less than a second. Every row of the CSV has its cycle, also where the disk was full.
+less than a second. Every row has its cycle, also where the disk was full. Of Parquet the next recorder of the name, or
+`compd recording convert`, closes the part that a kill has left open.
 """
 
 from __future__ import annotations
@@ -28,8 +30,12 @@ from pathlib import Path
 
 from compd.clock import Clock
 from compd.errors import CompdError, Problem, RecordingError, StateError
+from compd.live.record.part_table import close_left_parts
 from compd.live.record.readings_feed import FeedItem
 from compd.live.record.recording_part import Message, RecordingPart
+from compd.recording.parquet_table import arrow_modules
+from compd.recording.table_file import PARQUET
+from compd.recording.table_format import TableFormat
 
 _WRITE_EVERY_S = 0.5
 # 100 s of a 200 Hz burst, about 80 MB: a disk that stalls for longer is a fault.
@@ -81,10 +87,15 @@ class Recorder:
         limits: RecordingLimits,
         report: Callable[[str], None],
         clock: Clock,
+        table_format: TableFormat = TableFormat.CSV,
     ) -> None:
         """`name`: path of the parts without "-0001.csv"; `version`, `watch`: the daemon's first two messages;
-        `report`: called with sentences for the user. Raises RecordingError where a recording of this name exists.
+        `report`: called with sentences for the user. Raises RecordingError where a recording of this name exists, and
+        for Parquet without pyarrow.
         """
+        close_left_parts(name, report)
+        if table_format is TableFormat.PARQUET:
+            arrow_modules(name.with_name(f"{name.name}{PARQUET}"))
         if existing := sorted(name.parent.glob(f"{name.name}-[0-9][0-9][0-9][0-9]*.*")):
             raise RecordingError(
                 Problem(
@@ -96,6 +107,7 @@ class Recorder:
         self.without_zero = 0
         self._name = name
         self._first_messages = (version, watch)
+        self._table_format = table_format
         self._every_cycle = "rate_hz" not in watch
         self._limits = limits
         self._report = report
@@ -245,10 +257,10 @@ class Recorder:
         stem = self._name.with_name(f"{self._name.name}-{self._part_count + 1:04d}")
         age = timedelta(seconds=self._clock.monotonic() - message["time_s"])
         started_at = (datetime.now(UTC) - age).isoformat(timespec="milliseconds")
-        part = RecordingPart(stem, item.first_messages, message, self._origin_s, started_at)
+        part = RecordingPart(stem, item.first_messages, message, self._origin_s, started_at, self._table_format)
         self._parts.append(part)
         self._part_count += 1
-        self._report(f"{part.csv_path} begins")
+        self._report(f"{part.path} begins")
         return part
 
     def _total_bytes(self) -> int:
@@ -270,4 +282,4 @@ class Recorder:
             oldest = self._parts.pop(0)
             oldest.delete()
             self._rows_deleted += oldest.rows
-            self._report(f"limit of {limit}: {oldest.csv_path} deleted, with {oldest.rows} rows")
+            self._report(f"limit of {limit}: {oldest.path} deleted, with {oldest.rows} rows")

@@ -16,6 +16,8 @@ from compd.live.pipeline import build_pipeline
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, Message
 from compd.live.service.readings_message import RecordedCycle, parse_readings
 from compd.recording.columns import SKEW_COLUMN
+from compd.recording.open_part import ARROW, OpenPart
+from compd.recording.table_file import CSV, SUFFIXES, row_count
 
 # Of a part's messages the first two say who spoke, and what the columns are.
 _FIRST_CLASSES = ("VERSION", "WATCH")
@@ -46,7 +48,9 @@ class RecordedCycles:
 
         Raises RecordingError where there is no such recording.
         """
-        stem = name.name.removesuffix(CYCLES_SUFFIX).removesuffix(".csv").removesuffix(".yaml")
+        stem = name.name.removesuffix(CYCLES_SUFFIX)
+        for suffix in (*SUFFIXES, ARROW, ".yaml"):
+            stem = stem.removesuffix(suffix)
         path = name.with_name(stem + CYCLES_SUFFIX)
         self.paths = [path] if path.is_file() else sorted(name.parent.glob(f"{stem}-[0-9]*{CYCLES_SUFFIX}"))
         self.torn_lines = 0
@@ -82,12 +86,14 @@ class RecordedCycles:
                     yield where, message
 
     def rows_without_cycle(self) -> dict[Path, int]:
-        """How many rows of each part's CSV have no cycle from which they could be computed; only parts with such."""
+        """How many rows of each part's table have no cycle from which they could be computed; only parts with such."""
         lacking = {}
         for path in self.paths:
-            table = path.with_name(path.name.removesuffix(CYCLES_SUFFIX) + ".csv")
-            if table.is_file():
-                rows = _whole_lines(table) - 1
+            for suffix in (*SUFFIXES, ARROW):
+                table = path.with_name(path.name.removesuffix(CYCLES_SUFFIX) + suffix)
+                if not table.is_file():
+                    continue
+                rows = _rows(table)
                 cycles = _whole_lines(path) - len(_FIRST_CLASSES)
                 if rows > cycles:
                     lacking[table] = rows - cycles
@@ -174,6 +180,13 @@ def _model(where: str, hash_: str, models: Mapping[str, LiveModel]) -> LiveModel
             )
         )
     return models[hash_]
+
+
+def _rows(table: Path) -> int:
+    """Whole rows of a part's table."""
+    if table.suffix == ARROW:
+        return OpenPart(table).row_count
+    return _whole_lines(table) - 1 if table.suffix == CSV else row_count(table)
 
 
 def _whole_lines(path: Path) -> int:

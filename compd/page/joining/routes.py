@@ -21,9 +21,10 @@ from compd.page.joining.export_table import ExportReader, table_contents
 from compd.page.joining.exports import MOST_BYTES, Exports
 from compd.page.joining.trial import tried
 from compd.page.recording_machine import machine_of
-from compd.page.recordings import NAME, Recordings
+from compd.page.recordings import NAME, Recordings, recording_tables
 from compd.page.requests import LOOKS_ONLY, answer, keys_of, may_change, refused
 from compd.recording.sidecar import read_sidecar
+from compd.recording.table_file import CSV
 from compd.recording.writer import write_recording
 
 Result = TypeVar("Result")
@@ -162,29 +163,24 @@ class JoinRoutes:
 
 def _gauges_and_plans(directory: Path) -> tuple[list[str], list[str]]:
     """Names of the recordings without a reference, and of the CSV files without a sidecar, the newest first."""
-    own = [path for path in directory.glob("*.csv") if NAME.fullmatch(path.stem) and _is_own(path)]
+    own = [path for name, path in recording_tables(directory).items() if NAME.fullmatch(name)]
     gauges, plans = [], []
     for path in sorted(own, key=lambda path: path.stat().st_mtime, reverse=True):
         sidecar = path.with_suffix(".yaml")
         if not sidecar.is_file():
-            plans.append(path.stem)
+            plans += [path.stem] * (path.suffix == CSV)
         elif (read := read_sidecar(sidecar, [])) is not None and read.reference is None:
             gauges.append(path.stem)
     return gauges, plans
 
 
 def _named(directory: Path, keys: Mapping[str, Any], key: str) -> Path | None:
-    """The CSV file that a key names; None without a name. Raises RecordingError where it is not there."""
+    """The file that a key names; None without a name. Raises RecordingError where it is not there."""
     name = str(keys.get(key) or "")
-    path = directory / f"{name}.csv"
-    if name and not (NAME.fullmatch(name) and _is_own(path)):
+    path = recording_tables(directory).get(name)
+    if name and not (NAME.fullmatch(name) and path):
         raise _missing(key, f"there is no such {key}")
-    return path if name else None
-
-
-def _is_own(path: Path) -> bool:
-    """Whether it is a file of the directory itself: a link leads anywhere."""
-    return path.is_file() and not path.is_symlink()
+    return path
 
 
 def _missing(where: str, what: str, next_step: str = "") -> RecordingError:

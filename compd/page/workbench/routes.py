@@ -14,7 +14,7 @@ from starlette.routing import Route
 
 from compd.errors import CompdError
 from compd.page.recording_machine import machine_of
-from compd.page.recordings import NAME, Recordings
+from compd.page.recordings import NAME, Recordings, recording_tables
 from compd.page.requests import keys_of, refused
 from compd.page.workbench.diagnoses import Diagnoses
 from compd.page.workbench.diagnosis_handlers import DIAGNOSIS_HANDLERS
@@ -67,8 +67,8 @@ class WorkbenchRoutes:
     async def _open_one(self, request: Request) -> Response:
         keys = await keys_of(request)
         recording, model = str(keys.get("recording", "")), str(keys.get("model", ""))
-        path = self._recordings.directory / f"{recording}.csv"
-        if not NAME.fullmatch(recording) or not path.is_file() or path.is_symlink():
+        path = recording_tables(self._recordings.directory).get(recording)
+        if not NAME.fullmatch(recording) or path is None:
             return refused("there is no such recording", 404)
         if not MODEL_NAME.fullmatch(model):
             return refused("a model file is NAME.model.yaml, with letters, digits, - and _", 400)

@@ -10,6 +10,7 @@ from pathlib import Path
 from compd.configuration.shipped import Machine, load_machine
 from compd.errors import CompdError, Problem
 from compd.recording.ball_plate import write_plate
+from compd.recording.table_file import written_path
 from compd.recording.writer import write_recording
 from compd.simulation.campaign.plan_reader import read_plan
 from compd.simulation.campaign.simulated_recording import FIXED, simulate_recording
@@ -25,7 +26,7 @@ class CampaignFiles:
     Attributes
     ----------
     recording : Path
-        NAME.csv, with its sidecar NAME.yaml beside it.
+        NAME.csv or NAME.parquet, with its sidecar NAME.yaml beside it.
     answer : Path
         NAME.answer.json: what was hidden, and how strong. Leave it shut if you want to find out by a diagnosis.
     rows : int
@@ -69,7 +70,7 @@ def simulate_campaign(
     machine : str, Path or Configuration
         As `load_machine` takes it.
     out : str or Path
-        The recording to write: NAME.csv; NAME.yaml is written beside it, and NAME.answer.json.
+        The recording to write, NAME.csv or NAME.parquet; NAME.yaml is written beside it, and NAME.answer.json.
     seed : int
         Machine, weather, points and noise follow from it.
     effects : sequence of str
@@ -107,8 +108,7 @@ def simulate_campaign(
     >>> files.rows, files.measured
     (608, 608)
     """
-    path = Path(out)
-    path = path if path.suffix == ".csv" else path.with_name(f"{path.name}.csv")
+    path = written_path(Path(out))
     configuration = load_machine(machine)
     mechanism = Mechanism(configuration.geometry)
     if plan is not None and reference in ("ball_plate", *FIXED):

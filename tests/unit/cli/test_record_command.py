@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -20,6 +21,8 @@ from compd.errors import DaemonError
 from compd.gauge import good
 from compd.live import daemon as daemon_module
 from compd.live.record.replay import RecordedCycles, replay_cycles
+from compd.recording.convert import convert_recording
+from compd.recording.open_part import OpenPart
 from compd.recording.reader import read_recording
 from tests.support.live_machine import CONFIG
 from tests.support.running_daemon import supervised
@@ -95,14 +98,14 @@ def record_command(directory, *arguments):
         signal.signal(signal.SIGINT, heeded)
     with process:
         try:
-            assert "run-0001.csv begins" in process.stderr.readline()
+            assert re.search(r"run-0001\.(csv|parquet) begins", process.stderr.readline())
             yield process
         finally:
             process.kill()
 
 
 def rows_in(path):
-    return path.read_bytes().count(b"\n") - 1
+    return OpenPart(path).row_count if path.suffix == ".arrow" else path.read_bytes().count(b"\n") - 1
 
 
 def until_rows(client, path, count):
@@ -129,6 +132,26 @@ def test_killed_in_the_middle_it_reads_back_cleanly_and_replays(tmp_path):
     assert len(replayed) >= 60
     assert not [cycle for cycle in replayed if cycle.differs], "and gives the setpoints that the daemon sent"
     assert len({cycle.replayed for cycle in replayed}) == len(replayed)
+
+
+@pytest.mark.usefixtures("drifting")
+def test_killed_while_it_writes_parquet_every_synchronised_row_is_there_and_replays(tmp_path):
+    with daemon_at(tmp_path) as (configuration, _, client):
+        left = tmp_path / "run-0001.arrow"
+        with record_command(tmp_path, "--burst", "1000", "--format", "parquet") as process:
+            until_rows(client, left, 60)
+            on_disk = left.read_bytes()
+            process.send_signal(signal.SIGKILL)
+            process.wait(TIMEOUT_S)
+    assert left.read_bytes().startswith(on_disk), "what was on disk stays there"
+    rows = convert_recording(left, left.with_suffix(".parquet"))
+    assert rows >= 60
+    assert read_recording(left.with_suffix(".parquet"), configuration, needs_reference=False).rows == rows
+    recorded = RecordedCycles(tmp_path / "run")
+    assert recorded.rows_without_cycle() == {}
+    replayed = list(replay_cycles(configuration, recorded))
+    assert len(replayed) >= rows
+    assert not [cycle for cycle in replayed if cycle.differs]
 
 
 @pytest.mark.usefixtures("drifting")

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import resource
 import threading
-from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
@@ -19,6 +17,7 @@ from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.recording.reader import read_recording
 from tests.support.live_machine import Machine, machine
 from tests.support.recorded_run import ROOMY, Run, rows_of
+from tests.support.small_disk import room_for
 
 TIMEOUT_S = 60
 A_PICOMETRE_MM = 1e-9
@@ -196,17 +195,6 @@ def test_without_machine_zero_nothing_is_recorded_and_it_says_what_to_do(tmp_pat
     with pytest.raises(StateError, match="compd zero"):
         recorded(run, tmp_path / "run", 3)
     assert list(tmp_path.iterdir()) == []
-
-
-@contextmanager
-def room_for(size):
-    """A limit on the size of a file stands for the full disk: write(2) takes a part, then nothing."""
-    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".cycles.jsonl"])

@@ -31,3 +31,12 @@ def test_a_part_is_downloaded_with_what_belongs_to_it_in_pieces(tmp_path):
         assert archive.read("day-1.yaml") == b"day-1.yaml" * 100_000
     assert recordings.archive("day-2") is None
     assert recordings.archive("../day") is None
+
+
+def test_a_recording_is_listed_once_whatever_its_tables(tmp_path):
+    for name in ("day.csv", "day.parquet", "day.yaml", "night.parquet", "late-0001.arrow"):
+        (tmp_path / name).write_text(name)
+    recordings = Recordings(tmp_path, "/no/socket")
+    assert sorted((part["name"], part["bytes"]) for part in recordings.listed()) == [("day", 7), ("night", 13)]
+    assert recordings.archive("night") is not None
+    assert asyncio.run(recordings.start("late", None)) == "late is there already"

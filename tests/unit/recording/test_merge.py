@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from compd.errors import RecordingError
+from compd.recording.convert import convert_recording
 from compd.recording.merge import ASSUMED_GAP_S, merge_recordings
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
@@ -72,3 +73,10 @@ def test_what_does_not_fit_together_is_refused_all_at_once(tmp_path: Path) -> No
         "was recorded from another machine zero",
     ]
     assert not (tmp_path / "both.csv").exists()
+
+
+def test_of_csv_and_parquet_a_parquet_file_is_made(tmp_path: Path) -> None:
+    first = recording(tmp_path / "first", csv_text())
+    convert_recording(first.path, tmp_path / "second.parquet")
+    merge_recordings([first, read_recording(tmp_path / "second.parquet")], tmp_path / "both.parquet")
+    assert read_recording(tmp_path / "both.parquet").rows == 40

@@ -80,7 +80,7 @@ export class LiveModel {
 
   showBars({ models, model_effects } = {}, { unit, rms, ledger, recording, model_hash }) {
     if (!model_effects) return;
-    const first = ledger.find((step) => fileName(step.recording).replace(/\.csv$/, "") === recording);
+    const first = ledger.find((step) => fileName(step.recording).replace(/\.(csv|parquet)$/, "") === recording);
     const { applied_um, beyond_um, seconds } = model_effects;
     const rows = [[`the recording's error${first ? ", before → now" : ""}`, unit === "um" ? [...(first ? [first.before] : []), rms] : null, `its unit is ${unit}`, RECORDED]];
     const shadow = models?.shadow?.file;

@@ -1,0 +1,136 @@
+"""What a comparison reports of residuals, added up over blocks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+from compd.comparison.comparison import Size
+from compd.comparison.contributions import Contribution
+from compd.comparison.stream.magnitude_histogram import MagnitudeHistogram
+from compd.comparison.stream.time_envelope import TimeEnvelope
+
+# Outliers of which the rows are kept; nobody reads more.
+MOST_OUTLIERS_LISTED = 1000
+
+
+class SourceSquares(NamedTuple):
+    """Of one source, over rows and coordinates: sum of squares of what it moves, of the residual without it, um^2."""
+
+    moved: float
+    without: float
+    values: int
+
+    def plus(self, other: SourceSquares) -> SourceSquares:
+        """Of these values and of others."""
+        return SourceSquares(self.moved + other.moved, self.without + other.without, self.values + other.values)
+
+
+class BlockResiduals(NamedTuple):
+    """A block of N rows, of which U are used.
+
+    rows : N.  row, time_s : (U,).  residual_um : (U, m).  distance_um : (U,).  registration_um : (m,) summed.
+    outlier_row : (O,).  left_out : reason -> rows.  sources : by the names of `contributions`.
+    """
+
+    rows: int
+    row: IntArray
+    time_s: FloatArray
+    residual_um: FloatArray
+    distance_um: FloatArray
+    registration_um: FloatArray
+    outlier_row: IntArray
+    left_out: Mapping[str, int]
+    sources: Mapping[str, SourceSquares]
+
+
+class ResidualTotals:
+    """Sums over blocks.
+
+    Attributes
+    ----------
+    rows, used, outliers : numbers of rows.
+    left_out : reason -> rows that cannot be used.
+    outlier_rows : the first MOST_OUTLIERS_LISTED of them.
+    largest_um, largest_row : (m,) the largest amount of each coordinate, and its row.
+    envelope : of the residual over time.
+    """
+
+    def __init__(self, coordinates: int, envelope: TimeEnvelope) -> None:
+        self.rows = self.used = self.outliers = 0
+        self.left_out: Counter[str] = Counter()
+        self.outlier_rows: list[int] = []
+        self.largest_um = np.full(coordinates, -np.inf)
+        self.largest_row = np.zeros(coordinates, dtype=np.int64)
+        self.envelope = envelope
+        self._sum, self._squares, self._registration = (np.zeros(coordinates) for _ in range(3))
+        self._histograms = [MagnitudeHistogram() for _ in range(coordinates)]
+        self._distance_squares, self._largest_distance = 0.0, -np.inf
+        self._distances = MagnitudeHistogram()
+        self._sources: dict[str, SourceSquares] = {}
+
+    def add(self, block: BlockResiduals) -> None:
+        """Count a block; blocks come in the order of time."""
+        self.rows += block.rows
+        self.left_out.update(block.left_out)
+        self.outliers += len(block.outlier_row)
+        self.outlier_rows += block.outlier_row[: MOST_OUTLIERS_LISTED - len(self.outlier_rows)].tolist()
+        for name, squares in block.sources.items():
+            before = self._sources.get(name, SourceSquares(0.0, 0.0, 0))
+            self._sources[name] = before.plus(squares)
+        if not len(block.row):
+            return
+        self.used += len(block.row)
+        self._sum += block.residual_um.sum(axis=0)
+        self._squares += (block.residual_um**2).sum(axis=0)
+        self._registration += block.registration_um
+        size_um = np.abs(block.residual_um)
+        place = size_um.argmax(axis=0)
+        largest_um = size_um[place, np.arange(size_um.shape[1])]
+        self.largest_row = np.where(largest_um > self.largest_um, block.row[place], self.largest_row)
+        self.largest_um = np.maximum(largest_um, self.largest_um)
+        for histogram, column in zip(self._histograms, size_um.T, strict=True):
+            histogram.add(column)
+        self._distance_squares += float(block.distance_um @ block.distance_um)
+        self._largest_distance = max(self._largest_distance, float(block.distance_um.max()))
+        self._distances.add(block.distance_um)
+        self.envelope.add(block.time_s, block.residual_um)
+
+    @property
+    def rms_um(self) -> FloatArray:
+        """(m,)."""
+        return np.asarray(np.sqrt(self._squares / self.used))
+
+    @property
+    def mean_um(self) -> FloatArray:
+        """(m,)."""
+        return np.asarray(self._sum / self.used)
+
+    @property
+    def p95_um(self) -> FloatArray:
+        """(m,) within 0.05 %, by a histogram."""
+        return np.array([histogram.quantile(0.95) for histogram in self._histograms])
+
+    @property
+    def registration_um(self) -> FloatArray:
+        """(m,) mean of what the instrument's frame or a constant takes off."""
+        return np.asarray(self._registration / self.used)
+
+    @property
+    def distance(self) -> Size:
+        """Of the residual vector's length."""
+        rms_um = float(np.sqrt(self._distance_squares / self.used))
+        return Size(rms_um, self._distances.quantile(0.95), self._largest_distance)
+
+    @property
+    def contributions(self) -> dict[str, Contribution]:
+        """As of a recording in memory."""
+        return {
+            name: Contribution(float(np.sqrt(each.moved / each.values)), float(np.sqrt(each.without / each.values)))
+            for name, each in self._sources.items()
+            if each.values
+        }

@@ -1,0 +1,288 @@
+"""Making Recordings of a table file's rows: of all at once, or of block after block, with the same checks."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Collection, Iterable
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.configuration import Configuration
+from compd.errors import Problem, RecordingError
+from compd.recording.ball_plate import check_balls, read_plate
+from compd.recording.checks import (
+    RowCount,
+    check_joint_unit,
+    check_rising_time,
+    check_time,
+    check_values,
+    largest_joint_um,
+)
+from compd.recording.columns import (
+    ATTITUDE_COLUMNS,
+    ATTITUDES,
+    AXES,
+    DISTANCE_COLUMN,
+    FRAME_COLUMNS,
+    approach_columns,
+    correct_names,
+    joint_columns,
+    scale_columns,
+)
+from compd.recording.layout import Layout, machine_problems, read_layout
+from compd.recording.problem_list import ProblemList, rows_text
+from compd.recording.recording import Recording
+from compd.recording.sidecar import Sidecar, read_sidecar
+from compd.recording.table import FIRST_ROW, Table
+from compd.travel_direction import RowDirections
+from compd.units import UM_PER_MM
+
+# Comparators are converted from um to mm and rounded to a picometre, far below any gauge, so that a reading
+# that was written in decimals comes back as the same number that the gauge delivered.
+_PICOMETRES_PER_MM = 1e9
+_HASHED_BYTES = 1 << 20
+
+
+class RecordingBuilder:
+    """Makes Recordings of the tables of one file, and keeps what one block needs of the blocks before it.
+
+    Attributes
+    ----------
+    id_columns : columns of the table that may hold text.
+    """
+
+    def __init__(
+        self, path: Path, configuration: Configuration | None, needs_reference: bool, in_blocks: bool = False
+    ) -> None:
+        """Read the sidecar; `build` reports what is wrong with it.
+
+        path : the table's file.  in_blocks : the rows come in several tables, and their time must rise.
+        configuration, needs_reference : as in `read_recording`.
+        """
+        self._path = path
+        self._configuration = configuration
+        self._in_blocks = in_blocks
+        self._problems: list[Problem] = []
+        self._sidecar = sidecar = read_sidecar(path.with_suffix(".yaml"), self._problems)
+        self._reference_valid = sidecar is not None and (sidecar.reference is not None or not self._problems)
+        no_reference = sidecar is not None and sidecar.reference is None and self._reference_valid
+        if sidecar is not None and no_reference and (needs_reference or sidecar.external):
+            self._problems.append(_no_reference(sidecar))
+        self.id_columns = ("point", "pin", "ball") if _names_fixed_ends(sidecar) else ("point", "pin")
+        balls = sidecar.reference.balls if sidecar and sidecar.reference else None
+        self._plate = None if balls is None else read_plate(balls, self._problems)
+        self._directions = RowDirections()
+        self._count = RowCount()
+        self._last_row = FIRST_ROW - 1
+        self._last_time_s = -math.inf
+        self._largest_joint_um = 0.0
+
+    def build(self, table: Table | None, table_problems: ProblemList, last: bool = True) -> Recording:
+        """The Recording of the rows that follow those of the last call.
+
+        table : None where the file has none.  table_problems : what was wrong with it as it was read; what else is
+        wrong is added.  last : no more rows follow.
+
+        Raises RecordingError with every problem of these rows, with the first also those of the sidecar, with the last
+        those of the recording as a whole.
+        """
+        sidecar, problems = self._sidecar, self._problems
+        if table is None:
+            raise RecordingError([*problems, *table_problems.problems])
+        table = correct_names(table, table_problems)
+        has_time = "time_s" in table.letters or sidecar is None or not sidecar.external
+        if not has_time:
+            table = _with_row_numbers(table, self._count.rows)
+        layout = read_layout(list(table.letters), sidecar, self._reference_valid, table_problems)
+        if "time_s" in table.columns and self._in_blocks:
+            check_rising_time(table, self._last_time_s, table_problems)
+        elif "time_s" in table.columns:
+            check_time(table, table_problems)
+        check_values(table, table_problems)
+        excluded = self._excluded(table, table_problems, last)
+        self._check_whole(table, layout, excluded, table_problems, last)
+        if self._plate is not None and "ball" in table.columns:
+            check_balls(table, self._plate, table_problems)
+        if self._configuration is not None and sidecar is not None and sidecar.machine:
+            counts = (layout.scales, layout.joints)
+            problems += machine_problems(sidecar.machine, counts, self._configuration, str(sidecar.path))
+        problems += table_problems.problems
+        if problems or sidecar is None:
+            raise RecordingError(problems)
+        recording = self._recording(table, sidecar, layout, excluded, tuple(table_problems.warnings))
+        if len(table.row):
+            self._last_row = int(table.row[-1])
+        if recording.rows:
+            self._last_time_s = float(recording.time_s[-1])
+        return recording if has_time else _without_time(recording)
+
+    def _check_whole(
+        self, table: Table, layout: Layout, excluded: BoolArray, problems: ProblemList, last: bool
+    ) -> None:
+        """Count what only the whole recording shows; with the last rows, check it."""
+        needed = _needed_columns(layout, self._sidecar, table.letters)
+        self._largest_joint_um = max(self._largest_joint_um, largest_joint_um(table))
+        if last:
+            check_joint_unit(self._largest_joint_um, problems)
+        if all(name in table.columns for name in needed):
+            self._count.add(table, excluded, needed)
+            if last:
+                self._count.check(problems)
+
+    def _excluded(self, table: Table, problems: ProblemList, last: bool) -> BoolArray:
+        """(N,) rows that the person excluded; a row that the file does not have is a problem."""
+        sidecar = self._sidecar
+        numbers = np.array(sorted(sidecar.excluded), dtype=np.int64) if sidecar else np.array([], dtype=np.int64)
+        absent = numbers[(numbers > self._last_row) & ~np.isin(numbers, table.row)]
+        if not last:  # what is beyond may be in the blocks to come
+            absent = absent[absent <= table.row[-1]] if len(table.row) else absent[:0]
+        if len(absent) and sidecar is not None:
+            last_row = max([self._last_row, *table.row[-1:].tolist()])
+            problems.problems.append(
+                Problem(
+                    where=f"{sidecar.path} excluded_rows",
+                    what=f"{rows_text(absent.tolist())} of the file: no such row",
+                    allowed=f"rows {FIRST_ROW} to {last_row}" if last_row >= FIRST_ROW else "",
+                    next_step="count as the spreadsheet does: the header is row 1",
+                )
+            )
+        return np.isin(table.row, numbers)
+
+    def _recording(
+        self, table: Table, sidecar: Sidecar, layout: Layout, excluded: BoolArray, warnings: tuple[Problem, ...]
+    ) -> Recording:
+        """The rows in the order of time; those without a time are left out and counted."""
+        timed = ~np.isnan(table.columns["time_s"])
+        kept = np.argsort(table.columns["time_s"], kind="stable")[: int(timed.sum())]
+        columns = {name: values[kept] for name, values in table.columns.items()}
+        left_out = {"time_s is empty": int((~timed).sum()), "empty row": self._blank_rows(table)}
+
+        def stack(names: Iterable[str]) -> FloatArray | None:
+            present = [columns[name] for name in names if name in columns]
+            return np.column_stack(present) if present else None
+
+        def in_mm(kind: str, places: Iterable[str]) -> FloatArray | None:
+            """Reference or model; one unit of an angle counts as a micrometre."""
+            values = stack(f"{kind}_{place}_{layout.ending}" for place in places)
+            return values if values is None or layout.ending == "mm" else values / UM_PER_MM
+
+        def ids(name: str) -> IntArray | None:
+            return np.where(np.isnan(columns[name]), -1, columns[name]).astype(np.int64) if name in columns else None
+
+        session, ball = ids("session"), ids("ball")
+        scale_mm = stack(scale_columns(layout.scales))
+        approach = stack(approach_columns(layout.scales)) if layout.approach else None
+        if approach is None and scale_mm is not None:
+            approach = self._directions.of_block(scale_mm, session)
+        joint_um = stack(joint_columns(layout.joints))
+        frame_um = stack(FRAME_COLUMNS) if layout.frame else None
+        position = in_mm("reference", AXES)
+        links = [f"link_{i}" for i in layout.links]
+        if self._plate is not None and ball is not None:
+            position = self._plate.positions_of_mm(ball)
+        distance_mm = columns.get(DISTANCE_COLUMN)
+        if sidecar.reference is not None and sidecar.reference.radius_mm is not None:
+            distance_mm = np.full(len(kept), sidecar.reference.radius_mm)
+        return Recording(
+            path=table.path,
+            sha256=self._sha256,
+            sidecar=sidecar,
+            row=table.row[kept],
+            time_s=columns["time_s"],
+            session=session,
+            visit=ids("visit"),
+            point=ids("point"),
+            scale_mm=scale_mm,
+            joint_mm=_to_mm(joint_um),
+            frame_mm=_to_mm(frame_um),
+            approach=approach,
+            approach_measured=layout.approach,
+            quantities={name: columns[name] for name in layout.covariates},
+            reference_axes=layout.axes,
+            reference_mm=position,
+            reference_rotation_rad=stack(ATTITUDE_COLUMNS),
+            reference_links=layout.links,
+            reference_link_mm=in_mm("reference", links),
+            reference_distance_mm=distance_mm,
+            ball=ball,
+            plate=self._plate,
+            pin=ids("pin"),
+            end_names=table.labels.get("pin" if "pin" in columns else "ball", ()),
+            model_mm=in_mm("model", AXES),
+            model_rotation_rad=stack(f"model_{axis}_rad" for axis in ATTITUDES),
+            model_link_mm=in_mm("model", links),
+            excluded=excluded[kept],
+            left_out={reason: count for reason, count in left_out.items() if count},
+            columns=columns,
+            warnings=warnings,
+            point_labels=table.labels.get("point", ()),
+        )
+
+    def _blank_rows(self, table: Table) -> int:
+        """Empty rows between those of the table, and between the last block and it."""
+        return int(table.row[-1]) - self._last_row - len(table.row) if len(table.row) else 0
+
+    @cached_property
+    def _sha256(self) -> str:
+        """Hash of the table's file, its sidecar and its ball plate, in hexadecimal digits."""
+        digest = hashlib.sha256()
+        others = (self._path.with_suffix(".yaml"), *([] if self._plate is None else [self._plate.path]))
+        for i, path in enumerate((self._path, *others)):
+            digest.update(b"\0" * (i > 0))
+            with path.open("rb") as file:
+                while piece := file.read(_HASHED_BYTES):
+                    digest.update(piece)
+        return digest.hexdigest()
+
+
+def _no_reference(sidecar: Sidecar) -> Problem:
+    return Problem(
+        where=str(sidecar.path),
+        what="names no reference",
+        allowed="`reference:` with its `quantity:`",
+        next_step="write reference: {quantity: tool_position, frame: machine}"
+        if sidecar.external
+        else "put an instrument's export beside the gauges with `compd join`",
+    )
+
+
+def _with_row_numbers(table: Table, first: int) -> Table:
+    """The table with the number of each row, from `first`, in the place of its time: rows count as taken in order."""
+    numbers = np.arange(first, first + len(table.row), dtype=np.float64)
+    return replace(table, letters={**table.letters, "time_s": ""}, columns={**table.columns, "time_s": numbers})
+
+
+def _without_time(recording: Recording) -> Recording:
+    """The recording of a table `_with_row_numbers`: the column is not in the file, and its numbers are no seconds."""
+    columns = {name: values for name, values in recording.columns.items() if name != "time_s"}
+    return replace(recording, columns=columns, has_time=False)
+
+
+def _names_fixed_ends(sidecar: Sidecar | None) -> bool:
+    """Whether the column `ball` names the fixed ends of distances, and no ball of a plate."""
+    return sidecar is not None and sidecar.reference is not None and sidecar.reference.quantity == "distance"
+
+
+def _needed_columns(layout: Layout, sidecar: Sidecar | None, names: Collection[str]) -> list[str]:
+    """Columns without which a row is of no use: time, and the reference with what predicts it."""
+    reference = sidecar.reference if sidecar else None
+    reference_columns = [f"reference_{name}" for name in layout.reference]
+    if reference is not None and reference.quantity == "ball_plate":
+        reference_columns = ["ball"]
+    if reference is not None and reference.of_fixed_places:
+        own = ("pin",) if reference.quantity == "fixed_point" else (DISTANCE_COLUMN, "ball")
+        reference_columns = [name for name in own if name in names]
+    predictors = list(scale_columns(layout.scales))
+    if sidecar is not None and sidecar.external:
+        predictors = [f"model_{name}" for name in layout.reference]
+    return ["time_s", *predictors, *(reference_columns if reference is not None else ())]
+
+
+def _to_mm(value_um: FloatArray | None) -> FloatArray | None:
+    """The values in mm, rounded to a picometre; None stays None."""
+    return None if value_um is None else np.rint(value_um * (_PICOMETRES_PER_MM / UM_PER_MM)) / _PICOMETRES_PER_MM

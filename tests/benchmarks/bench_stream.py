@@ -1,0 +1,106 @@
+"""What `compd compare` costs on a recording that is too long for the memory: `python -m tests.benchmarks.bench_stream`.
+
+Beside it, in the same run, pandas reading the same Parquet file. `--rows 20000000` is a day at 200 Hz.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from compd.model_file import ModelFile
+from tests.benchmarks.bench_compare import COMMAND, Cost, cost
+from tests.benchmarks.figures import show
+from tests.support.measured import SIGMA_UM, gauges, hidden, record, tripod
+
+ROWS = 2_000_000
+RATE_HZ = 200.0
+REPEATED_ROWS = 50_000  # the same motion again and again, with noise of its own
+BUDGET_US, BUDGET_MB = 20.0, 1024.0
+EFFECTS = ("link_expansion", "link_elasticity", "backlash")
+PANDAS = "import sys, pandas; pandas.read_parquet(sys.argv[1])"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--rows", type=int, default=ROWS)
+    parser.add_argument("--directory", type=Path, default=None, help="Where the file is made; a temporary directory.")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory(dir=arguments.directory) as temporary:
+        directory = Path(temporary)
+        path = long_recording(directory, arguments.rows)
+        short = long_recording(directory, REPEATED_ROWS, "short")
+        model = directory / "model.yaml"
+        fitted_model(short, model)
+        rows = []
+        start = compare(long_recording(directory, 300_000, "few"))  # as long as to be read in blocks
+        by_pandas = cost([sys.executable, "-c", PANDAS, str(path)])
+        for name, options in (("no effects", []), (f"{len(EFFECTS)} effects", ["--model", str(model)])):
+            whole = compare(path, *options)
+            rows.append(line(f"compd compare, {name}", whole, by_pandas, arguments.rows))
+        rows.append(line("pandas.read_parquet", by_pandas, by_pandas, arguments.rows))
+        rows.append(line("compd compare, 300000 rows, no effects", start, by_pandas, 300_000))
+        title = f"{arguments.rows} rows, start of Python included; budget {BUDGET_US:g} us/row, {BUDGET_MB:g} MB"
+        head = ["", "s", "processor us/row", "/ pandas", "MB", "/ pandas"]
+        show(title, head, rows)
+
+
+def line(name: str, spent: Cost, by_pandas: Cost, rows: int) -> list[str]:
+    """A row of the table."""
+    return [
+        name,
+        f"{spent.seconds:.1f}",
+        f"{spent.processor_s / rows * 1e6:.2f}",
+        f"{spent.processor_s / by_pandas.processor_s:.1f}",
+        f"{spent.largest_MB:.0f}",
+        f"{spent.largest_MB / by_pandas.largest_MB:.2f}",
+    ]
+
+
+def compare(path: Path, *options: str) -> Cost:
+    return cost([sys.executable, "-c", COMMAND, "compare", str(path), "--json", *options])
+
+
+def long_recording(directory: Path, rows: int, name: str = "long") -> Path:
+    """NAME.parquet with its sidecar: one motion, repeated at RATE_HZ, each time with other noise and other visits."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    count = min(rows, REPEATED_ROWS)
+    source = record(directory, gauges(count, 1), [hidden("link_expansion", 1.1)], sigma_um=0.0, name="source")
+    names = source.read_text(encoding="utf-8").partition("\n")[0].split(",")
+    base = np.loadtxt(source, delimiter=",", skiprows=1)
+    rng = np.random.default_rng(1)
+    path = directory / f"{name}.parquet"
+    sidecar = source.with_suffix(".yaml").read_text(encoding="utf-8").replace("sigma_um: 0.0", f"sigma_um: {SIGMA_UM}")
+    path.with_suffix(".yaml").write_text(sidecar, encoding="utf-8")
+    schema = pa.schema([(column, pa.float64()) for column in names])
+    with pq.ParquetWriter(path, schema, compression="zstd") as writer:
+        for begin in range(0, rows, count):
+            block = dict(zip(names, base[: rows - begin].T.copy(), strict=True))
+            block["time_s"] = (begin + np.arange(len(block["time_s"]))) / RATE_HZ
+            block["session"] += 4 * (begin // count)
+            block["visit"] += begin
+            for axis in "xyz":
+                block[f"reference_{axis}_mm"] += rng.normal(0, SIGMA_UM / 1e3, len(block["time_s"]))
+            writer.write_table(pa.table(block, schema=schema))
+    return path
+
+
+def fitted_model(path: Path, model: Path) -> None:
+    """Write a model with EFFECTS, fitted on a short recording."""
+    import compd
+
+    file: ModelFile | None = None
+    for effect in EFFECTS:
+        file = compd.add_effect(file, effect, compd.open_sample(path, tripod(), rows=3000))
+    assert file is not None
+    file.write(model)
+
+
+if __name__ == "__main__":
+    main()
