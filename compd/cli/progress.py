@@ -26,6 +26,18 @@ def steps_shown(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         yield lambda said: bar.update(task, description=said)
 
 
+@contextmanager
+def counted(total: int, what: str) -> Iterator[Callable[[], None]]:
+    """A function that is called as each of `total` things is done; the bar, on standard error, is gone at the end."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(bar_width=20), MofNCompleteColumn(), TextColumn(what), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda: bar.advance(task)
+
+
 class ElapsedShown:
     """How far a measurement is that takes a given time, or goes on until Ctrl-C; a context manager."""
 
