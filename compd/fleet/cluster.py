@@ -87,7 +87,6 @@ def _local(processes: int) -> Iterator[Client]:
             # no dashboard, and none of the ports that another cluster may have
             dashboard_address=None,
             scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-            dashboard_address=None,
             # what happens to workers is told as the outcome of an item
             silence_logs=logging.CRITICAL,
         ) as cluster,

@@ -194,8 +194,6 @@ def _print_overview(results: list[RecordingResult] | tuple[RecordingResult, ...]
     if len(sentences) > MOST_SENTENCES:
         console.print(f"  and {len(sentences) - MOST_SENTENCES} more (the page has all)")
     for result in overview.failed[:MOST_SENTENCES]:
-        console.print(f"{result.recording}: not examined\n    {result.problem}")
+        console.print(f"not examined: {result.problem.splitlines()[0]}")
     if len(overview.failed) > MOST_SENTENCES:
-        console.print(
-            f"and {len(overview.failed) - MOST_SENTENCES} more that could not be examined (the table has all)"
-        )
+        console.print(f"and {len(overview.failed) - MOST_SENTENCES} more; the table has all, with what to do")
