@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import duckdb
@@ -11,6 +12,7 @@ import pytest
 from compd.errors import CompdError
 from compd.fleet.table import COLUMNS, check_table_path, is_table, read_table, write_table
 from tests.support.fleets import expansion, machine, result
+from tests.support.paths import ROOT
 
 PROBLEM = "lost.csv: cannot be read\n    next: copy it again"
 RESULTS = (
@@ -62,6 +64,12 @@ def test_an_earlier_table_is_replaced_and_nothing_else(path: Path, tmp_path: Pat
         check_table_path(other)
     with pytest.raises(CompdError, match="does not exist"):
         check_table_path(tmp_path / "nowhere" / "fleet.parquet")
+
+
+def test_the_guide_has_every_column() -> None:
+    guide = (ROOT / "docs" / "how-to" / "watch-a-fleet.md").read_text(encoding="utf-8")
+    rows = "".join(line.split("|")[1] for line in guide.splitlines() if line.startswith("| `"))
+    assert re.findall(r"`(\w+)`", rows) == [column.name for column in COLUMNS]
 
 
 def test_what_is_no_table_of_a_fleet_is_refused(tmp_path: Path) -> None:
