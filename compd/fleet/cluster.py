@@ -118,7 +118,7 @@ def _connected(scheduler: str) -> Iterator[Client]:
 def check_workers(client: Client, scheduler: str, paths: Sequence[Path] = ()) -> None:
     """Raise CompdError where a cluster has no worker, or workers that cannot do the work: with every one of them.
 
-    paths : files that the workers must be able to read; the first is looked for, the others lie where it does.
+    paths : files that the workers must be able to read.
     """
     # functions of the standard library: any worker has them
     releases = client.run(version, "compd", on_error="return")
@@ -143,13 +143,13 @@ def check_workers(client: Client, scheduler: str, paths: Sequence[Path] = ()) ->
         for worker, release in releases.items()
         if release != __version__
     ]
-    for path in paths[:1]:
+    for path in paths:
         problems += [
             Problem(
                 where=f"worker {worker}",
-                what="does not see the recordings",
+                what="does not see a file",
                 value=str(path),
-                next_step="put them into a directory that all computers have under this name",
+                next_step="put recordings, configurations and models where all computers have them under one name",
             )
             for worker, is_there in client.run(os.path.exists, str(path)).items()
             if not is_there

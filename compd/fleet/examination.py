@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -30,7 +31,7 @@ from compd.model_file import ModelFile, read_model_file
 from compd.recording.recording import Recording
 from compd.recording.sidecar import read_sidecar
 
-# Configurations that a process keeps: a fleet has hundreds of recordings of a few machines.
+# Configurations, and models, that a process keeps: a fleet has hundreds of recordings of a few machines.
 MOST_KEPT = 64
 
 
@@ -51,11 +52,16 @@ class Examination:
     models: Mapping[str, Path]
     effects: tuple[str, ...] = ()
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Every file that it needs beside the recordings."""
+        return (*self.machines.values(), *self.models.values(), *map(Path, filter(os.path.isabs, self.effects)))
+
     def __call__(self, path: Path) -> RecordingResult:
         """Examine one recording. Raises CompdError where it cannot be."""
         machine = machine_name(path)
-        configuration = self.machines.get(machine)
-        aligned = open_recording(path, None if configuration is None else _configuration(configuration))
+        file = self.machines.get(machine)
+        aligned = open_recording(path, None if file is None else _configuration(file, file_stamp(file)))
         model = self._model(aligned)
         if self.command == "diagnose":
             return self._diagnosed(aligned, model)
@@ -64,7 +70,7 @@ class Examination:
     def _model(self, aligned: AlignedRecording) -> ModelFile | None:
         machine = aligned.recording.machine
         path = self.models.get(machine)
-        return None if path is None else read_model_file(path, machine, aligned.rows.links)
+        return None if path is None else _model(path, file_stamp(path), machine, aligned.rows.links)
 
     def _compared(self, aligned: AlignedRecording, model: ModelFile | None) -> RecordingResult:
         """The recording beside the model, and the numbers that the model's effects would have on it."""
@@ -195,14 +201,16 @@ def _wherever(effects: str | Path) -> str:
     return str(Path(effects).absolute()) if Path(effects).exists() else str(effects)
 
 
-def _configuration(path: Path) -> Configuration:
-    """The configuration, read again where the file has changed."""
-    return _loaded(path, file_stamp(path))
+@lru_cache(MOST_KEPT)
+def _configuration(path: Path, stamp: tuple[int, int] | None) -> Configuration:
+    """The configuration; stamp : of the file, so that it is read again where that has changed."""
+    return load(path)
 
 
 @lru_cache(MOST_KEPT)
-def _loaded(path: Path, stamp: tuple[int, int] | None) -> Configuration:
-    return load(path)
+def _model(path: Path, stamp: tuple[int, int] | None, machine: str, links: int) -> ModelFile:
+    """The model; stamp : of the file, so that it is read again where that has changed."""
+    return read_model_file(path, machine, links)
 
 
 def _started_at(recording: Recording) -> datetime | None:

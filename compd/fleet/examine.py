@@ -58,7 +58,8 @@ def examine_fleet(
     results: dict[Path, RecordingResult] = {}
     interrupted = False
     try:
-        with open_cluster(scheduler, paths) as client:
+        # the other recordings lie where the first one does
+        with open_cluster(scheduler, [*paths[:1], *examination.files]) as client:
             for outcome in outcomes(client, examination, paths):
                 result = outcome.result if outcome.result is not None else _failed(outcome, examination)
                 results[outcome.item] = result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import pytest
 
 from compd.errors import CompdError
-from compd.fleet.cluster import check_workers, open_cluster
+from compd.fleet.cluster import check_installed, check_workers, open_cluster
 from compd.release import __version__
 
 ADDRESS = "tcp://lab:8786"
@@ -53,8 +54,14 @@ def test_no_worker() -> None:
 
 def test_workers_that_do_not_see_the_recordings() -> None:
     assert problems(Workers({"tcp://a:1": __version__}), Path("/data/run.csv")) == [
-        "worker tcp://a:1 does not see the recordings"
+        "worker tcp://a:1 does not see a file"
     ]
+
+
+def test_packages_that_are_missing_are_named_with_what_installs_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(CompdError, match=r"pyarrow, which is not installed\n.*compd\[fleet\]"):
+        check_installed()
 
 
 def test_an_address_that_is_none() -> None:
