@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
@@ -72,7 +73,13 @@ def open_cluster(
 @contextmanager
 def _local(processes: int) -> Iterator[Client]:
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, WorkerPlugin
+
+    class WithoutCtrlC(WorkerPlugin):
+        """Ctrl-C reaches every process of a terminal; this one alone is to end the others."""
+
+        def setup(self, worker: object) -> None:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     settings: Mapping[str, Any] = {
         # a worker that died is known at once; the engine tries its item again
@@ -92,6 +99,7 @@ def _local(processes: int) -> Iterator[Client]:
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
+        client.register_plugin(WithoutCtrlC())
         yield client
 
 
