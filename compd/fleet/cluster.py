@@ -85,6 +85,11 @@ def _local(processes: int) -> Iterator[Client]:
         # a worker that died is known at once; the engine tries its item again
         "distributed.scheduler.allowed-failures": 0,
         "distributed.nanny.pre-spawn-environ": _ONE_THREAD,
+        # nobody looks at what these watch, and they take a tenth of each processor
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.system-monitor.interval": "5s",
+        "distributed.admin.tick.interval": "1s",
+        "distributed.admin.tick.limit": "60s",
     }
     with (
         dask.config.set(settings),

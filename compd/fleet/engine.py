@@ -1,11 +1,11 @@
 """One function over many items on a Dask cluster: results as they come, and an exception is a result.
 
-A task is one item: `compare` of 600 rows takes a hundred times what Dask does for a task. An item whose worker died
-is tried once more by itself, when nothing else runs: then it is known whether it is the item that kills workers.
+Dask takes 5 ms for a task, so that quick items share one. An item whose worker died is tried once more by itself, when
+nothing else runs: then it is known whether it is the item that kills workers.
 
 Example::
 
-    with local_cluster() as client:
+    with open_cluster() as client:
         for outcome in outcomes(client, work, items):
             print(outcome.item, outcome.error or outcome.result)
 """
@@ -28,6 +28,8 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 # As long may a cluster be without any worker, s: those that died are started anew within that time, or nobody does it.
 LONGEST_WITHOUT_WORKERS_S = 60.0
+# At least so many tasks for each worker: the last ones are shared out evenly enough.
+_FEWEST_BATCHES = 8
 # How often it is looked whether there is a worker while no result comes, s.
 LOOK_EVERY_S = 5.0
 
@@ -44,7 +46,9 @@ class Outcome(Generic[Item, Result]):
     error: Exception | None = None
 
 
-def outcomes(client: Client, work: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Outcome[Item, Result]]:
+def outcomes(
+    client: Client, work: Callable[[Item], Result], items: Sequence[Item], batch: int = 1
+) -> Iterator[Outcome[Item, Result]]:
     """Every item's outcome, in the order in which they are done.
 
     Parameters
@@ -55,64 +59,81 @@ def outcomes(client: Client, work: Callable[[Item], Result], items: Sequence[Ite
         Of one item; it, the items and the results must be such that `pickle` takes them.
     items : sequence
         Each is done once, or twice where its worker died.
+    batch : int
+        So many items at most are one task; fewer where workers would be idle at the end.
 
     Yields
     ------
     Outcome
         One for each item. Where the caller leaves the loop, or Ctrl-C does, what is not done yet is cancelled.
     """
+    workers = max(1, len(client.nthreads()))
+    size = max(1, min(batch, len(items) // (workers * _FEWEST_BATCHES)))
     lost: list[Item] = []
-    for outcome in _run(client, work, items):
+    for outcome in _run(client, work, [items[k : k + size] for k in range(0, len(items), size)]):
         if isinstance(outcome.error, _WorkerDied):
             lost.append(outcome.item)
         else:
             yield outcome
+    no_worker = False
     for item in lost:
-        yield from _run(client, work, [item])
+        if no_worker:
+            yield Outcome(item, None, _no_worker(item))
+            continue
+        for outcome in _run(client, work, [[item]]):
+            no_worker = isinstance(outcome.error, _NoWorker)
+            yield outcome
 
 
 class _WorkerDied(CompdError):
     """The worker died while it had the item."""
 
 
-def _run(client: Client, work: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Outcome[Item, Result]]:
-    """Every item's outcome, each tried once; what is left when the loop is left is cancelled."""
-    futures = client.map(_attempt, [(work, item) for item in items], pure=False)
-    waiting = {future.key: (item, future) for item, future in zip(items, futures, strict=True)}
+class _NoWorker(CompdError):
+    """There was no worker for the item."""
+
+
+def _run(
+    client: Client, work: Callable[[Item], Result], batches: Sequence[Sequence[Item]]
+) -> Iterator[Outcome[Item, Result]]:
+    """Every item's outcome, each batch tried once; what is left when the loop is left is cancelled."""
+    futures = client.map(_attempt, [(work, batch) for batch in batches], pure=False)
+    waiting = {future.key: (batch, future) for batch, future in zip(batches, futures, strict=True)}
+    # `waiting` alone has them, so that the cluster forgets results that have been read
+    del futures
     done: SimpleQueue[Future[Any]] = SimpleQueue()
-    for future in futures:
+    for _, future in waiting.values():
         future.add_done_callback(done.put)
-    del futures, future
     without_workers_s = 0.0
     try:
         while waiting and without_workers_s < LONGEST_WITHOUT_WORKERS_S:
             try:
-                finished = done.get(timeout=LOOK_EVERY_S)
+                future = done.get(timeout=LOOK_EVERY_S)
             except Empty:
                 without_workers_s = 0.0 if _has_worker(client) else without_workers_s + LOOK_EVERY_S
                 continue
-            # forgotten here, so that the cluster forgets the result
-            item, _ = waiting.pop(finished.key)
-            yield _outcome(item, finished)
-        for item, _ in waiting.values():
-            yield Outcome(item, None, _no_worker(item))
+            batch, _ = waiting.pop(future.key)
+            yield from _outcomes_of(batch, future)
+        for batch, _ in waiting.values():
+            yield from (Outcome(item, None, _no_worker(item)) for item in batch)
     finally:
         client.cancel([future for _, future in waiting.values()])
 
 
-def _outcome(item: Item, future: Future[Any]) -> Outcome[Item, Any]:
-    """The outcome of an item whose task is done, one way or another."""
+def _outcomes_of(batch: Sequence[Item], future: Future[Any]) -> list[Outcome[Item, Any]]:
+    """The outcomes of items whose task is done, one way or another."""
     from distributed import KilledWorker
 
     try:
-        result, error = future.result()
+        done = future.result()
     except KilledWorker as killed:
-        return Outcome(item, None, _worker_died(item, killed.last_worker.address))
+        worker = killed.last_worker.address
+        return [Outcome(item, None, _worker_died(item, worker)) for item in batch]
     except CancelledError:
-        return Outcome(item, None, _scheduler_lost(item))
-    except Exception as lost:  # noqa: BLE001 - what does not come back from a worker may be of any kind
-        return Outcome(item, None, _unreadable(item, lost))
-    return Outcome(item, result, error)
+        return [Outcome(item, None, _scheduler_lost(item)) for item in batch]
+    except Exception as error:  # noqa: BLE001 - what does not come back from a worker may be of any kind
+        return [Outcome(item, None, _unreadable(item, error)) for item in batch]
+    return [Outcome(item, result, error) for item, (result, error) in zip(batch, done, strict=True)]
 
 
 def _has_worker(client: Client) -> bool:
@@ -122,13 +143,16 @@ def _has_worker(client: Client) -> bool:
         return False
 
 
-def _attempt(task: tuple[Callable[[Item], Result], Item]) -> tuple[Result | None, Exception | None]:
-    """What the worker does: the work, whose exception is a value that every process can read."""
-    work, item = task
-    try:
-        return work(item), None
-    except Exception as error:  # noqa: BLE001 - whatever one item raises, the others are worked on
-        return None, _portable(error)
+def _attempt(task: tuple[Callable[[Item], Result], Sequence[Item]]) -> list[tuple[Result | None, Exception | None]]:
+    """What a worker does: the work on a few items, whose exceptions are values that every process can read."""
+    work, batch = task
+    done: list[tuple[Result | None, Exception | None]] = []
+    for item in batch:
+        try:
+            done.append((work(item), None))
+        except Exception as error:  # noqa: BLE001 - whatever one item raises, the others are worked on
+            done.append((None, _portable(error)))
+    return done
 
 
 def _portable(error: Exception) -> Exception:
@@ -152,7 +176,7 @@ def _worker_died(item: object, worker: str) -> CompdError:
 
 
 def _no_worker(item: object) -> CompdError:
-    return CompdError(
+    return _NoWorker(
         Problem(
             where=str(item),
             what=f"was not worked on: for {LONGEST_WITHOUT_WORKERS_S:g} s the cluster had no worker",

@@ -1,7 +1,8 @@
 """How a fleet's work is shared out: `python -m tests.benchmarks.bench_fleet --recordings 500`.
 
 Simulated recordings of about 600 rows, compared by one worker process and by as many as there are cores. The start of
-the workers is apart: it is the same however many recordings there are.
+the workers is apart: it is the same however many recordings there are. Processor times tell what sharing out costs
+from what a busy machine, or two cores that are one, take: of the workers for the work, and of the scheduler beside it.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import outcomes
 from compd.fleet.examination import Examination, examination
+from compd.fleet.examine import BATCH
 from compd.fleet.recordings import find_recordings
 from compd.simulation.campaign.simulate_campaign import simulate_campaign
 from tests.benchmarks.figures import show
@@ -38,12 +41,12 @@ def main() -> None:
         rows = []
         alone_s = 0.0
         for workers in dict.fromkeys((1, cores)):
-            start_s, work_s = _cost(work, paths, workers)
-            alone_s = alone_s or work_s
-            efficiency = alone_s / (workers * work_s)
-            numbers = [start_s, work_s, work_s / len(paths) * 1e3, efficiency, efficiency / BUDGET]
+            cost = _cost(work, paths, workers)
+            alone_s = alone_s or cost.work_s
+            efficiency = alone_s / (workers * cost.work_s)
+            numbers = [*cost, efficiency, efficiency / BUDGET]
             rows.append([str(workers), *(f"{number:.2f}" for number in numbers)])
-    head = ["workers", "start, s", "work, s", "per recording, ms", "efficiency", "efficiency / budget"]
+    head = ["workers", "start, s", "work, s", "workers' processor, s", "scheduler's", "efficiency", "eff. / budget"]
     title = f"{len(paths)} recordings, {options.command}; efficiency = T1 / (workers * T), budget {BUDGET}"
     show(title, head, rows)
 
@@ -59,16 +62,26 @@ def _recordings(directory: Path, count: int) -> tuple[Path, ...]:
     return find_recordings([directory]).paths
 
 
-def _cost(work: Examination, paths: Sequence[Path], workers: int) -> tuple[float, float]:
-    """Seconds until every worker has done one recording, and of all recordings after that."""
+class Cost(NamedTuple):
+    """Seconds until every worker has done one recording, and of all recordings after that; processor time of these."""
+
+    start_s: float
+    work_s: float
+    workers_processor_s: float
+    scheduler_processor_s: float
+
+
+def _cost(work: Examination, paths: Sequence[Path], workers: int) -> Cost:
     begun_s = time.perf_counter()
     with open_cluster(processes=workers) as client:
         client.run(work, paths[0])
-        started_s = time.perf_counter()
-        failed = [outcome.error for outcome in outcomes(client, work, paths) if outcome.error]
-        done_s = time.perf_counter()
+        started_s, own_s = time.perf_counter(), time.process_time()
+        workers_s = sum(client.run(time.process_time).values())
+        failed = [outcome.error for outcome in outcomes(client, work, paths, BATCH[work.command]) if outcome.error]
+        done_s, own_s = time.perf_counter(), time.process_time() - own_s
+        workers_s = sum(client.run(time.process_time).values()) - workers_s
     assert not failed, failed
-    return started_s - begun_s, done_s - started_s
+    return Cost(started_s - begun_s, done_s - started_s, workers_s, own_s)
 
 
 if __name__ == "__main__":
