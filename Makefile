@@ -115,7 +115,7 @@ wheel: $(STAMP) docs
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
 
 SAMPLE := kinematics cycle compare diagnose
-BENCH := $(SAMPLE) loop latency flood throughput page gateway stream
+BENCH := $(SAMPLE) loop latency flood throughput page gateway stream fleet
 
 bench: $(STAMP)
 	@for name in $(BENCH); do $(BIN)/python -m tests.benchmarks.bench_$$name || exit 1; done

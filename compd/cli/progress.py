@@ -27,13 +27,13 @@ def steps_shown(quiet: bool = False) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def rows_shown(total: int, description: str) -> Iterator[Callable[[int], None]]:
-    """A function that is told how many of `total` rows are done; the bar goes to standard error, gone at the end."""
+def count_shown(total: int, what: str) -> Iterator[Callable[[int], None]]:
+    """A function that is told how many of `total` things are done; the bar goes to standard error, gone at the end."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    columns = (BarColumn(bar_width=20), TextColumn(description), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (BarColumn(bar_width=20), TextColumn(what), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=total)
         yield lambda done: bar.update(task, completed=done)

@@ -1,4 +1,4 @@
-"""The page of the criteria: every threshold of a comparison and of a diagnosis, with its meaning and its reason."""
+"""The page of the criteria: every threshold of a comparison, a diagnosis and a fleet, with its meaning and reason."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 from compd.comparison.criteria import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
+from compd.fleet.criteria import FleetCriteria
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target, term
 
 # Written by `python -m tests.scoreboard.sensitivity --figures`.
@@ -24,7 +25,8 @@ def counts() -> dict[str, Any]:
 
 
 INTRODUCTION = f"""\
-The result of `compd compare` and the verdict of `compd diagnose` rest on the thresholds of this page and on no others.
+The result of `compd compare`, the verdict of `compd diagnose`, and what `compd fleet report` names rest on the
+thresholds of this page and on no others.
 Each has its default, its unit, its meaning, and the reason for its value; a reason that begins with "A choice" says
 that there is no derivation. [How a verdict is reached](../explanation/how-a-verdict-is-reached.md) shows where each
 enters.
@@ -48,6 +50,7 @@ def page() -> str:
         INTRODUCTION,
         _part("Diagnosis", "diagnosis", Criteria),
         _part("Comparison", "comparison", ComparisonCriteria),
+        _part("A fleet of machines", "fleet", FleetCriteria),
     )
 
 

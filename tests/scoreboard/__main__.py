@@ -31,7 +31,7 @@ def main() -> None:
     wanted = dict(_wanted(options))
     if options.prepare:
         outcomes = in_parallel(partial(_directory, campaigns=options.campaigns), list(wanted.values()), options.jobs)
-        failed = [(str(item), str(error)) for item, _, error in outcomes if error]
+        failed = [(str(outcome.item), str(outcome.error)) for outcome in outcomes if outcome.error]
     else:
         done = {result["case"] for result in read_results(options.out)}
         todo = [item for name, item in wanted.items() if name not in done]

@@ -4,29 +4,26 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+from compd.cli.progress import counted
+from compd.fleet.cluster import open_cluster
+from compd.fleet.engine import Outcome, outcomes
 
 Item = TypeVar("Item")
 # Name of an item, and the error that it raised.
 Failures = list[tuple[str, str]]
 
 
-def in_parallel(
-    work: Callable[[Item], Any], todo: Sequence[Item], jobs: int
-) -> Iterator[tuple[Item, Any, BaseException | None]]:
-    """(item, `work` of it, the error that it raised), in the order in which they are done."""
-    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with ProcessPoolExecutor(jobs) as pool, Progress(*columns, transient=True) as progress:
-        running = {pool.submit(work, item): item for item in todo}
-        bar = progress.add_task("", total=len(todo))
-        for future in as_completed(running):
-            progress.advance(bar)
-            error = future.exception()
-            yield running[future], None if error else future.result(), error
+def in_parallel(work: Callable[[Item], Any], todo: Sequence[Item], jobs: int) -> Iterator[Outcome[Item, Any]]:
+    """The outcome of each item, in the order in which they are done."""
+    if not todo:
+        return
+    with open_cluster(processes=jobs) as client, counted(len(todo), "cases") as done:
+        for outcome in outcomes(client, work, todo):
+            done()
+            yield outcome
 
 
 def append_results(path: Path, work: Callable[[Item], Any], todo: Sequence[Item], jobs: int) -> Failures:
@@ -34,11 +31,11 @@ def append_results(path: Path, work: Callable[[Item], Any], todo: Sequence[Item]
     path.parent.mkdir(parents=True, exist_ok=True)
     failed: Failures = []
     with path.open("a", encoding="utf-8") as file:
-        for item, result, error in in_parallel(work, todo, jobs):
-            if error is not None:
-                failed.append((str(item), f"{type(error).__name__}: {error}"))
+        for outcome in in_parallel(work, todo, jobs):
+            if outcome.error is not None:
+                failed.append((str(outcome.item), f"{type(outcome.error).__name__}: {outcome.error}"))
                 continue
-            file.write(json.dumps(result) + "\n")
+            file.write(json.dumps(outcome.result) + "\n")
             file.flush()
     return failed
 

@@ -73,11 +73,11 @@ def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison
 
         return compare_recording(open_recording(path, machine), model)
     from compd.api.long_recordings import compare_stream
-    from compd.cli.progress import rows_shown
+    from compd.cli.progress import count_shown
     from compd.recording.blocks import row_count
 
     # read twice: for the sample, then row by row
-    with rows_shown(2 * row_count(path), f"comparing {path.name}") as progress:
+    with count_shown(2 * row_count(path), f"comparing {path.name}") as progress:
         return compare_stream(path, model, machine=machine, progress=progress)
 
 

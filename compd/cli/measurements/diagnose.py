@@ -74,9 +74,9 @@ def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, int]:
     if not is_long(path):
         return open_recording(path, machine), 0
     from compd.api.long_recordings import open_sample
-    from compd.cli.progress import rows_shown
+    from compd.cli.progress import count_shown
     from compd.recording.blocks import row_count
 
     rows = row_count(path)
-    with rows_shown(rows, f"drawing a sample of {path.name}") as progress:
+    with count_shown(rows, f"drawing a sample of {path.name}") as progress:
         return open_sample(path, machine, progress=progress), rows

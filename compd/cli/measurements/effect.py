@@ -148,11 +148,11 @@ def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinemen
     if not is_long(path):
         return open_recording(path, machine), unrefined
     from compd.api.long_recordings import open_long
-    from compd.cli.progress import rows_shown
+    from compd.cli.progress import count_shown
     from compd.recording.blocks import row_count
 
     rows = row_count(path)
-    with rows_shown(rows, f"drawing a sample of {path.name}") as progress:
+    with count_shown(rows, f"drawing a sample of {path.name}") as progress:
         long = open_long(path, machine, progress)
     aligned = long.sample.aligned
     typer.echo(f"Fitted to {rows} rows; errors are of a sample of {aligned.recording.rows}, spread evenly.")

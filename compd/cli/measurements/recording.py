@@ -96,10 +96,10 @@ def convert(
     overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
 ) -> None:
     """Write a recording of any length as Parquet or as CSV: the same numbers in the same rows, the same sidecar."""
-    from compd.cli.progress import rows_shown
+    from compd.cli.progress import count_shown
     from compd.recording.convert import convert_recording, rows_to_convert
 
-    with rows_shown(rows_to_convert(source), "rows") as progress:
+    with count_shown(rows_to_convert(source), "rows") as progress:
         rows = convert_recording(source, destination, overwrite, progress)
     typer.echo(f"written: {destination}, {rows} rows")
 

@@ -14,6 +14,7 @@ from compd.comparison.criteria import ComparisonCriteria
 from compd.configuration.machine_configuration import SECTIONS
 from compd.configuration.schema import json_schema
 from compd.diagnosis.criteria import Criteria
+from compd.fleet.criteria import FleetCriteria
 from compd.gauge import Quality
 from compd.live.loop.packet_layout import PACKET_BODY, PACKET_FIELDS, PACKET_SIZE
 from compd.live.loop.setpoint import Setpoint
@@ -41,7 +42,12 @@ from tests.support.paths import ROOT
 LARGEST_TABLE = 4
 MESSAGES = [*REQUESTS.values(), *SENT_MESSAGES.values()]
 FILES = [ModelDocument, EffectEntry, ParameterEntry, ModelStep, FormulaDeclaration, FormulaParameter]
-THRESHOLDS = [field for kind in (Criteria, ComparisonCriteria) for field in fields(kind) if field.name != "comparison"]
+THRESHOLDS = [
+    field
+    for kind in (Criteria, ComparisonCriteria, FleetCriteria)
+    for field in fields(kind)
+    if field.name != "comparison"
+]
 
 
 def example(name: str) -> Exchange:

@@ -1,0 +1,201 @@
+"""`compd fleet`: many machines, many recordings, one table and one page."""
+
+from __future__ import annotations
+
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from compd.cli.options import EffectsOption, OverwriteOption
+
+if TYPE_CHECKING:
+    from compd.fleet.examination import Examination
+    from compd.fleet.recording_result import RecordingResult
+
+# More of each a terminal does not show; the page and the table have all.
+MOST_SENTENCES = 12
+# Of shells: ended by SIGINT.
+_INTERRUPTED = 130
+
+fleet = typer.Typer(
+    no_args_is_help=True, help="Examine the recordings of many machines, on all cores or on a Dask cluster."
+)
+
+PlacesArgument = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="DIRECTORY|PATTERN...",
+        help="Where the recordings are: directories, with all below them, or patterns in quotes ('2026-*/*.csv').",
+    ),
+]
+MachinesOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--machine",
+        metavar="FILE",
+        help="The configuration of a machine that does not come with compd, for the recordings that name it. May be "
+        "repeated.",
+    ),
+]
+ModelsOption = Annotated[
+    list[Path] | None,
+    typer.Option("--model", metavar="FILE", help="A model file, for the recordings of its machine. May be repeated."),
+]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="tcp://HOST:PORT",
+        help="A Dask scheduler that runs already; left out, all cores of this computer do the work.",
+    ),
+]
+OutOption = Annotated[Path, typer.Option("--out", help="The table to write (Parquet); an earlier one is replaced.")]
+HtmlOption = Annotated[Path | None, typer.Option("--html", help="Write the page too; works offline.")]
+
+
+@fleet.callback()
+def _fleet() -> None:
+    """Examine the recordings of many machines, on all cores or on a Dask cluster."""
+
+
+@fleet.command()
+def compare(
+    places: PlacesArgument,
+    out: OutOption = Path("fleet.parquet"),
+    machine: MachinesOption = None,
+    model: ModelsOption = None,
+    scheduler: SchedulerOption = None,
+    html: HtmlOption = None,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Compare every recording with the model of its machine; the effects of the model are fitted anew on each.
+
+    A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1.
+    """
+    from compd.fleet.cluster import check_installed
+    from compd.fleet.examination import examination
+
+    check_installed()
+    _examine(examination("compare", machine or (), model or ()), places, out, scheduler, html, overwrite)
+
+
+@fleet.command()
+def diagnose(
+    places: PlacesArgument,
+    out: OutOption = Path("fleet.parquet"),
+    machine: MachinesOption = None,
+    model: ModelsOption = None,
+    effects: EffectsOption = None,
+    scheduler: SchedulerOption = None,
+    html: HtmlOption = None,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Diagnose every recording: which effect the model of its machine lacks, with its numbers.
+
+    A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1.
+    """
+    from compd.fleet.cluster import check_installed
+    from compd.fleet.examination import examination
+
+    check_installed()
+    wanted = examination("diagnose", machine or (), model or (), effects or ())
+    _examine(wanted, places, out, scheduler, html, overwrite)
+
+
+@fleet.command()
+def report(
+    places: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="TABLE|DIRECTORY|PATTERN...",
+            help="The table that `compd fleet diagnose` or `compd fleet compare` wrote; or recordings, which are "
+            "diagnosed first.",
+        ),
+    ],
+    html: Annotated[Path, typer.Option("--html", help="The page to write; works offline.")] = Path("fleet.html"),
+    out: OutOption = Path("fleet.parquet"),
+    machine: MachinesOption = None,
+    model: ModelsOption = None,
+    effects: EffectsOption = None,
+    scheduler: SchedulerOption = None,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Write the page: which machine has which effect, what drifts, which machine differs, what could not be read."""
+    from compd.fleet.cluster import check_installed
+    from compd.fleet.examination import examination
+    from compd.fleet.fleet_page import write_fleet_page
+    from compd.fleet.table import is_table, read_table
+    from compd.report.page import check_page_path
+
+    check_installed()
+    if not all(is_table(Path(place)) for place in places):
+        wanted = examination("diagnose", machine or (), model or (), effects or ())
+        _examine(wanted, places, out, scheduler, html, overwrite)
+        return
+    check_page_path(html, overwrite)
+    results = [result for place in places for result in read_table(Path(place))]
+    write_fleet_page(html, results)
+    _print_overview(results)
+    typer.echo(f"The page: {html}")
+
+
+def _examine(
+    wanted: Examination, places: list[str], out: Path, scheduler: str | None, html: Path | None, overwrite: bool
+) -> None:
+    """Examine what lies in these places, write the table and where it is wanted the page, print an overview."""
+    from compd.cli.problems import print_problems
+    from compd.cli.progress import count_shown
+    from compd.fleet.examine import examine_fleet
+    from compd.fleet.fleet_page import write_fleet_page
+    from compd.fleet.recordings import find_recordings
+    from compd.fleet.table import check_table_path, write_table
+
+    check_table_path(out, overwrite)
+    if html is not None:
+        from compd.report.page import check_page_path
+
+        check_page_path(html, overwrite)
+    found = find_recordings(places)
+    print_problems(found.remarks, "remark: ")
+    numbers = count(1)
+    with count_shown(len(found.paths), "recordings") as done:
+        run = examine_fleet(wanted, found.paths, scheduler, lambda result: done(next(numbers)))
+    write_table(out, run.results)
+    _print_overview(run.results)
+    typer.echo(f"The table: {out}")
+    if html is not None:
+        write_fleet_page(html, run.results)
+        typer.echo(f"The page: {html}")
+    if run.interrupted:
+        raise typer.Exit(_INTERRUPTED)
+    raise typer.Exit(any(result.problem for result in run.results))
+
+
+def _print_overview(results: list[RecordingResult] | tuple[RecordingResult, ...]) -> None:
+    """The machines as a table, then what drifts and differs, then the problems."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from compd.fleet.overview import Overview
+    from compd.report.terminal_table import keep_words_whole
+
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    overview = Overview(results)
+    console.print(overview.headline)
+    if overview.machines:
+        summary = overview.machine_table()
+        table = Table(*summary.head)
+        for row in summary.rows:
+            table.add_row(*row)
+        console.print(keep_words_whole(table, console.width))
+    sentences = [*overview.drift_sentences(), *overview.outlying_sentences()]
+    for sentence in sentences[:MOST_SENTENCES]:
+        console.print(f"  - {sentence}")
+    if len(sentences) > MOST_SENTENCES:
+        console.print(f"  and {len(sentences) - MOST_SENTENCES} more (the page has all)")
+    for result in overview.failed[:MOST_SENTENCES]:
+        console.print(f"not examined: {result.problem.splitlines()[0]}")
+    if len(overview.failed) > MOST_SENTENCES:
+        console.print(f"and {len(overview.failed) - MOST_SENTENCES} more; the table has all, with what to do")

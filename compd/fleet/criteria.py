@@ -1,0 +1,52 @@
+"""Thresholds by which drifts and machines that differ are named, each with its meaning, its unit and its reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from compd.comparison.criteria import threshold
+
+
+@dataclass(frozen=True)
+class FleetCriteria:
+    """Numbers on which the sentences of a fleet's page rest.
+
+    Each field's metadata hold `unit`, `meaning` and `reason`::
+
+        for criterion in dataclasses.fields(FleetCriteria):
+            print(criterion.name, criterion.default, criterion.metadata["reason"])
+    """
+
+    fewest_campaigns: int = threshold(
+        3,
+        unit="recordings of one machine",
+        meaning="fewer values of a parameter show no drift",
+        reason="a line goes through any two points: nothing is left that could contradict it",
+    )
+    drift_p_value: float = threshold(
+        0.01,
+        unit="probability",
+        meaning="a drift is named where a parameter that stays the same shows so steep a line more rarely, all lines "
+        "of the fleet counted together (Bonferroni)",
+        reason="a fleet without any drift names one in a hundred pages",
+    )
+    scatter_p_value: float = threshold(
+        0.05,
+        unit="probability",
+        meaning="where values scatter about their line more than chance makes of their standard errors, the scatter "
+        "counts in place of the standard errors",
+        reason="the customary level; the ratio is Birge's, Phys. Rev. 40 (1932) 207",
+    )
+    fewest_machines: int = threshold(
+        6,
+        unit="machines",
+        meaning="among fewer none is said to differ from the others",
+        reason="of five machines that are alike one in sixteen sets has a robust score above 7, of six one in 36",
+    )
+    outlying_score: float = threshold(
+        7.0,
+        unit="standard deviations, robust",
+        meaning="a machine whose value is farther from the median of all machines differs",
+        reason="20,000 simulated sets of normal values: among 6 machines that are alike 3 % of the quantities have one "
+        "beyond it, among 20 0.2 %; beyond the customary 3.5 (Iglewicz and Hoaglin, 1993) 15 % and 10 %",
+    )

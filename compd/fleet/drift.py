@@ -1,0 +1,128 @@
+"""How a parameter goes from campaign to campaign: a line by weighted least squares, named where it is no chance.
+
+The line is c + b t, weighted with the standard errors of the values. Where the values scatter about it more than
+these errors explain, something else changes from campaign to campaign: the standard error of b then grows by Birge's
+ratio sqrt(chi^2 / (n - 2)), and its chance is that of Student's t with n - 2 degrees of freedom.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from itertools import groupby
+
+import numpy as np
+from scipy.stats import chi2, norm, t
+
+from compd.arrays import FloatArray
+from compd.fleet.criteria import FleetCriteria
+from compd.fleet.recording_result import RecordingResult
+
+_SECONDS_PER_DAY = 86400.0
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """One parameter of one machine over its C campaigns.
+
+    Attributes
+    ----------
+    machine, effect, parameter, unit : whose values they are.
+    started_at : when each campaign began; empty where one of them does not say.
+    time : (C,) days since the machine's first campaign; without `started_at` their number, from 1.
+    value, standard_error : (C,) in `unit`.
+    intercept, slope, slope_std : of the line, in `unit` and `unit` per day (or per campaign); nan where there is none.
+    p_value : chance of so steep a line for a parameter that stays the same; nan where there is no line.
+    named : whether that is too rare to be chance.
+    """
+
+    machine: str
+    effect: str
+    parameter: str
+    unit: str
+    started_at: tuple[datetime, ...]
+    time: FloatArray
+    value: FloatArray
+    standard_error: FloatArray
+    intercept: float = math.nan
+    slope: float = math.nan
+    slope_std: float = math.nan
+    p_value: float = math.nan
+    named: bool = False
+
+    @property
+    def name(self) -> str:
+        """ "link_expansion.a": which parameter it is."""
+        return f"{self.effect}.{self.parameter}"
+
+    @property
+    def change(self) -> float:
+        """Change along the line from the first to the last campaign, in `unit`."""
+        return self.slope * float(self.time[-1] - self.time[0])
+
+    @property
+    def change_std(self) -> float:
+        """Standard error of `change`."""
+        return self.slope_std * float(self.time[-1] - self.time[0])
+
+
+def drifts(results: Iterable[RecordingResult], criteria: FleetCriteria = FleetCriteria()) -> tuple[Drift, ...]:
+    """Every parameter of every machine over its campaigns, by machine and name.
+
+    A line is fitted where there are enough campaigns whose standard errors are known.
+    """
+    found = [_with_line(series, criteria) for series in _series(results)]
+    lines = sum(math.isfinite(drift.p_value) for drift in found)
+    return tuple(replace(drift, named=drift.p_value * lines < criteria.drift_p_value) for drift in found)
+
+
+def _series(results: Iterable[RecordingResult]) -> list[Drift]:
+    """The values of each parameter of each machine, in the order of its campaigns, without a line."""
+    series = []
+    examined = sorted((result for result in results if not result.problem), key=lambda result: result.machine)
+    for machine, group in groupby(examined, key=lambda result: result.machine):
+        campaigns = list(group)
+        dated = all(campaign.started_at for campaign in campaigns)
+        campaigns.sort(key=lambda campaign: (campaign.started_at if dated else 0, campaign.recording))
+        first = campaigns[0].started_at
+        points: dict[tuple[str, str, str], list[tuple[float, datetime | None, float, float]]] = {}
+        for number, campaign in enumerate(campaigns, start=1):
+            began = campaign.started_at if dated else None
+            time = (began - first).total_seconds() / _SECONDS_PER_DAY if began and first else float(number)
+            for estimate in campaign.estimates:
+                key = (estimate.effect, estimate.parameter, estimate.unit)
+                points.setdefault(key, []).append((time, began, estimate.value, estimate.standard_error))
+        for (effect, parameter, unit), values in sorted(points.items()):
+            time, value, standard_error = np.array([(at, v, s) for at, _, v, s in values], dtype=np.float64).T
+            began_at = tuple(began for _, began, _, _ in values if began is not None)
+            series.append(Drift(machine, effect, parameter, unit, began_at, time, value, standard_error))
+    return series
+
+
+def _with_line(drift: Drift, criteria: FleetCriteria) -> Drift:
+    """The same with its line, where one can be fitted."""
+    weighable = np.isfinite(drift.value) & np.isfinite(drift.standard_error) & (drift.standard_error > 0)
+    time, value, sigma = (column[weighable] for column in (drift.time, drift.value, drift.standard_error))
+    dof = len(time) - 2
+    if len(time) < criteria.fewest_campaigns or np.ptp(time) == 0:
+        return drift
+    weight = sigma**-2
+    middle = np.average(time, weights=weight)
+    spread = float(np.sum(weight * (time - middle) ** 2))
+    slope = float(np.sum(weight * (time - middle) * value)) / spread
+    intercept = float(np.average(value, weights=weight)) - slope * middle
+    slope_std = spread**-0.5
+    chi_squared = float(np.sum(weight * (value - intercept - slope * time) ** 2))
+    if chi2.sf(chi_squared, dof) < criteria.scatter_p_value:
+        slope_std *= math.sqrt(chi_squared / dof)
+        p_value = 2 * t.sf(abs(slope) / slope_std, dof)
+    else:
+        p_value = 2 * norm.sf(abs(slope) / slope_std)
+    return replace(drift, intercept=intercept, slope=slope, slope_std=slope_std, p_value=float(p_value))
+
+
+def named_drifts(found: Sequence[Drift]) -> list[Drift]:
+    """Those that are named, the surest first."""
+    return sorted((drift for drift in found if drift.named), key=lambda drift: drift.p_value)

@@ -1,0 +1,157 @@
+"""Figures of a fleet: effects by machine, parameters over campaigns, errors beside the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from plotly.graph_objects import Figure, Heatmap, Scatter
+from plotly.subplots import make_subplots
+
+from compd.fleet.drift import Drift
+from compd.fleet.overview import Overview, short_name
+from compd.report.page import COLOURS, style_figure
+from compd.report.page_table import PageTable
+from compd.report.small_multiples import COLUMNS, SERIES_COLOURS
+
+NO_EFFECTS = PageTable(("",), [("no effect was found, and the models have none",)])
+# A machine's line in the matrix.
+ROW_PX = 26
+PANEL_PX = 260
+# Beyond so many machines in one small figure colours cannot be told apart: those that drift have one, others none.
+MOST_COLOURED = len(SERIES_COLOURS)
+
+
+def plot_effect_matrix(overview: Overview) -> Figure | PageTable:
+    """A line for each machine, a column for each effect: on which share of the recordings, and "3 of 4" in words."""
+    if not overview.effects:
+        return NO_EFFECTS
+    share, text = [], []
+    for machine in overview.machines:
+        results, counts = overview.of(machine), overview.counts(machine)
+        rivalled = {estimate.effect for result in results for estimate in result.estimates if estimate.rivals}
+        share.append([counts[effect] / len(results) for effect in overview.effects])
+        text.append(
+            [
+                f"{counts[effect]} of {len(results)}{' ?' if effect in rivalled else ''}" if counts[effect] else ""
+                for effect in overview.effects
+            ]
+        )
+    figure = Figure(
+        Heatmap(
+            x=overview.effects,
+            y=overview.machines,
+            z=share,
+            text=text,
+            texttemplate="%{text}",
+            hovertemplate="%{y}, %{x}: %{text}<extra></extra>",
+            colorscale=[[0, "#ffffff"], [1, COLOURS["plain"]]],
+            zmin=0,
+            zmax=1,
+            xgap=2,
+            ygap=2,
+            showscale=False,
+        )
+    )
+    style_figure(figure, "", "", 120 + ROW_PX * len(overview.machines))
+    return figure.update_yaxes(autorange="reversed", automargin=True).update_xaxes(side="top", automargin=True)
+
+
+def plot_drifts(overview: Overview) -> Figure | PageTable:
+    """A small figure for each parameter: its value on each campaign of each machine, and the lines of drifts."""
+    by_name: dict[tuple[str, str], list[Drift]] = {}
+    for drift in overview.drifts:
+        by_name.setdefault((drift.name, drift.unit), []).append(drift)
+    if not by_name:
+        return NO_EFFECTS
+    lines, across = -(-len(by_name) // COLUMNS), min(COLUMNS, len(by_name))
+    figure = make_subplots(
+        lines,
+        across,
+        subplot_titles=[name for name, _ in by_name],
+        vertical_spacing=min(0.45 / lines, 0.3),
+        horizontal_spacing=0.09,
+    )
+    style_figure(figure, "", "", 80 + PANEL_PX * lines).update_layout(
+        legend={"y": 1 + 45 / (PANEL_PX * lines), "itemsizing": "constant"}, margin={"t": 70}
+    ).update_annotations(font_size=14)
+    coloured = _coloured(overview)
+    shown: set[str] = set()
+    for k, ((_, unit), series) in enumerate(by_name.items()):
+        row, col = k // across + 1, k % across + 1
+        # quiet ones first, so that the others lie over them
+        for drift in sorted(series, key=lambda drift: drift.machine in coloured):
+            colour = coloured.get(drift.machine, COLOURS["quiet"])
+            legend = drift.machine in coloured and drift.machine not in shown
+            shown.add(drift.machine)
+            for trace in _traces(drift, colour, legend):
+                figure.add_trace(trace, row=row, col=col)
+        dated = all(drift.started_at for drift in series)
+        figure.update_xaxes(title_text="" if dated else "campaign", title_standoff=4, row=row, col=col)
+        figure.update_yaxes(title_text=unit if unit != "1" else "", row=row, col=col)
+    return figure
+
+
+def plot_errors(overview: Overview) -> Figure | PageTable:
+    """The error of each recording by machine, before and with its effects, and the noise alone."""
+    kinds: Sequence[tuple[str, str, dict[str, Any]]] = (
+        ("error", "rms_before_um", {"color": COLOURS["worst"], "size": 7, "opacity": 0.7}),
+        ("with its effects", "rms_after_um", {"color": COLOURS["best"], "size": 7, "opacity": 0.7}),
+        ("noise alone", "noise_floor_um", {"color": COLOURS["quiet"], "size": 10, "symbol": "line-ew-open"}),
+    )
+    units = sorted({result.error_unit for result in overview.examined})
+    figure = Figure()
+    for name, attribute, marker in kinds:
+        results = [result for result in overview.examined if getattr(result, attribute) > 0]
+        figure.add_trace(
+            Scatter(
+                x=[result.machine for result in results],
+                y=[getattr(result, attribute) for result in results],
+                mode="markers",
+                name=name,
+                marker=marker,
+                text=[short_name(result) for result in results],
+                hovertemplate="%{text}: %{y:.3g}<extra>" + name + "</extra>",
+            )
+        )
+    style_figure(figure, "", f"error, {' or '.join(units)} rms per coordinate", 420)
+    figure.update_xaxes(categoryorder="array", categoryarray=overview.machines, automargin=True)
+    return figure.update_yaxes(type="log", dtick="D2", tickformat=".3~g")
+
+
+def _coloured(overview: Overview) -> dict[str, str]:
+    """Machine -> its colour: all where they are few, else those that drift or differ, as far as colours go."""
+    machines = overview.machines
+    if len(machines) > MOST_COLOURED:
+        named = [drift.machine for drift in overview.drifts if drift.named]
+        named += [outlying.machine for outlying in overview.outlying]
+        machines = list(dict.fromkeys(named))
+    return dict(zip(machines, SERIES_COLOURS, strict=False))
+
+
+def _traces(drift: Drift, colour: str, legend: bool) -> list[Scatter]:
+    """The values with their standard errors, and where it is named the line."""
+    x = list(drift.started_at) or drift.time.tolist()
+    values = Scatter(
+        x=x,
+        y=drift.value,
+        error_y={"array": drift.standard_error, "color": colour, "thickness": 1, "width": 3},
+        mode="markers",
+        marker={"color": colour, "size": 6},
+        name=drift.machine,
+        legendgroup=drift.machine,
+        showlegend=legend,
+        hovertemplate=f"{drift.machine}: %{{y:.4g}} {drift.unit}<extra></extra>",
+    )
+    if not drift.named:
+        return [values]
+    line = Scatter(
+        x=[x[0], x[-1]],
+        y=[drift.intercept + drift.slope * float(drift.time[k]) for k in (0, -1)],
+        mode="lines",
+        line={"color": colour, "width": 2},
+        legendgroup=drift.machine,
+        showlegend=False,
+        hoverinfo="skip",
+    )
+    return [values, line]

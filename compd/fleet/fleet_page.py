@@ -1,0 +1,57 @@
+"""The page of a fleet: which machine has which effect, what drifts, which machine differs, what could not be read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from compd.fleet.criteria import FleetCriteria
+from compd.fleet.fleet_figures import plot_drifts, plot_effect_matrix, plot_errors
+from compd.fleet.overview import Overview
+from compd.fleet.recording_result import RecordingResult
+from compd.report.page import Panel, write_page
+from compd.report.page_table import PageTable
+
+_CRITERIA = FleetCriteria()
+
+
+def write_fleet_page(path: Path, results: Sequence[RecordingResult]) -> None:
+    """Write the page; it works offline. results : at least one."""
+    overview = Overview(results)
+    sentences = [*overview.drift_sentences(), *overview.outlying_sentences()]
+    verdict = overview.headline
+    panels = [
+        Panel("Every machine", "Errors are medians over the machine's recordings.", overview.machine_table()),
+        Panel("What to look at", "Drifts and machines that differ; the reasons are below.", _list(sentences)),
+        Panel(
+            "Which machine has which effect",
+            "On how many of its recordings an effect was found, or was in the model. A question mark: on one of them "
+            "another effect would do as well.",
+            plot_effect_matrix(overview),
+        ),
+        Panel(
+            "How parameters change from campaign to campaign",
+            f"Bars are standard errors. A line is drawn where chance makes so steep a one less than once in "
+            f"{1 / _CRITERIA.drift_p_value:g} such pages; it takes {_CRITERIA.fewest_campaigns} campaigns.",
+            plot_drifts(overview),
+        ),
+        Panel(
+            "The error of each machine",
+            f"Dots are recordings. A machine differs where its median, or one of its parameters, is more than "
+            f"{_CRITERIA.outlying_score:g} robust standard deviations from the median of all machines; it takes "
+            f"{_CRITERIA.fewest_machines} machines.",
+            plot_errors(overview),
+        ),
+    ]
+    if overview.failed:
+        panels.append(
+            Panel("Recordings that could not be examined", "They count in nothing above.", overview.problem_table())
+        )
+    commands = ", ".join(sorted({f"compd fleet {result.command}" for result in results}))
+    models = sorted({result.model for result in results if result.model})
+    footer = f"By {commands}; models: {', '.join(models) or 'none'}."
+    write_page(path, f"A fleet of {len(overview.machines)} machines", verdict, panels, footer)
+
+
+def _list(sentences: Sequence[str]) -> PageTable:
+    return PageTable(("",), [[sentence] for sentence in sentences or ["nothing drifts, and no machine differs"]])

@@ -1,0 +1,152 @@
+"""What a fleet's results say in words and tables, for the page and for the terminal."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from statistics import median
+
+from compd.comparison.display_unit import format_error
+from compd.fleet.drift import Drift, drifts, named_drifts
+from compd.fleet.outlying import ERROR, ERROR_LEFT, OutlyingMachine, outlying_machines
+from compd.fleet.recording_result import RecordingResult
+from compd.number_text import estimate_text, join_words, number_text
+from compd.report.page_table import PageTable
+
+_NO_MACHINE = "(no machine named)"
+_DATE = "%Y-%m-%d"
+
+
+@dataclass(frozen=True)
+class Overview:
+    """The results of a fleet with what follows from all of them together."""
+
+    results: Sequence[RecordingResult]
+
+    @cached_property
+    def examined(self) -> list[RecordingResult]:
+        """Results without a problem."""
+        return [result for result in self.results if not result.problem]
+
+    @cached_property
+    def failed(self) -> list[RecordingResult]:
+        """Recordings that could not be examined."""
+        return [result for result in self.results if result.problem]
+
+    @cached_property
+    def machines(self) -> list[str]:
+        """Machines with a recording that was examined, by name."""
+        return sorted({result.machine for result in self.examined})
+
+    @cached_property
+    def effects(self) -> list[str]:
+        """Effects by the number of machines that have them, the most common first."""
+        having = Counter(effect for machine in self.machines for effect in self.counts(machine))
+        return sorted(having, key=lambda effect: (-having[effect], effect))
+
+    @cached_property
+    def drifts(self) -> tuple[Drift, ...]:
+        """Every parameter of every machine over its campaigns."""
+        return drifts(self.results)
+
+    @cached_property
+    def outlying(self) -> tuple[OutlyingMachine, ...]:
+        """Machines that differ from the others."""
+        return outlying_machines(self.examined, self.drifts)
+
+    def of(self, machine: str) -> list[RecordingResult]:
+        """The recordings of a machine that were examined."""
+        return [result for result in self.examined if result.machine == machine]
+
+    def counts(self, machine: str) -> Counter[str]:
+        """Effect -> recordings of the machine on which it was found."""
+        return Counter(effect for result in self.of(machine) for effect in result.effects)
+
+    @property
+    def headline(self) -> str:
+        """How much was examined, and how many things are to be looked at, in a sentence or two."""
+        recordings = _counted(len(self.examined), "recording")
+        text = f"{recordings} of {_counted(len(self.machines), 'machine')} examined"
+        text += f"; {_counted(len(self.failed), 'other')} could not be." if self.failed else "."
+        named = named_drifts(self.drifts)
+        findings = [_counted(len(named), "parameter drifts", "parameters drift")] if named else []
+        outlying = {machine.machine for machine in self.outlying}
+        findings += [_counted(len(outlying), "machine differs", "machines differ")] if outlying else []
+        return f"{text} {join_words(findings)}." if findings else text
+
+    def machine_table(self) -> PageTable:
+        """A row for each machine: how many recordings, their verdicts, error and noise, effects."""
+        head = ("machine", "recordings", "verdicts", "error", "left with its effects", "noise alone", "effects")
+        rows = []
+        for machine in self.machines:
+            results = self.of(machine)
+            verdicts = Counter(result.verdict for result in results)
+            effects = self.counts(machine)
+            rows.append(
+                [
+                    machine,
+                    str(len(results)),
+                    ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()),
+                    _median_text(results, "rms_before_um"),
+                    _median_text(results, "rms_after_um"),
+                    _median_text(results, "noise_floor_um"),
+                    ", ".join(f"{effect} ({count})" for effect, count in effects.most_common()) or "none",
+                ]
+            )
+        return PageTable(head, rows)
+
+    def drift_sentences(self) -> list[str]:
+        """What drifts, the surest first."""
+        return [drift_sentence(drift) for drift in named_drifts(self.drifts)]
+
+    def outlying_sentences(self) -> list[str]:
+        """Which machine differs and by how much, the farthest first."""
+        return [outlying_sentence(machine) for machine in self.outlying]
+
+    def problem_table(self) -> PageTable:
+        """Recordings that could not be examined, each with the reason."""
+        rows = [(short_name(result), result.machine or _NO_MACHINE, result.problem) for result in self.failed]
+        return PageTable(("recording", "machine", "problem"), rows)
+
+
+def short_name(result: RecordingResult) -> str:
+    """The recording's file with its folder."""
+    path = Path(result.recording)
+    return f"{path.parent.name}/{path.name}"
+
+
+def drift_sentence(drift: Drift) -> str:
+    """ "tripod-03: link_expansion.a changes by 0.21 +- 0.03 ppm/K from 2026-01-05 to 2026-06-01 (6 campaigns)"."""
+    if drift.started_at:
+        over = f"from {drift.started_at[0]:{_DATE}} to {drift.started_at[-1]:{_DATE}}"
+    else:
+        over = f"from campaign {drift.time[0]:g} to {drift.time[-1]:g}"
+    change = estimate_text(drift.change, drift.change_std, drift.unit)
+    return f"{drift.machine}: {drift.name} changes by {change} {over} ({len(drift.time)} values)"
+
+
+def outlying_sentence(outlying: OutlyingMachine) -> str:
+    """ "tripod-03: link_expansion.a is 4.1 +- 0.1 ppm/K, the median of 12 machines is 1.1 ppm/K"."""
+    if outlying.quantity in (ERROR, ERROR_LEFT):
+        value, middle = (format_error(error, outlying.unit) for error in (outlying.value, outlying.median))
+    else:
+        value = estimate_text(outlying.value, outlying.standard_error, outlying.unit)
+        middle = number_text(outlying.median, outlying.unit, digits=3)
+    return (
+        f"{outlying.machine}: {outlying.quantity} is {value}, the median of {outlying.machines} machines is {middle} "
+        f"({outlying.score:.0f} robust standard deviations)"
+    )
+
+
+def _counted(count: int, one: str, several: str = "") -> str:
+    return f"{count} {one if count == 1 else several or one + 's'}"
+
+
+def _median_text(results: Sequence[RecordingResult], name: str) -> str:
+    """The median over the recordings, with its unit; "-" where none has the number."""
+    values = [value for result in results if not math.isnan(value := getattr(result, name))]
+    return format_error(median(values), results[0].error_unit) if values else "-"

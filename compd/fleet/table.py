@@ -1,0 +1,183 @@
+"""The results of a fleet as one Parquet table, which pandas, DuckDB and any other program read.
+
+A row is one parameter of one effect on one recording. What is said of the recording as a whole stands in each of its
+rows; a recording without any effect has one row, in which the effect's columns are empty. Example::
+
+    write_table(Path("fleet.parquet"), results)
+    assert read_table(Path("fleet.parquet")) == results
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import UTC
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from compd.errors import CompdError, Problem
+from compd.files import write_files
+from compd.fleet.recording_result import FleetEstimate, RecordingResult
+from compd.output_file import check_replaceable
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+# In the schema's metadata; another number where a column changes its meaning.
+FORMAT_KEY, FORMAT = b"compd.fleet.format", b"1"
+
+
+class Column(NamedTuple):
+    """A column of the table: its name, Arrow's name of its type, what it holds."""
+
+    name: str
+    type: str
+    meaning: str
+
+
+OF_RECORDING = (
+    Column("recording", "string", "path of the recording's table"),
+    Column("machine", "string", "name of its machine; empty where its sidecar does not say"),
+    Column("command", "string", "compare or diagnose"),
+    Column("model", "string", "the model file that was applied; empty for none"),
+    Column("started_at", "timestamp", "when the campaign began, UTC; empty where the sidecar does not say"),
+    Column("rows", "int64", "rows of the recording that counted"),
+    Column("error_unit", "string", "unit of the columns that end in _um, um but for recordings in another unit"),
+    Column("rms_before_um", "double", "error per coordinate with the model as it is"),
+    Column("rms_after_um", "double", "error with the effects of this recording, fitted on it"),
+    Column("noise_floor_um", "double", "what noise alone would be; empty where it is not known"),
+    Column("verdict", "string", "of diagnose its verdict; of compare at_floor, above_floor, noise_not_known"),
+    Column("summary", "string", "the verdict in words"),
+)
+OF_EFFECT = (
+    Column("effect", "string", "id of an effect that was found, or that the model has"),
+    Column("parameter", "string", "one of its parameters"),
+    Column("value", "double", "fitted on this recording, in `unit`"),
+    Column("standard_error", "double", "of the value, in `unit`; empty where it is not known"),
+    Column("unit", "string", "of value and standard_error"),
+    Column("p_value", "double", "chance that noise looks so much like the effect; empty for effects of the model"),
+    Column("plausible", "bool", "whether the value lies in the effect's plausible range"),
+    Column("rivals", "string", "effects that would do as well in its place, separated by spaces"),
+)
+PROBLEM = Column("problem", "string", "why the recording could not be examined; empty where it was")
+COLUMNS = (*OF_RECORDING, *OF_EFFECT, PROBLEM)
+
+
+def check_table_path(path: Path, overwrite: bool = False) -> None:
+    """Raise CompdError where the table cannot be written, before the long work; an earlier table is replaced."""
+    if not path.parent.is_dir():
+        raise CompdError(
+            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
+        )
+    if not is_table(path):
+        check_replaceable(path, (), "", overwrite)
+
+
+def is_table(path: Path) -> bool:
+    """Whether a file is a table of a fleet, and no recording or anything else."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not path.is_file():
+        return False
+    try:
+        return FORMAT_KEY in (pq.read_schema(path).metadata or {})
+    except (pa.ArrowInvalid, OSError):
+        return False
+
+
+def write_table(path: Path, results: Sequence[RecordingResult]) -> None:
+    """Write the table, whole or not at all; an existing file is replaced."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.Table.from_pylist([row for result in results for row in rows_of(result)], schema=_schema())
+    buffer = io.BytesIO()
+    pq.write_table(table, buffer, compression="zstd")
+    write_files({path: buffer.getvalue()})
+
+
+def read_table(path: Path) -> tuple[RecordingResult, ...]:
+    """The results of a table, as they were given to `write_table`. Raises CompdError for what is no such table."""
+    import pyarrow.parquet as pq
+
+    if not is_table(path):
+        raise CompdError(
+            Problem(
+                where=str(path),
+                what="is not a table of a fleet",
+                allowed="what `compd fleet diagnose` or `compd fleet compare` has written",
+                next_step="give that table, or the directory of the recordings",
+            )
+        )
+    table = pq.read_table(path)
+    if table.schema.metadata[FORMAT_KEY] != FORMAT:
+        raise CompdError(
+            Problem(
+                where=str(path),
+                what="was written by another release of compd",
+                value=table.schema.metadata[FORMAT_KEY].decode(errors="replace"),
+                allowed=FORMAT.decode(),
+                next_step="make the table anew",
+            )
+        )
+    by_recording = groupby(table.to_pylist(), key=lambda row: (row["recording"], row["command"]))
+    return tuple(_result(list(rows)) for _, rows in by_recording)
+
+
+def rows_of(result: RecordingResult) -> Iterator[dict[str, Any]]:
+    """The rows of one recording: column -> value, None where there is none."""
+    whole = _cells(result, OF_RECORDING)
+    whole |= {"rows": None if result.problem else result.rows, PROBLEM.name: result.problem or None}
+    for estimate in result.estimates:
+        yield {**whole, **_cells(estimate, OF_EFFECT), "rivals": " ".join(estimate.rivals) or None}
+    if not result.estimates:
+        yield whole
+
+
+def _schema() -> pa.Schema:
+    import pyarrow as pa
+
+    types = {
+        "string": pa.string(),
+        "double": pa.float64(),
+        "int64": pa.int64(),
+        "bool": pa.bool_(),
+        "timestamp": pa.timestamp("us", tz="UTC"),
+    }
+    fields = [pa.field(name, types[kind], metadata={"meaning": meaning}) for name, kind, meaning in COLUMNS]
+    return pa.schema(fields, metadata={FORMAT_KEY: FORMAT})
+
+
+def _cells(source: object, columns: Iterable[Column]) -> dict[str, Any]:
+    """The columns that are attributes of a result; what is not known is None."""
+    cells = {column.name: getattr(source, column.name) for column in columns}
+    return {name: None if value == "" or _is_nan(value) else value for name, value in cells.items()}
+
+
+def _result(rows: Sequence[Mapping[str, Any]]) -> RecordingResult:
+    """The result that these rows are of."""
+    estimates = [
+        FleetEstimate(**{**_known(row, OF_EFFECT), "rivals": tuple((row["rivals"] or "").split())})
+        for row in rows
+        if row["effect"] is not None
+    ]
+    began = rows[0]["started_at"]
+    whole = {
+        **_known(rows[0], OF_RECORDING),
+        "started_at": None if began is None else began.astimezone(UTC),
+        "rows": rows[0]["rows"] or 0,
+    }
+    return RecordingResult(**whole, estimates=tuple(estimates), problem=rows[0][PROBLEM.name] or "")
+
+
+def _known(row: Mapping[str, Any], columns: Iterable[Column]) -> dict[str, Any]:
+    """The cells of these columns, with "" and nan where a cell is empty."""
+    empty = {"string": "", "double": math.nan}
+    return {column.name: empty.get(column.type) if row[column.name] is None else row[column.name] for column in columns}
+
+
+def _is_nan(value: object) -> bool:
+    return isinstance(value, float) and math.isnan(value)

@@ -1,0 +1,88 @@
+"""How a fleet's work is shared out: `python -m tests.benchmarks.bench_fleet --recordings 500`.
+
+Simulated recordings of about 600 rows, compared by one worker process and by as many as there are cores. The start of
+the workers is apart: it is the same however many recordings there are. Processor times tell what sharing out costs
+from what a busy machine, or two cores that are one, take: of the workers for the work, and of the scheduler beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from compd.fleet.cluster import open_cluster
+from compd.fleet.engine import outcomes
+from compd.fleet.examination import Examination, examination
+from compd.fleet.examine import BATCH
+from compd.fleet.recordings import find_recordings
+from compd.simulation.campaign.simulate_campaign import simulate_campaign
+from tests.benchmarks.figures import show
+
+# Recordings that are simulated; the others are copies.
+DIFFERENT = 5
+BUDGET = 0.85
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.bench_fleet", description=__doc__)
+    parser.add_argument("--recordings", type=int, default=60)
+    parser.add_argument("--command", choices=["compare", "diagnose"], default="compare")
+    options = parser.parse_args()
+    cores = len(os.sched_getaffinity(0))
+    with tempfile.TemporaryDirectory() as temporary:
+        paths = _recordings(Path(temporary), options.recordings)
+        work = examination(options.command)
+        rows = []
+        alone_s = 0.0
+        for workers in dict.fromkeys((1, cores)):
+            cost = _cost(work, paths, workers)
+            alone_s = alone_s or cost.work_s
+            efficiency = alone_s / (workers * cost.work_s)
+            numbers = [*cost, efficiency, efficiency / BUDGET]
+            rows.append([str(workers), *(f"{number:.2f}" for number in numbers)])
+    head = ["workers", "start, s", "work, s", "workers' processor, s", "scheduler's", "efficiency", "eff. / budget"]
+    title = f"{len(paths)} recordings, {options.command}; efficiency = T1 / (workers * T), budget {BUDGET}"
+    show(title, head, rows)
+
+
+def _recordings(directory: Path, count: int) -> tuple[Path, ...]:
+    for number in range(count):
+        path = directory / f"{number:04d}.csv"
+        if number < DIFFERENT:
+            simulate_campaign("tripod-cmm", path, seed=number + 1, effects=["link_expansion"])
+        else:
+            for ending in (".csv", ".yaml"):
+                shutil.copy(directory / f"{number % DIFFERENT:04d}{ending}", path.with_suffix(ending))
+    return find_recordings([directory]).paths
+
+
+class Cost(NamedTuple):
+    """Seconds until every worker has done one recording, and of all recordings after that; processor time of these."""
+
+    start_s: float
+    work_s: float
+    workers_processor_s: float
+    scheduler_processor_s: float
+
+
+def _cost(work: Examination, paths: Sequence[Path], workers: int) -> Cost:
+    begun_s = time.perf_counter()
+    with open_cluster(processes=workers) as client:
+        client.run(work, paths[0])
+        started_s, own_s = time.perf_counter(), time.process_time()
+        workers_s = sum(client.run(time.process_time).values())
+        failed = [outcome.error for outcome in outcomes(client, work, paths, BATCH[work.command]) if outcome.error]
+        done_s, own_s = time.perf_counter(), time.process_time() - own_s
+        workers_s = sum(client.run(time.process_time).values()) - workers_s
+    assert not failed, failed
+    return Cost(started_s - begun_s, done_s - started_s, workers_s, own_s)
+
+
+if __name__ == "__main__":
+    main()
