@@ -33,8 +33,8 @@ class FleetCriteria:
     scatter_p_value: float = threshold(
         0.05,
         unit="probability",
-        meaning="where values scatter about their line more than chance makes of their standard errors, the scatter "
-        "counts in place of the standard errors",
+        meaning="where a machine's values scatter about their line more than chance makes of the standard errors, "
+        "which grow with the scatter of all machines, its own scatter counts",
         reason="the customary level; the ratio is Birge's, Phys. Rev. 40 (1932) 207",
     )
     fewest_machines: int = threshold(

@@ -1,8 +1,10 @@
 """How a parameter goes from campaign to campaign: a line by weighted least squares, named where it is no chance.
 
-The line is c + b t, weighted with the standard errors of the values. Where the values scatter about it more than
-these errors explain, something else changes from campaign to campaign: the standard error of b then grows by Birge's
-ratio sqrt(chi^2 / (n - 2)), and its chance is that of Student's t with n - 2 degrees of freedom.
+The line is c + b t, weighted with the standard errors of the values. These say how well a recording determines the
+parameter, and not what else changes from campaign to campaign. How much that is shows in the scatter about the lines of
+all machines: where the median of chi^2 is more than chance makes, all standard errors of the parameter grow by the root
+of the ratio. Where one machine still scatters more than the others, its own grow by Birge's ratio
+sqrt(chi^2 / (n - 2)), and the chance of its line is that of Student's t with n - 2 degrees of freedom.
 """
 
 from __future__ import annotations
@@ -12,6 +14,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import groupby
+from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import chi2, norm, t
@@ -68,14 +72,33 @@ class Drift:
         return self.slope_std * float(self.time[-1] - self.time[0])
 
 
+class _Line(NamedTuple):
+    """A line through values whose standard errors are taken as they are; chi_squared : of what is left."""
+
+    intercept: float
+    slope: float
+    slope_std: float
+    chi_squared: float
+    dof: int
+
+
 def drifts(results: Iterable[RecordingResult], criteria: FleetCriteria = FleetCriteria()) -> tuple[Drift, ...]:
     """Every parameter of every machine over its campaigns, by machine and name.
 
     A line is fitted where there are enough campaigns whose standard errors are known.
     """
-    found = [_with_line(series, criteria) for series in _series(results)]
-    lines = sum(math.isfinite(drift.p_value) for drift in found)
-    return tuple(replace(drift, named=drift.p_value * lines < criteria.drift_p_value) for drift in found)
+    series = _series(results)
+    lines = [_line(drift, criteria) for drift in series]
+    ratios: dict[tuple[str, str], list[float]] = {}
+    for drift, line in zip(series, lines, strict=True):
+        if line is not None:
+            ratios.setdefault((drift.name, drift.unit), []).append(line.chi_squared / chi2.median(line.dof))
+    scales = {parameter: max(1.0, math.sqrt(median(of_machines))) for parameter, of_machines in ratios.items()}
+    tried = sum(line is not None for line in lines)
+    return tuple(
+        drift if line is None else _judged(drift, line, scales[drift.name, drift.unit], tried, criteria)
+        for drift, line in zip(series, lines, strict=True)
+    )
 
 
 def _series(results: Iterable[RecordingResult]) -> list[Drift]:
@@ -101,26 +124,40 @@ def _series(results: Iterable[RecordingResult]) -> list[Drift]:
     return series
 
 
-def _with_line(drift: Drift, criteria: FleetCriteria) -> Drift:
-    """The same with its line, where one can be fitted."""
+def _line(drift: Drift, criteria: FleetCriteria) -> _Line | None:
+    """The line of a parameter; None where none can be fitted."""
     weighable = np.isfinite(drift.value) & np.isfinite(drift.standard_error) & (drift.standard_error > 0)
     time, value, sigma = (column[weighable] for column in (drift.time, drift.value, drift.standard_error))
-    dof = len(time) - 2
     if len(time) < criteria.fewest_campaigns or np.ptp(time) == 0:
-        return drift
+        return None
     weight = sigma**-2
     middle = np.average(time, weights=weight)
     spread = float(np.sum(weight * (time - middle) ** 2))
     slope = float(np.sum(weight * (time - middle) * value)) / spread
-    intercept = float(np.average(value, weights=weight)) - slope * middle
-    slope_std = spread**-0.5
+    intercept = float(np.average(value, weights=weight) - slope * middle)
     chi_squared = float(np.sum(weight * (value - intercept - slope * time) ** 2))
-    if chi2.sf(chi_squared, dof) < criteria.scatter_p_value:
-        slope_std *= math.sqrt(chi_squared / dof)
-        p_value = 2 * t.sf(abs(slope) / slope_std, dof)
+    return _Line(intercept, slope, spread**-0.5, chi_squared, len(time) - 2)
+
+
+def _judged(drift: Drift, line: _Line, scale: float, tried: int, criteria: FleetCriteria) -> Drift:
+    """The parameter with its line, and whether that is named.
+
+    scale : by which the standard errors of this parameter are too small on all machines.  tried : lines of the fleet.
+    """
+    slope_std, chi_squared = scale * line.slope_std, line.chi_squared / scale**2
+    if chi2.sf(chi_squared, line.dof) < criteria.scatter_p_value:
+        slope_std *= math.sqrt(chi_squared / line.dof)
+        p_value = float(2 * t.sf(abs(line.slope) / slope_std, line.dof))
     else:
-        p_value = 2 * norm.sf(abs(slope) / slope_std)
-    return replace(drift, intercept=intercept, slope=slope, slope_std=slope_std, p_value=float(p_value))
+        p_value = float(2 * norm.sf(abs(line.slope) / slope_std))
+    return replace(
+        drift,
+        intercept=line.intercept,
+        slope=line.slope,
+        slope_std=slope_std,
+        p_value=p_value,
+        named=p_value * tried < criteria.drift_p_value,
+    )
 
 
 def named_drifts(found: Sequence[Drift]) -> list[Drift]:

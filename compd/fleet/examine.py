@@ -69,9 +69,9 @@ def examine_fleet(
                 progress(result)
     except KeyboardInterrupt:
         interrupted = True
-        not_done = CompdError(Problem(where="compd fleet", what="was ended by Ctrl-C before this recording was done"))
         for path in paths:
             if path not in results:
+                not_done = CompdError(Problem(where=str(path), what="was not done: Ctrl-C ended the work before"))
                 results[path] = _failed(Outcome(path, None, not_done), examination)
     return FleetRun(tuple(results[path] for path in paths), interrupted)
 

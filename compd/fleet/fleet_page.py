@@ -21,8 +21,8 @@ def write_fleet_page(path: Path, results: Sequence[RecordingResult]) -> None:
     sentences = [*overview.drift_sentences(), *overview.outlying_sentences()]
     verdict = overview.headline
     panels = [
-        Panel("Every machine", "Errors are medians over the machine's recordings.", overview.machine_table()),
         Panel("What to look at", "Drifts and machines that differ; the reasons are below.", _list(sentences)),
+        Panel("Every machine", "Errors are medians over the machine's recordings.", overview.machine_table()),
         Panel(
             "Which machine has which effect",
             "On how many of its recordings an effect was found, or was in the model. A question mark: on one of them "

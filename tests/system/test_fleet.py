@@ -91,7 +91,7 @@ def test_ctrl_c_leaves_a_result_for_every_recording(fleet: Path, cluster: DaskCl
     assert run.interrupted
     problems = [result.problem for result in run.results]
     assert len(problems) == RECORDINGS
-    assert sum("was ended by Ctrl-C" in problem for problem in problems) == RECORDINGS - 1
+    assert sum("Ctrl-C ended the work" in problem for problem in problems) == RECORDINGS - 1
 
 
 def test_recordings_that_a_worker_does_not_see(cluster: DaskCluster, tmp_path: Path) -> None:

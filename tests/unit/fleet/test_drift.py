@@ -41,6 +41,19 @@ def test_scatter_beyond_the_standard_errors_counts() -> None:
     assert drift.slope_std > 0.001
 
 
+@pytest.mark.parametrize("scatter", [1.5, 3.0])
+def test_standard_errors_that_are_too_small_on_all_machines_name_nothing(scatter: float) -> None:
+    chance = np.random.default_rng(5)
+    fleet = [
+        campaign
+        for k in range(20)
+        for campaign in machine(f"m{k:02d}", 1 + scatter * 0.02 * chance.standard_normal(5), 0.02)
+    ]
+    assert [drift.machine for drift in drifts(fleet) if drift.named] == []
+    steady = machine("steady", 1 + scatter * np.linspace(0, 1, 5), 0.02)
+    assert [drift.machine for drift in drifts([*fleet, *steady]) if drift.named] == ["steady"]
+
+
 def test_two_campaigns_and_unknown_errors_have_no_line() -> None:
     (drift,) = drifts(machine("tripod-01", [1.0, 2.0], 0.02))
     assert not drift.named
