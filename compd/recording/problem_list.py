@@ -51,7 +51,12 @@ def rows_text(rows: Sequence[int]) -> str:
 
 def values_text(values: Iterable[str]) -> str:
     """The first few offending values as written, each once."""
-    different = list(dict.fromkeys(values))
+    different: list[str] = []
+    for value in values:
+        if value not in different:
+            different.append(value)
+        if len(different) > SHOWN_ROWS:  # of millions no more need be looked at
+            break
     shown = ", ".join(repr(value if len(value) <= 40 else value[:37] + "...") for value in different[:SHOWN_ROWS])
     return shown + (", ..." if len(different) > SHOWN_ROWS else "")
 
