@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help docs demo demo-linuxcnc live test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample soak scoreboard sensitivity nightly clean
+.PHONY: help docs demo demo-linuxcnc live test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -22,6 +22,7 @@ help:
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make soak    a running daemon and random faults, held against the truth (4 min; OPTIONS=\"--minutes 60 --seed 7\")"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
+	@echo "make costs   the README's table of what compd costs (cyclictest; a quarter of an hour)"
 	@echo "make scoreboard  the diagnosis on 1300 simulated machines (hours; continues where it stopped)"
 	@echo "make sensitivity  the scoreboard with each threshold of the diagnosis halved and doubled (hours; continues, too)"
 	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench, three hours of soak, the scoreboard"
@@ -115,10 +116,14 @@ wheel: $(STAMP) docs
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
 
 SAMPLE := kinematics cycle compare diagnose
-BENCH := $(SAMPLE) loop latency flood throughput page gateway stream fleet
+BENCH := $(SAMPLE) loop latency flood throughput page gateway stream fleet kilohertz
 
 bench: $(STAMP)
 	@for name in $(BENCH); do $(BIN)/python -m tests.benchmarks.bench_$$name || exit 1; done
+
+# The README's table of costs, from one run of a quarter of an hour.
+costs: $(STAMP)
+	@$(BIN)/python -m tests.benchmarks.costs
 
 # Without those that run in real time for minutes.
 bench-sample: $(STAMP)

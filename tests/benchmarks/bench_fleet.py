@@ -36,12 +36,12 @@ def main() -> None:
     options = parser.parse_args()
     cores = len(os.sched_getaffinity(0))
     with tempfile.TemporaryDirectory() as temporary:
-        paths = _recordings(Path(temporary), options.recordings)
+        paths = recordings(Path(temporary), options.recordings)
         work = examination(options.command)
         rows = []
         alone_s = 0.0
         for workers in dict.fromkeys((1, cores)):
-            cost = _cost(work, paths, workers)
+            cost = measure(work, paths, workers)
             alone_s = alone_s or cost.work_s
             efficiency = alone_s / (workers * cost.work_s)
             numbers = [*cost, efficiency, efficiency / BUDGET]
@@ -51,7 +51,8 @@ def main() -> None:
     show(title, head, rows)
 
 
-def _recordings(directory: Path, count: int) -> tuple[Path, ...]:
+def recordings(directory: Path, count: int) -> tuple[Path, ...]:
+    """So many recordings of about 600 rows, written there."""
     for number in range(count):
         path = directory / f"{number:04d}.csv"
         if number < DIFFERENT:
@@ -71,7 +72,8 @@ class Cost(NamedTuple):
     scheduler_processor_s: float
 
 
-def _cost(work: Examination, paths: Sequence[Path], workers: int) -> Cost:
+def measure(work: Examination, paths: Sequence[Path], workers: int) -> Cost:
+    """What this work on all recordings takes with so many worker processes."""
     begun_s = time.perf_counter()
     with open_cluster(processes=workers) as client:
         client.run(work, paths[0])

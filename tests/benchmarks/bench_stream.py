@@ -9,6 +9,7 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from tests.support.measured import SIGMA_UM, gauges, hidden, record, tripod
 ROWS = 2_000_000
 RATE_HZ = 200.0
 REPEATED_ROWS = 50_000  # the same motion again and again, with noise of its own
+FEW_ROWS = 300_000  # as long as to be read in blocks
 BUDGET_US, BUDGET_MB = 20.0, 1024.0
 EFFECTS = ("link_expansion", "link_elasticity", "backlash")
 PANDAS = "import sys, pandas; pandas.read_parquet(sys.argv[1])"
@@ -31,22 +33,34 @@ def main() -> None:
     parser.add_argument("--directory", type=Path, default=None, help="Where the file is made; a temporary directory.")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=arguments.directory) as temporary:
-        directory = Path(temporary)
-        path = long_recording(directory, arguments.rows)
-        short = long_recording(directory, REPEATED_ROWS, "short")
-        model = directory / "model.yaml"
-        fitted_model(short, model)
-        rows = []
-        start = compare(long_recording(directory, 300_000, "few"))  # as long as to be read in blocks
-        by_pandas = cost([sys.executable, "-c", PANDAS, str(path)])
-        for name, options in (("no effects", []), (f"{len(EFFECTS)} effects", ["--model", str(model)])):
-            whole = compare(path, *options)
-            rows.append(line(f"compd compare, {name}", whole, by_pandas, arguments.rows))
-        rows.append(line("pandas.read_parquet", by_pandas, by_pandas, arguments.rows))
-        rows.append(line("compd compare, 300000 rows, no effects", start, by_pandas, 300_000))
-        title = f"{arguments.rows} rows, start of Python included; budget {BUDGET_US:g} us/row, {BUDGET_MB:g} MB"
-        head = ["", "s", "processor us/row", "/ pandas", "MB", "/ pandas"]
-        show(title, head, rows)
+        measured = measure(arguments.rows, Path(temporary))
+    rows = [
+        line("compd compare, no effects", measured.bare, measured.by_pandas, arguments.rows),
+        line(f"compd compare, {len(EFFECTS)} effects", measured.with_effects, measured.by_pandas, arguments.rows),
+        line("pandas.read_parquet", measured.by_pandas, measured.by_pandas, arguments.rows),
+        line(f"compd compare, {FEW_ROWS} rows, no effects", measured.few, measured.by_pandas, FEW_ROWS),
+    ]
+    title = f"{arguments.rows} rows, start of Python included; budget {BUDGET_US:g} us/row, {BUDGET_MB:g} MB"
+    show(title, ["", "s", "processor us/row", "/ pandas", "MB", "/ pandas"], rows)
+
+
+class Measured(NamedTuple):
+    """`compd compare` without and with effects, and of few rows; pandas reading the same file."""
+
+    bare: Cost
+    with_effects: Cost
+    few: Cost
+    by_pandas: Cost
+
+
+def measure(rows: int, directory: Path) -> Measured:
+    """On a recording of so many rows, which is made in `directory`."""
+    path = long_recording(directory, rows)
+    model = directory / "model.yaml"
+    fitted_model(long_recording(directory, REPEATED_ROWS, "short"), model)
+    few = compare(long_recording(directory, FEW_ROWS, "few"))
+    by_pandas = cost([sys.executable, "-c", PANDAS, str(path)])
+    return Measured(compare(path), compare(path, "--model", str(model)), few, by_pandas)
 
 
 def line(name: str, spent: Cost, by_pandas: Cost, rows: int) -> list[str]:

@@ -8,10 +8,13 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import tempfile
 from datetime import UTC, datetime
+from pathlib import Path
 
+from compd.fleet.examination import examination
 from compd.live import daemon as daemon_module
-from tests.benchmarks import bench_kilohertz
+from tests.benchmarks import bench_fleet, bench_kilohertz, bench_stream
 from tests.benchmarks.bench_cycle import EFFECTS, whole_cycles
 from tests.benchmarks.bench_latency import AllAtOnce
 from tests.benchmarks.cost_table import Cost, save
@@ -59,6 +62,41 @@ def kilohertz_costs(seconds: int, rounds: int) -> list[Cost]:
     ]
 
 
+def long_recording_costs(rows: int) -> list[Cost]:
+    with tempfile.TemporaryDirectory() as temporary:
+        measured = bench_stream.measure(rows, Path(temporary))
+    whole, by_pandas = measured.with_effects, measured.by_pandas
+    return [
+        Cost(
+            f"`compd compare` of {rows:,} rows with {len(bench_stream.EFFECTS)} effects, processor time",
+            f"{whole.processor_s / rows * 1e6:.1f} us a row",
+            f"pandas reads the file: {by_pandas.processor_s / rows * 1e6:.2f} us",
+            f"{whole.processor_s / by_pandas.processor_s:.0f}",
+        ),
+        Cost(
+            "memory for that",
+            f"{whole.largest_MB:.0f} MB",
+            f"pandas: {by_pandas.largest_MB:.0f} MB",
+            f"{whole.largest_MB / by_pandas.largest_MB:.2f}",
+        ),
+    ]
+
+
+def fleet_costs(count: int) -> list[Cost]:
+    with tempfile.TemporaryDirectory() as temporary:
+        paths = bench_fleet.recordings(Path(temporary), count)
+        work = examination("compare")
+        alone_s, both_s = (bench_fleet.measure(work, paths, workers).work_s for workers in (1, 2))
+    return [
+        Cost(
+            f"`compd fleet compare` of {count} recordings, two workers",
+            f"{both_s:.1f} s",
+            f"one worker: {alone_s:.1f} s",
+            f"{both_s / alone_s:.2f}",
+        )
+    ]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="measure little of everything, write nothing")
@@ -66,7 +104,13 @@ def main() -> None:
     quiet()
     daemon_module.Acquisition = AllAtOnce  # type: ignore[misc, assignment]
     seconds, rounds = (5, 1) if options.quick else (60, 5)
-    costs = [*cycle_costs(), *kilohertz_costs(seconds, rounds)]
+    rows, recordings = (300_000, 20) if options.quick else (20_000_000, 500)
+    costs = [
+        *cycle_costs(),
+        *kilohertz_costs(seconds, rounds),
+        *long_recording_costs(rows),
+        *fleet_costs(recordings),
+    ]
     show("What it costs", ["", "figure", "beside it", "ratio"], costs)
     if not options.quick:
         save(costs, f"{datetime.now(UTC):%Y-%m-%d}", os.cpu_count() or 0)
