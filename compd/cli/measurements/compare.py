@@ -34,7 +34,11 @@ def compare(
     ] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails."""
+    """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails.
+
+    A recording of more than 200,000 rows is gone through block by block, in constant memory; what rests on a sample of
+    it is said.
+    """
     from compd.errors import CompdError, Problem
 
     if html is not None:

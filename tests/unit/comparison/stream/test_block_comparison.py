@@ -16,6 +16,7 @@ from compd.comparison.stream.sample import draw_sample
 from compd.model.effect import FittedEffect
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
+from tests.support.external_recordings import record_external
 from tests.support.measured import gauges, hidden, record, tripod
 from tests.support.streams import in_blocks
 
@@ -90,3 +91,13 @@ def test_the_envelope_has_the_extremes_and_the_mean(tmp_path: Path) -> None:
     largest = np.maximum(np.nanmax(envelope.largest, axis=0), -np.nanmin(envelope.smallest, axis=0))
     np.testing.assert_allclose(largest, streamed.largest_by_axis_um)
     np.testing.assert_allclose(np.nanmean(envelope.mean, axis=0), streamed.mean_by_axis_um, rtol=1e-9)
+
+
+def test_an_external_model_is_compared_alike(tmp_path: Path) -> None:
+    rows = np.arange(ROWS)
+    columns = {"session": 1.0 + rows * 4 // ROWS, "temperature_bed_degC": 20 + rows / 100}
+    whole = compare(record_external(tmp_path / "run.csv", columns, {"x": np.sin(rows / 50)}, model_mm={"x": rows / 10}))
+    stream = in_blocks(whole.aligned.recording, None, BLOCK)
+    streamed = compare_blocks(stream, draw_sample(stream))
+    np.testing.assert_allclose(streamed.rms_by_axis_um, whole.rms_by_axis_um, rtol=1e-9)
+    np.testing.assert_allclose(streamed.constant_um, whole.constant_um, rtol=1e-9)
