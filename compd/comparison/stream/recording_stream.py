@@ -78,9 +78,12 @@ def is_long(path: Path) -> bool:
     a sample.
 
     The places of fixed balls and pins, and how an instrument's target is turned on the platform, are found from all
-    rows in memory.
+    rows in memory. False for a file that cannot be read: who reads it whole says everything that is wrong.
     """
-    if row_count(path) <= LONG_ROWS:
+    try:
+        if row_count(path) <= LONG_ROWS:
+            return False
+    except RecordingError:
         return False
     sidecar = read_sidecar(path.with_suffix(".yaml"), [])
     if sidecar is None or sidecar.reference is None:

@@ -64,6 +64,7 @@ def test_a_recording_with_fixed_pins_is_read_whole(recorded: Path) -> None:
     sidecar = recorded.with_suffix(".yaml")
     sidecar.write_text("machine: tripod-cmm\nreference: {quantity: fixed_point}\n", encoding="utf-8")
     assert not recording_stream.is_long(recorded)
+    assert not recording_stream.is_long(recorded.with_name("none.csv"))
 
 
 def test_effects_are_fitted_to_all_rows(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
