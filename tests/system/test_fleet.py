@@ -25,6 +25,9 @@ from tests.support.dask_cluster import PATIENCE_S, DaskCluster, dask_cluster
 from tests.support.measured import gauges, hidden, record
 from tests.support.paths import ROOT
 
+# Processes are started anew, and each imports compd.
+pytestmark = pytest.mark.timeout(240)
+
 RECORDINGS = 8
 
 
