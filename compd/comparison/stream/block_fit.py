@@ -51,7 +51,7 @@ def fit_blocks(
     """Fit the effects of a fit on the sample to all rows; nonlinear constants stay as they are.
 
     sample : of the stream.  start : the fit on it.  weight_sigma_um : (m,) that it was weighed by.
-    progress : called with the number of rows of a pass that are done, after each block; there are two passes or three.
+    progress : called with the number of rows of a pass that are done, after each block; there are two to five passes.
 
     Parameters, covariance and clusters of the result are of all rows, its residual and the rows used of the sample.
     Raises RecordingError with the problems of the recording.
