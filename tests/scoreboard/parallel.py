@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from compd.cli.progress import counted
+from compd.cli.progress import count_shown
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import Outcome, outcomes
 
@@ -20,9 +20,9 @@ def in_parallel(work: Callable[[Item], Any], todo: Sequence[Item], jobs: int) ->
     """The outcome of each item, in the order in which they are done."""
     if not todo:
         return
-    with open_cluster(processes=jobs) as client, counted(len(todo), "cases") as done:
-        for outcome in outcomes(client, work, todo):
-            done()
+    with open_cluster(processes=jobs) as client, count_shown(len(todo), "cases") as done:
+        for number, outcome in enumerate(outcomes(client, work, todo), start=1):
+            done(number)
             yield outcome
 
 
