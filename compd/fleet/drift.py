@@ -72,7 +72,7 @@ class Drift:
         return self.slope_std * float(self.time[-1] - self.time[0])
 
 
-class _Line(NamedTuple):
+class _WeightedLine(NamedTuple):
     """A line through values whose standard errors are taken as they are; chi_squared : of what is left."""
 
     intercept: float
@@ -124,7 +124,7 @@ def _series(results: Iterable[RecordingResult]) -> list[Drift]:
     return series
 
 
-def _line(drift: Drift, criteria: FleetCriteria) -> _Line | None:
+def _line(drift: Drift, criteria: FleetCriteria) -> _WeightedLine | None:
     """The line of a parameter; None where none can be fitted."""
     weighable = np.isfinite(drift.value) & np.isfinite(drift.standard_error) & (drift.standard_error > 0)
     time, value, sigma = (column[weighable] for column in (drift.time, drift.value, drift.standard_error))
@@ -136,10 +136,10 @@ def _line(drift: Drift, criteria: FleetCriteria) -> _Line | None:
     slope = float(np.sum(weight * (time - middle) * value)) / spread
     intercept = float(np.average(value, weights=weight) - slope * middle)
     chi_squared = float(np.sum(weight * (value - intercept - slope * time) ** 2))
-    return _Line(intercept, slope, spread**-0.5, chi_squared, len(time) - 2)
+    return _WeightedLine(intercept, slope, spread**-0.5, chi_squared, len(time) - 2)
 
 
-def _judged(drift: Drift, line: _Line, scale: float, tried: int, criteria: FleetCriteria) -> Drift:
+def _judged(drift: Drift, line: _WeightedLine, scale: float, tried: int, criteria: FleetCriteria) -> Drift:
     """The parameter with its line, and whether that is named.
 
     scale : by which the standard errors of this parameter are too small on all machines.  tried : lines of the fleet.

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 FORMAT_KEY, FORMAT = b"compd.fleet.format", b"1"
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """A column of the table: its name, Arrow's name of its type, what it holds."""
 
     name: str
@@ -38,30 +38,30 @@ class Column(NamedTuple):
 
 
 OF_RECORDING = (
-    Column("recording", "string", "path of the recording's table"),
-    Column("machine", "string", "name of its machine; empty where its sidecar does not say"),
-    Column("command", "string", "compare or diagnose"),
-    Column("model", "string", "the model file that was applied; empty for none"),
-    Column("started_at", "timestamp", "when the campaign began, UTC; empty where the sidecar does not say"),
-    Column("rows", "int64", "rows of the recording that counted"),
-    Column("error_unit", "string", "unit of the columns that end in _um, um but for recordings in another unit"),
-    Column("rms_before_um", "double", "error per coordinate with the model as it is"),
-    Column("rms_after_um", "double", "error with the effects of this recording, fitted on it"),
-    Column("noise_floor_um", "double", "what noise alone would be; empty where it is not known"),
-    Column("verdict", "string", "of diagnose its verdict; of compare at_floor, above_floor, noise_not_known"),
-    Column("summary", "string", "the verdict in words"),
+    TableColumn("recording", "string", "path of the recording's table"),
+    TableColumn("machine", "string", "name of its machine; empty where its sidecar does not say"),
+    TableColumn("command", "string", "compare or diagnose"),
+    TableColumn("model", "string", "the model file that was applied; empty for none"),
+    TableColumn("started_at", "timestamp", "when the campaign began, UTC; empty where the sidecar does not say"),
+    TableColumn("rows", "int64", "rows of the recording that counted"),
+    TableColumn("error_unit", "string", "unit of the columns that end in _um, um but for recordings in another unit"),
+    TableColumn("rms_before_um", "double", "error per coordinate with the model as it is"),
+    TableColumn("rms_after_um", "double", "error with the effects of this recording, fitted on it"),
+    TableColumn("noise_floor_um", "double", "what noise alone would be; empty where it is not known"),
+    TableColumn("verdict", "string", "of diagnose its verdict; of compare at_floor, above_floor, noise_not_known"),
+    TableColumn("summary", "string", "the verdict in words"),
 )
 OF_EFFECT = (
-    Column("effect", "string", "id of an effect that was found, or that the model has"),
-    Column("parameter", "string", "one of its parameters"),
-    Column("value", "double", "fitted on this recording, in `unit`"),
-    Column("standard_error", "double", "of the value, in `unit`; empty where it is not known"),
-    Column("unit", "string", "of value and standard_error"),
-    Column("p_value", "double", "chance that noise looks so much like the effect; empty for effects of the model"),
-    Column("plausible", "bool", "whether the value lies in the effect's plausible range"),
-    Column("rivals", "string", "effects that would do as well in its place, separated by spaces"),
+    TableColumn("effect", "string", "id of an effect that was found, or that the model has"),
+    TableColumn("parameter", "string", "one of its parameters"),
+    TableColumn("value", "double", "fitted on this recording, in `unit`"),
+    TableColumn("standard_error", "double", "of the value, in `unit`; empty where it is not known"),
+    TableColumn("unit", "string", "of value and standard_error"),
+    TableColumn("p_value", "double", "chance that noise looks so much like the effect; empty for effects of the model"),
+    TableColumn("plausible", "bool", "whether the value lies in the effect's plausible range"),
+    TableColumn("rivals", "string", "effects that would do as well in its place, separated by spaces"),
 )
-PROBLEM = Column("problem", "string", "why the recording could not be examined; empty where it was")
+PROBLEM = TableColumn("problem", "string", "why the recording could not be examined; empty where it was")
 COLUMNS = (*OF_RECORDING, *OF_EFFECT, PROBLEM)
 
 
@@ -151,7 +151,7 @@ def _schema() -> pa.Schema:
     return pa.schema(fields, metadata={FORMAT_KEY: FORMAT})
 
 
-def _cells(source: object, columns: Iterable[Column]) -> dict[str, Any]:
+def _cells(source: object, columns: Iterable[TableColumn]) -> dict[str, Any]:
     """The columns that are attributes of a result; what is not known is None."""
     cells = {column.name: getattr(source, column.name) for column in columns}
     return {name: None if value == "" or _is_nan(value) else value for name, value in cells.items()}
@@ -173,7 +173,7 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> RecordingResult:
     return RecordingResult(**whole, estimates=tuple(estimates), problem=rows[0][PROBLEM.name] or "")
 
 
-def _known(row: Mapping[str, Any], columns: Iterable[Column]) -> dict[str, Any]:
+def _known(row: Mapping[str, Any], columns: Iterable[TableColumn]) -> dict[str, Any]:
     """The cells of these columns, with "" and nan where a cell is empty."""
     empty = {"string": "", "double": math.nan}
     return {column.name: empty.get(column.type) if row[column.name] is None else row[column.name] for column in columns}

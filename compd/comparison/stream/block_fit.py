@@ -32,7 +32,7 @@ from compd.comparison.stream.carried_effects import (
 )
 from compd.comparison.stream.clusters import RowClusters
 from compd.comparison.stream.fixed_terms import session_places
-from compd.comparison.stream.normal_equations import NormalEquations
+from compd.comparison.stream.normal_equations import ClusterNormals
 from compd.comparison.stream.recording_stream import Block, RecordingStream, align_block
 from compd.comparison.stream.sample import Sample
 from compd.model.deltas import sum_deltas
@@ -130,7 +130,7 @@ def _normals(
     theta: FloatArray,
     nuisance: FloatArray,
     progress: Callable[[int], None],
-) -> NormalEquations:
+) -> ClusterNormals:
     """The normal equations at these parameters, over all rows."""
     ends = np.cumsum([0, *(len(effect.theta) for effect in fitted)])
     effects = [replace(effect, theta=theta[a:b]) for effect, a, b in zip(fitted, ends[:-1], ends[1:], strict=True)]
@@ -142,7 +142,7 @@ def _normals(
 
     def compute(
         numbered_block: tuple[Block, IntArray], hand_over: HandOver[CarriedState]
-    ) -> tuple[NormalEquations, int]:
+    ) -> tuple[ClusterNormals, int]:
         block, cluster = numbered_block
         aligned = align_block(block, sample.aligned)
         rows, carried = advance_effects(effects, aligned.rows, system.keys, hand_over.take())
@@ -150,7 +150,7 @@ def _normals(
         session = session_places(sample.starts_s, aligned.rows.time_s)
         return _block_normals(aligned, effects, rows, system, nuisance, cluster, session), aligned.recording.rows
 
-    totals, done = NormalEquations(), 0
+    totals, done = ClusterNormals(), 0
     for normals, rows in computed_blocks(numbered(), compute, NOTHING_CARRIED):
         totals.add(normals)
         done += rows
@@ -166,7 +166,7 @@ def _block_normals(
     nuisance: FloatArray,
     cluster: IntArray,
     session: IntArray,
-) -> NormalEquations:
+) -> ClusterNormals:
     """The normal equations of a block.
 
     cluster, session : (N,) of each row, the session by its place.
@@ -188,6 +188,6 @@ def _block_normals(
     whitened = residual_um / system.sigma_um
     used = usable & ~system.limits.outliers(whitened, usable, aligned.recording.visit)
     weight = huber_weights(whitened[used], scale=lambda _: system.scale)
-    normals = NormalEquations()
+    normals = ClusterNormals()
     normals.add_rows(G_um[used] / system.sigma_um[:, None], whitened[used], weight, cluster[used])
     return normals

@@ -19,7 +19,7 @@ class Sums(NamedTuple):
     score: FloatArray
 
 
-class NormalEquations:
+class ClusterNormals:
     """Sums by cluster.
 
     squares : sum w e^2.  values : how many e there are.  rows : as many as there are.
@@ -41,7 +41,7 @@ class NormalEquations:
         self.values += residual.size
         self.rows += len(residual)
 
-    def add(self, other: NormalEquations) -> None:
+    def add(self, other: ClusterNormals) -> None:
         """The sums of other rows."""
         for number, sums in other._by_cluster.items():
             self._add(number, sums)

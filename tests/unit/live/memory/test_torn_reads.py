@@ -121,6 +121,17 @@ def test_a_slot_that_stays_half_written_keeps_the_reading_before():
     assert latest.snapshot(9.0).readings[0] == good(2.0, 8.0)
 
 
+def test_a_slot_whose_checksum_does_not_fit_keeps_the_reading_before():
+    latest = Latest(["a.x", "a.y"])
+    latest.put(0, good(1.0, 5.0))
+    latest.snapshot(6.0)
+    latest.put(0, good(2.0, 6.5))
+    latest._slots[0] ^= 1  # its version says that it is whole
+    latest.put(1, good(3.0, 6.5))
+    readings = latest.snapshot(7.0).readings
+    assert (readings[0], readings[1]) == (good(1.0, 5.0), good(3.0, 6.5))
+
+
 @pytest.mark.parametrize(
     "reading",
     [
