@@ -98,6 +98,11 @@ class LoopSettings(Section):
         default=40, description="real-time priority of the loop (SCHED_FIFO), where permitted"
     )
     lock_memory: bool = Field(default=True, description="keep the daemon in memory (mlockall), where permitted")
+    wake_latency_us: Annotated[int, Field(ge=0, le=2_000_000)] | None = Field(
+        default=None,
+        description="how long a processor may take to wake from its sleep, us, where permitted "
+        "(/dev/cpu_dma_latency); 0: none sleeps, which takes more power; left out: 0 from 500 Hz on, and no limit below",
+    )
 
 
 class AcquisitionSettings(Section):

@@ -62,6 +62,7 @@ def test_exposure_is_at_most_two(installed):
         "LimitMEMLOCK=infinity",
         "SupplementaryGroups=dialout",
         "DeviceAllow=char-ttyUSB rw",
+        "DeviceAllow=/dev/cpu_dma_latency w",
     ],
 )
 def test_what_the_daemon_cannot_do_without(line):

@@ -21,6 +21,7 @@ _COARSE_S = 1e-6
 _LISTENING = "0A"  # net/tcp_states.h
 
 
+_RULES = "install systemd/compd.rules, or set loop.wake_latency_us to 100000 to do without"
 _LIMITS = "run the daemon by systemd/compd.service, or give its user rtprio 98 and memlock unlimited in limits.conf(5)"
 
 
@@ -48,14 +49,14 @@ def realtime_findings(computer: Computer, priority: int, granted: Mapping[str, A
 
 def _granted_findings(granted: Mapping[str, Any]) -> Iterator[Finding]:
     """Of a daemon that runs: what it has."""
-    for name in ("sched_fifo", "locked_memory"):
+    for name, next_step in (("sched_fifo", _LIMITS), ("locked_memory", _LIMITS), ("wake_latency", _RULES)):
         permission = granted.get(name)
         if permission is None:
             continue
         if permission["granted"]:
             yield good("real time", f"the running daemon has {name}: {permission['detail']}")
         else:
-            yield advice("real time", f"the running daemon has no {name}: {permission['detail']}", _LIMITS)
+            yield advice("real time", f"the running daemon has no {name}: {permission['detail']}", next_step)
 
 
 def _permitted_findings(computer: Computer, priority: int) -> Iterator[Finding]:

@@ -13,6 +13,7 @@ from pathlib import Path
 import structlog
 
 from compd.clock import Clock
+from compd.configuration.operation import LoopSettings
 from compd.errors import CompdError
 from compd.live import realtime
 from compd.live.loop.adopted_models import AdoptedModels
@@ -34,10 +35,19 @@ from compd.live.processes.control import Control
 _TRIAL_CYCLES = 20
 # Priority for these cycles, below every `loop.priority`.
 _TRIAL_PRIORITY = 1
+# From this rate on processors are kept awake, Hz: to wake them takes a tenth of the period and more.
+_AWAKE_FROM_HZ = 500.0
 # A loop that is alive gives the turn within a period.
 _TURN_WITHIN_S = 2.0
 
 _log = structlog.get_logger()
+
+
+def wake_latency_us(settings: LoopSettings) -> int | None:
+    """How long a processor may take to wake, us; None for no limit."""
+    if settings.wake_latency_us is None and settings.rate_hz >= _AWAKE_FROM_HZ:
+        return 0
+    return settings.wake_latency_us
 
 
 @dataclass(frozen=True)
@@ -143,6 +153,8 @@ class LoopProcess:
         permissions = {"quiet_collector": loop.collector.start(self.clock.monotonic())}
         if settings.lock_memory:
             permissions["locked_memory"] = realtime.lock_memory()
+        if (latency_us := wake_latency_us(settings)) is not None:
+            permissions["wake_latency"] = realtime.limit_wake_latency(latency_us)
         permissions["sched_fifo"] = realtime.use_fifo(settings.priority)
         # what follows must not get in the way of the loop that has the turn
         realtime.use_fifo(_TRIAL_PRIORITY)

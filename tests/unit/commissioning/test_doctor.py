@@ -162,9 +162,12 @@ def test_real_time_by_capabilities_and_on_a_real_time_kernel(tmp_path: Path) -> 
 
 
 def test_what_the_running_daemon_was_granted_counts_more_than_what_this_user_may(tmp_path: Path) -> None:
-    granted = {"sched_fifo": {"granted": False, "detail": "Operation not permitted"}}
-    findings = list(realtime_findings(Machine(tmp_path), 40, granted))
-    assert "the running daemon has no sched_fifo" in findings[0].what
+    refused = {"granted": False, "detail": "Operation not permitted"}
+    granted = {"sched_fifo": refused, "wake_latency": refused}
+    fifo, awake, *_ = realtime_findings(Machine(tmp_path), 40, granted)
+    assert "the running daemon has no sched_fifo" in fifo.what
+    assert "the running daemon has no wake_latency" in awake.what
+    assert "compd.rules" in awake.next_step
 
 
 @pytest.mark.parametrize(("said", "verdict"), [("yes", Verdict.GOOD), ("no", Verdict.ADVICE), (None, Verdict.UNKNOWN)])
