@@ -101,7 +101,7 @@ class LoopSettings(Section):
     wake_latency_us: Annotated[int, Field(ge=0, le=2_000_000)] | None = Field(
         default=None,
         description="how long a processor may take to wake from its sleep, us, where permitted "
-        "(/dev/cpu_dma_latency); 0: none sleeps, which takes more power; left out: 0 from 500 Hz on, and no limit below",
+        "(/dev/cpu_dma_latency); 0: none sleeps, which takes more power; left out: 0 from 500 Hz on, below no limit",
     )
 
 

@@ -89,6 +89,14 @@ class MachineModel:
         return any({"direction", "motion"} & set(fitted.effect.needs) for fitted in self.live_effects)
 
     @cached_property
+    def live_covariance(self) -> FloatArray:
+        """(P, P) of the live effects' fitted numbers; nan where the model does not give it."""
+        live = [fitted.effect.live for fitted in self.effects for _ in fitted.theta]
+        if not len(self.covariance):
+            return np.full((sum(live),) * 2, np.nan)
+        return self.covariance[np.ix_(live, live)]
+
+    @cached_property
     def program(self) -> EffectProgram:
         """The live effects as the compensation's kernel reads them."""
         return build_program(

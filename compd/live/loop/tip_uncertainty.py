@@ -14,9 +14,8 @@ from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.model.effect_memory import EffectMemory
 from compd.model.machine import MachineModel
-from compd.model.motion import Movement
-from compd.model.observe import observe
-from compd.model.uncertainty import GAUGE_PORTS, GaugeNoise, tip_sensitivities, tip_uncertainty_mm
+from compd.model.tip_derivatives import tip_derivatives
+from compd.model.uncertainty import GaugeNoise, parameter_variance
 from compd.units import UM_PER_MM
 
 
@@ -48,8 +47,8 @@ def with_absent(noise: GaugeNoise | None, absent_mm: FloatArray) -> GaugeNoise |
 class TipUncertainty(NamedTuple):
     """Of one place of the tip.
 
-    by_noise_um : (3), standard uncertainty without age, um; nan where it is not known, see `tip_uncertainty_mm`. None
-        where the noise of a gauge is not known.
+    by_noise_um : (3), standard uncertainty without age, um; nan where a fitted number's error or the noise of a needed
+        quantity is not known. None where the noise of a gauge is not known.
     tip_by_gauge : (3, n + k + 9), by how much a length moves the tip, mm per mm: scales, joints, frame.
     """
 
@@ -80,24 +79,24 @@ def with_age(
 def tip_uncertainty(
     machine: MachineModel, noise: GaugeNoise | None, values: GaugeValues, scale_mm: FloatArray, effects: EffectMemory
 ) -> TipUncertainty:
-    """Of the tip with the scales at scale_mm (n,)."""
+    """Of the tip with the scales at scale_mm (n,); GUM 5.1.2 and 5.2.2, see `compd.model.uncertainty`.
+
+    effects : what they remember after the snapshot.
+    """
     if noise is None:
         return TipUncertainty(None, None)
-    assert machine.constants is not None
-    motion = effects.motion
-    rows = observe(
+    derivatives = tip_derivatives(
         machine,
-        machine.constants,
-        scale_mm=scale_mm[None],
-        joint_mm=values.joint_mm[None],
-        frame_mm=values.frame_mm[None],
-        quantities={name: np.array([value]) for name, value in values.quantities.items()},
-        time_s=np.array([values.time_s]),
-        session_start=np.array([False]),
-        movement=Movement.unknown(scale_mm[None], values.joint_mm[None])
-        if motion is None
-        else Movement.from_motions([motion]),
+        scale_mm=scale_mm,
+        joint_mm=values.joint_mm,
+        frame_mm=values.frame_mm,
+        quantities=values.quantities,
+        sigmas=noise.quantities,
+        time_s=float(values.time_s),
+        effects=effects,
     )
-    by_port = tip_sensitivities(machine, rows)
-    tip_um = tip_uncertainty_mm(machine, rows, noise, effects.memories, by_port)[0] * UM_PER_MM
-    return TipUncertainty(tip_um, np.concatenate([by_port[port].tip[0] for port in GAUGE_PORTS], axis=1))
+    by_gauge_mm = derivatives.by_gauge * np.concatenate([noise.scale_mm, noise.joint_mm, noise.frame_mm])
+    variance = (by_gauge_mm * by_gauge_mm).sum(axis=1) + (derivatives.by_quantity**2).sum(axis=1)
+    if machine.live_effects:
+        variance += parameter_variance(derivatives.by_theta[None], machine.live_covariance)[0]
+    return TipUncertainty(np.sqrt(np.maximum(variance, 0.0)) * UM_PER_MM, derivatives.by_gauge)
