@@ -15,6 +15,7 @@ from compd.live.realtime import QuietCollector
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
 from compd.model.library import load_library
+from compd.model.uncertainty import GaugeNoise
 from tests.benchmarks.figures import median_and_p99, show
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
 
@@ -34,6 +35,8 @@ EFFECTS = (
     "base_joint_position",
 )
 ARRIVING_MM = 1e-4  # every gauge shows something new in every cycle
+NOISE_MM, NOISE = 1e-4, 0.05  # of a length and of any other quantity, where the tip's uncertainty is computed
+HEAD = ["", "median us", "p99 us", "p99 / median", f"median / {BUDGET_US:g} us budget"]
 
 
 def main() -> None:
@@ -48,24 +51,45 @@ def main() -> None:
                 [f"{name.removesuffix('.yaml')}, {mode}: {part}", *_row(durations)]
                 for part, durations in _cycles(measured).items()
             ]
-    show(f"Cycle cost over {CYCLES} cycles", ["", "median us", "p99 us", f"median / {BUDGET_US:g} us budget"], rows)
+    show(f"Cycle cost over {CYCLES} cycles", HEAD, rows)
     rows = [
         [f"{name.removesuffix('.yaml')}, {mode}, {count} effects", *_row(whole_cycles(name, mode, count))]
         for name in ("tripod-cmm.yaml", "hexapod.yaml")
         for mode in ("cmm", "machine_tool")
         for count in (0, 3, len(EFFECTS))
     ]
-    show("Snapshot to bytes, with effects", ["", "median us", "p99 us", f"median / {BUDGET_US:g} us budget"], rows)
+    rows += [
+        [f"{name.removesuffix('.yaml')}, {mode}, the same with the uncertainty", *_row(uncertain_cycles(name, mode))]
+        for name in ("tripod-cmm.yaml", "hexapod.yaml")
+        for mode in ("cmm", "machine_tool")
+    ]
+    show("Snapshot to bytes, with effects; the tip's uncertainty is computed in one cycle a second", HEAD, rows)
 
 
 def whole_cycles(name: str, mode: str, count: int) -> list[float]:
     """Durations (s) from snapshot to bytes, with so many effects."""
+    measured = _machine(name, mode, count)
+    measured.settle()
+    return _cycles(measured)["snapshot to bytes"]
+
+
+def uncertain_cycles(name: str, mode: str) -> list[float]:
+    """Durations (s) from snapshot to bytes of those cycles that compute the tip's uncertainty, with all effects."""
+    measured = _machine(name, mode, len(EFFECTS))
+    wires = measured.wires
+    lengths_mm = (np.full(count, NOISE_MM) for count in (measured.model.links, wires.joints, 9))
+    noise = GaugeNoise(*lengths_mm, dict.fromkeys(wires.quantity_names, NOISE))
+    measured.settings = replace(measured.settings, noise=noise)
+    measured.settle()
+    return _cycles(measured)["snapshot to bytes"][:: measured.settings.uncertainty_every]
+
+
+def _machine(name: str, mode: str, effects: int) -> Machine:
     measured = machine(name)
     if mode == "machine_tool":
         measured.commands.target = _target(measured)
-    measured.commands.models = _with_effects(measured, count)
-    measured.settle()
-    return _cycles(measured)["snapshot to bytes"]
+    measured.commands.models = _with_effects(measured, effects)
+    return measured
 
 
 def _target(measured: Machine) -> Target:
@@ -88,7 +112,7 @@ def _with_effects(measured: Machine, count: int) -> Models:
 
 def _row(durations_s: list[float]) -> list[str]:
     median, p99 = (value * 1e6 for value in median_and_p99(durations_s))
-    return [f"{median:.1f}", f"{p99:.1f}", f"{median / BUDGET_US:.2f}"]
+    return [f"{median:.1f}", f"{p99:.1f}", f"{p99 / median:.2f}", f"{median / BUDGET_US:.2f}"]
 
 
 def _cycles(measured: Machine) -> dict[str, list[float]]:
