@@ -17,7 +17,7 @@ LOOP = {"stale_after_s": 0.5, "on_stale": "hold", "hold_s": 1}
 
 def files_open(path: Path) -> list[int]:
     """Descriptors of this process that are open on `path`."""
-    links = {int(link.name): os.readlink(link) for link in Path("/proc/self/fd").iterdir() if link.is_symlink()}
+    links = {int(link.name): str(link.readlink()) for link in Path("/proc/self/fd").iterdir() if link.is_symlink()}
     return [number for number, target in links.items() if target == str(path)]
 
 
@@ -41,5 +41,7 @@ def test_a_refused_limit_says_what_it_needs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rate_hz", "given_us", "limit_us"), [(200, None, None), (499, None, None), (500, None, 0), (1000, 50, 50)]
 )
-def test_processors_stay_awake_for_a_fast_loop_alone(rate_hz: float, given_us: int | None, limit_us: int | None) -> None:
+def test_processors_stay_awake_for_a_fast_loop_alone(
+    rate_hz: float, given_us: int | None, limit_us: int | None
+) -> None:
     assert wake_latency_us(LoopSettings(rate_hz=rate_hz, wake_latency_us=given_us, **LOOP)) == limit_us
