@@ -13,8 +13,8 @@ from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect
 from compd.model.library import find_effect, load_library
 from compd.model.library.effects_file import gather_effects, named_effect
-from compd.model_document import read_stored
-from compd.model_file import ModelFile, read_model_file
+from compd.model_file.model_document import read_stored
+from compd.model_file.model_file import ModelFile, read_model_file
 from compd.recording.sidecar import EXTERNAL
 
 

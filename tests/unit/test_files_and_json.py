@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.files import write_files, write_new_file
-from compd.json_text import encode_compact, nan_to_null, omit_unknown
+from compd.files.atomic_files import write_files, write_new_file
+from compd.text.json_text import encode_compact, nan_to_null, omit_unknown
 
 
 def test_text_is_written_as_utf8_and_bytes_as_they_are(tmp_path: Path) -> None:

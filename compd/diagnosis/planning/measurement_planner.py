@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.statistics.least_squares import solve_least_squares
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.planning.programme_rows import ProgrammeRows, at_rows

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from compd.api.models import add_effect
-from compd.model_document import read_stored
+from compd.model_file.model_document import read_stored
 from compd.recording.sidecar import read_sidecar
 from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
