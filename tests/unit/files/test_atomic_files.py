@@ -1,18 +1,14 @@
-"""Files are written whole or not at all; JSON has neither NaN nor spaces."""
+"""Files are written whole or not at all."""
 
 from __future__ import annotations
 
 import errno
-import math
 import os
-from collections import OrderedDict
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from compd.files.atomic_files import write_files, write_new_file
-from compd.text.json_text import encode_compact, nan_to_null, omit_unknown
 
 
 def test_text_is_written_as_utf8_and_bytes_as_they_are(tmp_path: Path) -> None:
@@ -61,20 +57,3 @@ def test_a_new_file_never_overwrites_an_old_one(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         write_new_file(tmp_path / "a", "2")
     assert (tmp_path / "a").read_text() == "1"
-
-
-def test_nan_becomes_null_and_every_key_stays() -> None:
-    report = {"a": math.nan, "b": [1.5, -math.inf, {"c": np.float64("nan")}], "d": "nan", "e": 3, "f": None}
-    assert nan_to_null(report) == {"a": None, "b": [1.5, None, {"c": None}], "d": "nan", "e": 3, "f": None}
-    assert type(nan_to_null(np.float64(0.5))) is float
-
-
-def test_what_is_not_known_is_left_out_of_a_message() -> None:
-    message = OrderedDict(a=math.inf, b=(1.0, math.nan), c={"d": None, 5: 0.5}, e="")
-    assert omit_unknown(message) == {"b": [1.0, None], "c": {"5": 0.5}, "e": ""}
-
-
-def test_compact_json_has_no_spaces_and_refuses_nan() -> None:
-    assert encode_compact({"a": [1, 2.5], "b": None}) == '{"a":[1,2.5],"b":null}'
-    with pytest.raises(ValueError, match="Out of range"):
-        encode_compact([math.nan])
