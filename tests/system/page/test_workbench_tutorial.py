@@ -29,7 +29,7 @@ def order(tab, name, done):
     tab.locator(f"#{name}").click()
     until(tab, "document.querySelector('#confirm-order')?.disabled === false")
     tab.locator("#confirm-order").click()
-    until(tab, f"document.querySelector('#live-model .said').textContent === {json.dumps(done)}")
+    until(tab, f"document.querySelector('#live-model .order-answer').textContent === {json.dumps(done)}")
 
 
 def test_a_hidden_effect_is_found_added_and_adopted_by_mouse_with_the_ledger_of_the_commands(chromium):
