@@ -99,26 +99,28 @@ class ObservedChannels:
 
     def _ask_for_units(self) -> None:
         for exchange, k in self._read:
-            said, unit = exchange.units(k), self.unit(exchange, k)
+            reply_units, unit = exchange.units(k), self.unit(exchange, k)
             where = "--unit" if self.single else f"--unit of {self.name(exchange, k)}"
             if not unit:
                 self.problems.append(
                     Problem(
                         where=where,
-                        what=f"which unit has the number? the replies {_say(said)}",
+                        what=f"which unit has the number? the replies {_units_text(reply_units)}",
                         value=exchange.texts(k)[0].strip(),
                         next_step="--unit mm (um, inch, degC ...); --unit mm,inch where each channel has its own",
                     )
                 )
-            elif said != [""] and any(other not in ("", unit) and _factor(other, unit, said) is None for other in said):
+            elif reply_units != [""] and any(
+                other not in ("", unit) and _factor(other, unit, reply_units) is None for other in reply_units
+            ):
                 self.problems.append(
                     Problem(
                         where=where,
                         what="the replies say another unit",
                         value=unit,
-                        allowed=", ".join(filter(None, said)),
+                        allowed=", ".join(filter(None, reply_units)),
                         next_step="leave out --unit, or set the device to one unit; to multiply the number, "
-                        f"--factors {said[-1]}=FACTOR; if it is no unit, --ignore its letters",
+                        f"--factors {reply_units[-1]}=FACTOR; if it is no unit, --ignore its letters",
                     )
                 )
 
@@ -143,17 +145,17 @@ class ObservedChannels:
         return list(given)
 
 
-def _unit(said: Sequence[str], given: str) -> str:
+def _unit(reply_units: Sequence[str], given: str) -> str:
     """Of a number on the wire: what the person says, else what the replies do; mm where they change between units."""
-    units = [unit for unit in said if unit in WIRE_UNITS]
+    units = [unit for unit in reply_units if unit in WIRE_UNITS]
     return given or ("mm" if "mm" in units else units[0] if units else "")
 
 
-def _say(said: Sequence[str]) -> str:
-    units = [unit for unit in said if unit]
+def _units_text(reply_units: Sequence[str]) -> str:
+    units = [unit for unit in reply_units if unit]
     return f"say {', '.join(units)}, which is none of a channel" if units else "do not say it"
 
 
-def _factor(other: str, unit: str, said: Sequence[str]) -> float | None:
+def _factor(other: str, unit: str, reply_units: Sequence[str]) -> float | None:
     """What a number in `other` is multiplied by where the replies say in which of several units each is."""
-    return unit_factor(other, unit) if len(said) > 1 else None
+    return unit_factor(other, unit) if len(reply_units) > 1 else None
