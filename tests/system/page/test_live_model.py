@@ -116,7 +116,8 @@ def test_an_effect_is_added_run_as_a_shadow_and_adopted_by_mouse(chromium, live,
         order(tab, "live-adopt")
         assert "The correction changes by" in tab.locator("#live-model .consequence").inner_text()
         tab.locator("#confirm-order").click()
-        until(tab, "document.querySelector('#live-model .order-answer').textContent === 'Done: adopt the shadow\\'s model.'")
+        done = "Done: adopt the shadow's model."
+        until(tab, f'document.querySelector("#live-model .order-answer").textContent === "{done}"')
         assert daemon.model()["applied"]["file"] == str(model)
         assert daemon.model()["applied"]["effects"] == ["link_zero"]
         until(tab, "document.getElementById('live-models').textContent.startsWith('Applied: tripod.model.yaml')")
