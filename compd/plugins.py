@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from compd.errors import PluginError, Problem
-from compd.file_trust import own_users, trust_problem
+from compd.files.file_trust import own_users, trust_problem
 
 GAUGES = "compd.gauges"
 SIMULATED_GAUGES = "compd.simulated_gauges"

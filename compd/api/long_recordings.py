@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from compd.api.arguments import Model, opened_model
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.fit import FitResult
 from compd.comparison.stream.block_comparison import compare_blocks
 from compd.comparison.stream.block_fit import fit_blocks
@@ -17,7 +17,7 @@ from compd.comparison.stream.sample import SAMPLE_ROWS, Sample, draw_sample
 from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.configuration.shipped import Machine
 from compd.diagnosis import model_changes
-from compd.model_file import ModelFile
+from compd.model_file.model_file import ModelFile
 
 # Called with the number of rows that are done, block after block.
 Progress = Callable[[int], None]

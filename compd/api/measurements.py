@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan

@@ -13,8 +13,8 @@ from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect
 from compd.model.library import find_effect, load_library
 from compd.model.library.effects_file import gather_effects, named_effect
-from compd.model_document import read_stored
-from compd.model_file import ModelFile, read_model_file
+from compd.model_file.model_document import read_stored
+from compd.model_file.model_file import ModelFile, read_model_file
 from compd.recording.sidecar import EXTERNAL
 
 
@@ -106,18 +106,18 @@ def add_effect(
     >>> round(compd.compare(monday, model).rms_um, 2)
     0.18
     """
-    found = _found(effect, gather_effects(effects))
-    declared = found.declared if isinstance(found.declared, str) else dict(found.declared)
+    resolved = _resolve_effect(effect, gather_effects(effects))
+    declared = resolved.declared if isinstance(resolved.declared, str) else dict(resolved.declared)
     aligned = opened_recording(recording)
-    return model_changes.add(opened_model(model, aligned), declared or found.id, found, aligned, refine)
+    return model_changes.add(opened_model(model, aligned), declared or resolved.id, resolved, aligned, refine)
 
 
-def _found(effect: Effect | str | Path | Mapping[str, Any], given: Mapping[str, Effect]) -> Effect:
+def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapping[str, Effect]) -> Effect:
     """The effect that is to be added, such that a model file can name it. Raises CompdError with every problem."""
     if isinstance(effect, Mapping):
         return find_effect(effect, "effect")
     if not isinstance(effect, Effect):
-        return named_effect(str(effect), "effect", given)
+        return named_effect(str(effect), "effect", known)
     if not effect.declared and load_library().get(effect.id) != effect:
         raise CompdError(
             Problem(

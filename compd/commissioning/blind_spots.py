@@ -17,8 +17,8 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.commissioning.feigned_jumps import FeignedJump, feigned_jumps, measured_lengths
 from compd.commissioning.line_budget import LineBudget, line_budgets
-from compd.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation_values import Compensation, GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.errors import KinematicsError

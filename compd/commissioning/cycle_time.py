@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.clock import Clock, MonotonicClock
-from compd.compensation import compensate_cmm
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.errors import Problem
 from compd.gauge import good

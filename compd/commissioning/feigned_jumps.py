@@ -19,7 +19,7 @@ from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.lines import CARRIES
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
-from compd.live.acquisition.acquisition import FASTEST_ROUND_S
+from compd.live.acquisition.polled_round import FASTEST_ROUND_S
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
 from compd.live.acquisition.reading_trust import tolerance_mm
 

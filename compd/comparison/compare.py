@@ -8,11 +8,11 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.measured_attitude import MM_PER_RAD
 from compd.comparison.comparison import NO_QUANTITY, Comparison
 from compd.comparison.contributions import contributions
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.measured_attitude import MM_PER_RAD
 from compd.comparison.noise_floor import noise_floor, repeat_scatter
 from compd.comparison.nuisance import FittedAlong, fit_along
 from compd.comparison.outliers import outlier_rows

@@ -12,19 +12,19 @@ import numpy as np
 from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, TextArray, rms
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.alignment.measured_attitude import UNIT as ATTITUDE_UNIT
 from compd.comparison.contributions import Contribution
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import format_error, residual_ending
-from compd.comparison.measured_attitude import UNIT as ATTITUDE_UNIT
 from compd.comparison.noise_floor import NoiseFloor
 from compd.comparison.prediction_uncertainty import Uncertainty
 from compd.comparison.residual_trends import Trend
-from compd.json_text import nan_to_null
 from compd.model.effect import FittedEffect
 from compd.model.uncertainty import GaugeNoise
 from compd.recording.reference import sigma_key
 from compd.tables import data_frame, html_table
+from compd.text.json_text import nan_to_null
 
 if TYPE_CHECKING:
     import pandas as pd

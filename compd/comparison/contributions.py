@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, rms
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.nuisance import fit_along
 from compd.model.deltas import Deltas, sum_deltas
 from compd.model.effect import FittedEffect

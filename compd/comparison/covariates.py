@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.display_unit import in_place_unit, place_unit
 from compd.recording.columns import is_sensitivity
 from compd.units import unit_of

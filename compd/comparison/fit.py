@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
-from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.nuisance import nuisance_beside

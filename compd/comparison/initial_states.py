@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.model.effect import ConstantValues, Effect
 from compd.model.effect_basis import evaluate_basis
 from compd.model.observations import Observations

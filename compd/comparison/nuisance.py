@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.initial_states import initial_state_columns
 from compd.comparison.statistics.least_squares import column_norms, solve_least_squares
 from compd.comparison.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale

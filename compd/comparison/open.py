@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from compd.comparison.align_recording import align_recording
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.align_recording import align_recording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.configuration import Configuration
 from compd.configuration.shipped import Machine, load_machine, shipped_names
 from compd.errors import Problem, RecordingError

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.statistics.least_squares import solve_least_squares
 from compd.comparison.statistics.periodogram import PeriodLimits, strongest_periods
 from compd.model.effect import Constant, ConstantValues, Effect

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.noise_floor import repeat_scatter
 from compd.comparison.statistics.last_digit import last_digit_um
 from compd.model.deltas import Deltas, split_by_port, sum_deltas

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import betainc
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.covariates import Covariate, covariates
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import format_error

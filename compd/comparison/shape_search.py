@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.fit import FitResult, fit, initial_effect
 from compd.comparison.period_search import neighbouring_periods, promising_constants

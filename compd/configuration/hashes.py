@@ -73,18 +73,18 @@ def hash_of(configuration: object, fields: tuple[str, ...], without: tuple[str, 
         if isinstance(value, BaseModel):
             value = value.model_dump(mode="json")
         if isinstance(value, Mapping):
-            return {k: plain(v) for k, v in _said(value).items() if k not in without}
+            return {k: plain(v) for k, v in _stated_options(value).items() if k not in without}
         return [plain(v) for v in value] if isinstance(value, list) else value
 
     text = json.dumps({name: plain(getattr(configuration, name)) for name in fields}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _said(options: Mapping[str, Any]) -> dict[str, Any]:
+def _stated_options(options: Mapping[str, Any]) -> dict[str, Any]:
     """The options that say anything: one that a later release has brought, and that is left out, changes no hash."""
-    said = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
-    if "low_latency" in said:  # false if left out, up to 0.2.0
-        said["low_latency"] = bool(said["low_latency"])
-    if (driver := str(said.get("driver"))) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in said:
-        said["fastest_mm_per_s"] = _FORMER_SPEED_LIMITS[driver]
-    return said
+    stated = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
+    if "low_latency" in stated:  # false if left out, up to 0.2.0
+        stated["low_latency"] = bool(stated["low_latency"])
+    if (driver := str(stated.get("driver"))) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in stated:
+        stated["fastest_mm_per_s"] = _FORMER_SPEED_LIMITS[driver]
+    return stated

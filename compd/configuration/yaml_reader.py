@@ -21,7 +21,7 @@ except ImportError:
     from yaml import SafeLoader  # type: ignore[assignment]
 
 from compd.errors import ConfigurationError, Problem
-from compd.files import read_small_file
+from compd.files.atomic_files import read_small_file
 
 Location = tuple[str | int, ...]
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.comparison import Comparison
 from compd.comparison.fit import fit, initial_effect

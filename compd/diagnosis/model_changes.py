@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.comparison import Comparison
 from compd.comparison.fit import FitResult, fit, initial_effect
@@ -21,8 +21,8 @@ from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect
 from compd.model.library import load_library
-from compd.model_document import Declaration, Kind, ModelStep, StoredModel
-from compd.model_file import ModelFile
+from compd.model_file.model_document import Declaration, Kind, ModelStep, StoredModel
+from compd.model_file.model_file import ModelFile
 
 # What makes of a fit, and the standard deviations (m,) of the noise that it was weighed by, a better one.
 Refinement: TypeAlias = Callable[[FitResult, FloatArray], FitResult]

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.fit import FitResult
 from compd.comparison.nuisance import nuisance_beside
 from compd.comparison.statistics.least_squares import normal_inverse

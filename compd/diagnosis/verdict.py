@@ -15,8 +15,8 @@ from compd.diagnosis.findings import (
     GrossRows,
     UntestedEffect,
 )
-from compd.json_text import nan_to_null
 from compd.tables import Columns, data_frame, html_table
+from compd.text.json_text import nan_to_null
 
 if TYPE_CHECKING:
     import pandas as pd

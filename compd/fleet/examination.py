@@ -11,13 +11,13 @@ from functools import lru_cache
 from pathlib import Path
 
 from compd.api.diagnosis import compare, diagnose
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import Comparison
 from compd.comparison.open import open_recording
 from compd.configuration import Configuration, load
 from compd.diagnosis.model_changes import refit
 from compd.errors import CompdError, Problem
-from compd.files import file_stamp
+from compd.files.atomic_files import file_stamp
 from compd.fleet.recording_result import (
     ABOVE_FLOOR,
     AT_FLOOR,
@@ -26,8 +26,8 @@ from compd.fleet.recording_result import (
     FleetEstimate,
     RecordingResult,
 )
-from compd.model_document import read_stored
-from compd.model_file import ModelFile, read_model_file
+from compd.model_file.model_document import read_stored
+from compd.model_file.model_file import ModelFile, read_model_file
 from compd.recording.recording import Recording
 from compd.recording.sidecar import read_sidecar
 

@@ -14,8 +14,8 @@ from compd.comparison.display_unit import format_error
 from compd.fleet.drift import Drift, drifts, named_drifts
 from compd.fleet.outlying import ERROR, ERROR_LEFT, OutlyingMachine, outlying_machines
 from compd.fleet.recording_result import RecordingResult
-from compd.number_text import estimate_text, join_words, number_text
 from compd.report.page_table import PageTable
+from compd.text.number_text import estimate_text, join_words, number_text
 
 _NO_MACHINE = "(no machine named)"
 _DATE = "%Y-%m-%d"

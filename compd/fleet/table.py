@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from compd.errors import CompdError, Problem
-from compd.files import write_files
+from compd.files.atomic_files import write_files
+from compd.files.output_file import check_replaceable
 from compd.fleet.recording_result import FleetEstimate, RecordingResult
-from compd.output_file import check_replaceable
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -98,12 +98,12 @@ def _take_columns(table: RawTable, columns: Sequence[str], roles: Roles, problem
 def _take_names(table: RawTable, names: Mapping[str, str], roles: Roles, problems: ExportProblems) -> None:
     """The columns that a person names, by the header's words or by their number."""
     for role, name in names.items():
-        found = _columns_named(table, name)
-        if len(found) == 1:
-            roles.take(role, found[0], _header_unit(table, found[0]), f"as --{role} says")
+        places = _columns_named(table, name)
+        if len(places) == 1:
+            roles.take(role, places[0], _header_unit(table, places[0]), f"as --{role} says")
             continue
         shown = ", ".join(table.header) if table.header else f"1 to {len(table.columns)}"
-        what = f"has no column for {role}" if not found else f"{len(found)} columns may be {role}"
+        what = f"has no column for {role}" if not places else f"{len(places)} columns may be {role}"
         problems.add(table.header_line, what, name, shown, f"name one with --{role}")
 
 
@@ -114,9 +114,9 @@ def _columns_named(table: RawTable, name: str) -> list[int]:
             lambda own: own.lower() == name.strip().lower(),
             lambda own: split_unit(own)[0] == split_unit(name)[0],
         ):
-            found = [k for k, own in enumerate(table.header) if same(own)]
-            if found:
-                return found
+            places = [k for k, own in enumerate(table.header) if same(own)]
+            if places:
+                return places
     return [int(name) - 1] if name.isdecimal() and 1 <= int(name[:6]) <= len(table.columns) else []
 
 

@@ -32,24 +32,24 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
         problems.check()
     roles = find_roles(table, options, problems)
     problems.check()
-    taken = {role: f"{column_text(table, k)}, {roles.why[role]}" for role, k in roles.column.items()}
+    assumptions = {role: f"{column_text(table, k)}, {roles.why[role]}" for role, k in roles.column.items()}
     unused = [k for k in range(len(table.columns)) if k not in roles.column.values()]
     if unused:
-        taken["not used"] = ", ".join(column_text(table, k) for k in unused)
-    table = _of_group(table, roles, options, taken, problems)
+        assumptions["not used"] = ", ".join(column_text(table, k) for k in unused)
+    table = _of_group(table, roles, options, assumptions, problems)
     problems.check()
     axes = tuple(axis for axis in AXES if axis in roles.column)
     time = _time(table, roles, options, problems)
-    values = _values(table, roles, axes, options, taken, problems)
+    values = _values(table, roles, axes, options, assumptions, problems)
     problems.check()
     complete: BoolArray = np.asarray(np.isfinite(values).all(axis=1))
     if time is not None:
         complete = complete & np.isfinite(time.time_s)
-        taken["time"] = f"{taken['time']}, {time.assumed}" if "time" in taken else time.assumed
+        assumptions["time"] = f"{assumptions['time']}, {time.assumed}" if "time" in assumptions else time.assumed
     if not complete.any():
         problems.add(int(table.line[0]), "no row is complete", allowed=f"{', '.join(axes)} in each row")
         problems.check()
-    names = _names(table, roles, taken)
+    names = _names(table, roles, assumptions)
     left_out = dict(table.left_out)
     if not complete.all():
         left_out["with an empty cell"] = int((~complete).sum())
@@ -64,13 +64,13 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
         time_s=None if time is None else time.time_s[complete],
         time_std_s=0.0 if time is None else time.std_s,
         name=names,
-        taken={**table.assumed, **taken},
+        taken={**table.assumed, **assumptions},
         left_out=left_out,
     )
 
 
 def _of_group(
-    table: RawTable, roles: Roles, options: ReadOptions, taken: dict[str, str], problems: ExportProblems
+    table: RawTable, roles: Roles, options: ReadOptions, assumptions: dict[str, str], problems: ExportProblems
 ) -> RawTable:
     """The rows of one group of points; asks where there are several and none is chosen."""
     labels = group_labels(table, roles)
@@ -84,13 +84,17 @@ def _of_group(
     )
     listed += f" and {len(counts) - _SHOWN_GROUPS} more" if len(counts) > _SHOWN_GROUPS else ""
     if options.group == ALL_GROUPS or (options.group is None and len(counts) == 1):
-        taken["group"] = f"{taken.get('group', '')}: {'all of ' if len(counts) > 1 else ''}{listed}".lstrip(": ")
+        assumptions["group"] = f"{assumptions.get('group', '')}: {'all of ' if len(counts) > 1 else ''}{listed}".lstrip(
+            ": "
+        )
         return table
     wanted = {label for label in counts if options.group in (label, label.rpartition("::")[2])}
     if options.group is not None and len(wanted) == 1:
         chosen = wanted.pop()
         rows = [i for i, label in enumerate(labels) if label == chosen]
-        taken["group"] = f"{taken.get('group', '')}: {chosen}, {len(rows)} of {len(labels)} rows".lstrip(": ")
+        assumptions["group"] = f"{assumptions.get('group', '')}: {chosen}, {len(rows)} of {len(labels)} rows".lstrip(
+            ": "
+        )
         columns = [[cells[i] for i in rows] for cells in table.columns]
         others = {**table.left_out, "of other groups": len(labels) - len(rows)}
         return replace(table, columns=columns, line=table.line[rows], left_out=others)
@@ -113,7 +117,7 @@ def group_labels(table: RawTable, roles: Roles) -> Sequence[str] | None:
     return table.columns[group]
 
 
-def _names(table: RawTable, roles: Roles, taken: dict[str, str]) -> tuple[str, ...] | None:
+def _names(table: RawTable, roles: Roles, assumptions: dict[str, str]) -> tuple[str, ...] | None:
     """The names of the points; with their group in front where several groups use one name."""
     if "name" not in roles.column:
         return None
@@ -122,7 +126,7 @@ def _names(table: RawTable, roles: Roles, taken: dict[str, str]) -> tuple[str, .
     if labels is not None and len(set(labels)) > 1:
         pairs = set(zip(labels, names, strict=True))
         if len(pairs) > len(set(names)):
-            taken["name"] += ", with the group in front, as names occur in several"
+            assumptions["name"] += ", with the group in front, as names occur in several"
             return tuple(f"{label}::{name}" for label, name in zip(labels, names, strict=True))
     return tuple(names)
 
@@ -132,7 +136,7 @@ class _UnitOf:
     """A unit, and who says it."""
 
     unit: str
-    said: str
+    source: str
 
 
 def _values(
@@ -140,7 +144,7 @@ def _values(
     roles: Roles,
     axes: Sequence[str],
     options: ReadOptions,
-    taken: dict[str, str],
+    assumptions: dict[str, str],
     problems: ExportProblems,
 ) -> FloatArray:
     """(N, d) in mm, attitude in rad."""
@@ -160,7 +164,7 @@ def _values(
             continue
         for axis in of_kind:
             # a unit in the name stands in the name
-            taken[axis] += f", {known.unit}" + ("" if roles.unit.get(axis) else f" {known.said}")
+            assumptions[axis] += f", {known.unit}" + ("" if roles.unit.get(axis) else f" {known.source}")
             columns.append(raw[axis] * factor)
     return np.column_stack(columns)
 
@@ -176,30 +180,32 @@ def _unit(
 ) -> _UnitOf | None:
     """The one unit of these axes, as all who name one agree; None, with a problem, where none is named or two are."""
     option, flag = (options.unit, "--unit") if wanted == "mm" else (options.angle_unit, "--angle-unit")
-    said: dict[str, str] = {}
+    sources: dict[str, str] = {}
     for axis in axes:
         if roles.unit.get(axis):
-            said.setdefault(roles.unit[axis], f"by the name of {axis}" if "columns" not in roles.why[axis] else "given")
+            sources.setdefault(
+                roles.unit[axis], f"by the name of {axis}" if "columns" not in roles.why[axis] else "given"
+            )
     if wanted == "mm" and table.unit:
-        said.setdefault(unit_named(table.unit) or table.unit, "by the file's header")
+        sources.setdefault(unit_named(table.unit) or table.unit, "by the file's header")
     if option:
-        said.setdefault(unit_named(option) or option, f"by {flag}")
+        sources.setdefault(unit_named(option) or option, f"by {flag}")
     without = [axis for axis in axes if not roles.unit.get(axis)]
-    wrong = [unit for unit in said if unit_factor(unit, wanted) is None]
+    wrong = [unit for unit in sources if unit_factor(unit, wanted) is None]
     kind = "length" if wanted == "mm" else "angle"
     allowed = _LENGTH_UNITS if wanted == "mm" else "rad, mrad, deg, arcsec"
     if wrong:
-        problems.add(table.header_line, f"is no unit of {kind}", f"{wrong[0]}, {said[wrong[0]]}", allowed)
-    elif len(said) > 1:
+        problems.add(table.header_line, f"is no unit of {kind}", f"{wrong[0]}, {sources[wrong[0]]}", allowed)
+    elif len(sources) > 1:
         problems.add(
             table.header_line,
-            f"units are mixed: {', '.join(f'{unit} {who}' for unit, who in said.items())}",
+            f"units are mixed: {', '.join(f'{unit} {who}' for unit, who in sources.items())}",
             allowed="one unit",
             next_step="export in one unit, or leave out the option that differs",
         )
-    elif said and len(without) not in (0, len(axes)) and not option and not table.unit:
+    elif sources and len(without) not in (0, len(axes)) and not option and not table.unit:
         problems.add(table.header_line, f"{', '.join(without)} has no unit, where others have one", allowed=allowed)
-    elif not said:
+    elif not sources:
         problems.ask(
             f"no unit of {axes[0]} in its name, nor in the file",
             _spans(axes, raw, wanted),
@@ -207,7 +213,7 @@ def _unit(
             table.header_line,
         )
     else:
-        return _UnitOf(*next(iter(said.items())))
+        return _UnitOf(*next(iter(sources.items())))
     return None
 
 

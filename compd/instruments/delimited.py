@@ -40,18 +40,18 @@ def read_delimited(text: TextFile, options: ReadOptions, shape: str | None = Non
     shape : of the table; None for "csv" or "blanks", as the delimiter is.
     """
     problems = ExportProblems(text.path)
-    found = _rows_and_comments(text.lines)
-    delimiter = _take_delimiter(found, options)
-    if not found.rows:
-        problems.add(0, "has no rows", f"{len(found.comments)} lines of comments", "rows of numbers")
+    file_rows = _rows_and_comments(text.lines)
+    delimiter = _take_delimiter(file_rows, options)
+    if not file_rows.rows:
+        problems.add(0, "has no rows", f"{len(file_rows.comments)} lines of comments", "rows of numbers")
     problems.check()
     # a delimiter at the end of every line is the end of its last cell
-    if delimiter.strip() and all(row.rstrip(" ").endswith(delimiter) for row in found.rows[1:] or found.rows):
-        found.rows = [row.rstrip(" ").removesuffix(delimiter) for row in found.rows]
-    count, above = _count_cells(found, delimiter, problems)
+    if delimiter.strip() and all(row.rstrip(" ").endswith(delimiter) for row in file_rows.rows[1:] or file_rows.rows):
+        file_rows.rows = [row.rstrip(" ").removesuffix(delimiter) for row in file_rows.rows]
+    count, above = _count_cells(file_rows, delimiter, problems)
     problems.check()
-    columns, line = _split(found, delimiter, count, above)
-    header = _take_header(found, columns, line, delimiter, count, above, problems)
+    columns, line = _split(file_rows, delimiter, count, above)
+    header = _take_header(file_rows, columns, line, delimiter, count, above, problems)
     columns, line, left_out = _drop_headers(columns, line, header, problems)
     problems.check()
     number_columns = [k for k, cells in enumerate(columns) if is_number_column(cells)]
@@ -65,8 +65,8 @@ def read_delimited(text: TextFile, options: ReadOptions, shape: str | None = Non
     assumed["header"] = f"line {header.line}" if header.names else "none"
     if header.above:
         assumed["not read"] = f"{header.above} line{'s' * (header.above != 1)} above the table"
-    if found.comments:
-        assumed["comments"] = f"{len(found.comments)} line{'s' * (len(found.comments) != 1)}"
+    if file_rows.comments:
+        assumed["comments"] = f"{len(file_rows.comments)} line{'s' * (len(file_rows.comments) != 1)}"
     return RawTable(
         path=text.path,
         shape=shape or ("blanks" if delimiter in (BLANKS, WIDE_BLANKS) else "csv"),
@@ -74,7 +74,7 @@ def read_delimited(text: TextFile, options: ReadOptions, shape: str | None = Non
         line=line,
         header=header.names,
         header_line=header.line,
-        unit=_unit_in_comments(found, problems),
+        unit=_unit_in_comments(file_rows, problems),
         decimal=mark,
         assumed=assumed,
         left_out=left_out,
@@ -93,60 +93,62 @@ class _Header:
 
 
 def _rows_and_comments(lines: Sequence[str]) -> _Rows:
-    found = _Rows()
+    file_rows = _Rows()
     gone = set()
     # of a million lines few begin so; an empty line "begins" with any of them
     for i in [i for i, line in enumerate(map(str.lstrip, lines)) if line[:1] in _MAY_BE_NO_ROW]:
         stripped = lines[i].strip()
         if stripped.startswith(_COMMENT):
-            found.comments.append((i + 1, stripped))
+            file_rows.comments.append((i + 1, stripped))
         if not stripped or stripped.startswith(_COMMENT):
             gone.add(i)
-    found.rows = [line for i, line in enumerate(lines) if i not in gone]
-    found.number = [i for i in range(1, len(lines) + 1) if i - 1 not in gone]
-    return found
+    file_rows.rows = [line for i, line in enumerate(lines) if i not in gone]
+    file_rows.number = [i for i in range(1, len(lines) + 1) if i - 1 not in gone]
+    return file_rows
 
 
-def _take_delimiter(found: _Rows, options: ReadOptions) -> str:
+def _take_delimiter(file_rows: _Rows, options: ReadOptions) -> str:
     """The delimiter; lines with a semicolon in front become comments where it is none, empty rows are dropped."""
-    if not found.rows:
+    if not file_rows.rows:
         return BLANKS
-    separator = _SEPARATOR_LINE.fullmatch(found.rows[0].strip())
+    separator = _SEPARATOR_LINE.fullmatch(file_rows.rows[0].strip())
     if separator and separator[1] in NAMES:
-        del found.rows[0], found.number[0]
+        del file_rows.rows[0], file_rows.number[0]
         delimiter = separator[1]
     else:
-        table = [row for row, bare in zip(found.rows, map(str.lstrip, found.rows), strict=True) if bare[0] != ";"]
+        table = [
+            row for row, bare in zip(file_rows.rows, map(str.lstrip, file_rows.rows), strict=True) if bare[0] != ";"
+        ]
         delimiter = find_delimiter(table, options.decimal) if table else ","
     if options.shape == "blanks" and delimiter not in (BLANKS, WIDE_BLANKS):
         delimiter = BLANKS
     if delimiter != ";":
-        marked = [i for i, row in enumerate(map(str.lstrip, found.rows)) if row[:1] == ";"]
-        found.comments += [(found.number[i], found.rows[i].strip()) for i in marked]
-        found.comments.sort()
-        _drop(found, marked)
+        marked = [i for i, row in enumerate(map(str.lstrip, file_rows.rows)) if row[:1] == ";"]
+        file_rows.comments += [(file_rows.number[i], file_rows.rows[i].strip()) for i in marked]
+        file_rows.comments.sort()
+        _drop(file_rows, marked)
     between = delimiter + " \t"
-    _drop(found, [i for i, row in enumerate(found.rows) if row[0] in between and not row.strip(between)])
+    _drop(file_rows, [i for i, row in enumerate(file_rows.rows) if row[0] in between and not row.strip(between)])
     return delimiter
 
 
-def _drop(found: _Rows, places: Sequence[int]) -> None:
+def _drop(file_rows: _Rows, places: Sequence[int]) -> None:
     if places:
         gone = set(places)
-        found.rows = [row for i, row in enumerate(found.rows) if i not in gone]
-        found.number = [number for i, number in enumerate(found.number) if i not in gone]
+        file_rows.rows = [row for i, row in enumerate(file_rows.rows) if i not in gone]
+        file_rows.number = [number for i, number in enumerate(file_rows.number) if i not in gone]
 
 
-def _count_cells(found: _Rows, delimiter: str, problems: ExportProblems) -> tuple[int, int]:
+def _count_cells(file_rows: _Rows, delimiter: str, problems: ExportProblems) -> tuple[int, int]:
     """Number of cells that most rows have, and how many lines of prose stand above the table."""
-    if delimiter in (BLANKS, WIDE_BLANKS) or '"' in "".join(found.rows):
-        counts = [len(split_cells(row, delimiter)) for row in found.rows]
+    if delimiter in (BLANKS, WIDE_BLANKS) or '"' in "".join(file_rows.rows):
+        counts = [len(split_cells(row, delimiter)) for row in file_rows.rows]
     else:
-        counts = [row.count(delimiter) + 1 for row in found.rows]
+        counts = [row.count(delimiter) + 1 for row in file_rows.rows]
     count = Counter(counts).most_common(1)[0][0]
     above = 0
     while above < len(counts) and counts[above] != count:
-        cells = split_cells(found.rows[above], delimiter)
+        cells = split_cells(file_rows.rows[above], delimiter)
         if len(cells) > 1 and any(map(is_number, cells)):
             break
         above += 1
@@ -155,9 +157,9 @@ def _count_cells(found: _Rows, delimiter: str, problems: ExportProblems) -> tupl
         last = "; the last line seems to be cut off" if i == len(counts) - 1 and counts[i] < count else ""
         more = f" ({len(wrong)} lines like this)" if len(wrong) > 1 and i == wrong[0] else ""
         problems.add(
-            found.number[i],
+            file_rows.number[i],
             f"has {_cells(counts[i])} where the others have {count}{last}{more}",
-            found.rows[i].strip(),
+            file_rows.rows[i].strip(),
             f"{_cells(count)}, {NAMES[delimiter]} between them",
             "mend or delete the line",
         )
@@ -168,10 +170,10 @@ def _cells(count: int) -> str:
     return f"{count} cell{'s' * (count != 1)}"
 
 
-def _split(found: _Rows, delimiter: str, count: int, above: int) -> tuple[list[list[str]], IntArray]:
+def _split(file_rows: _Rows, delimiter: str, count: int, above: int) -> tuple[list[list[str]], IntArray]:
     """The columns of the rows below the prose, and the lines that they are from."""
-    rows = found.rows[above:]
-    line = np.array(found.number[above:], dtype=np.int64)
+    rows = file_rows.rows[above:]
+    line = np.array(file_rows.number[above:], dtype=np.int64)
     if delimiter == BLANKS:
         flat = " ".join(rows).split()
     elif delimiter == WIDE_BLANKS or '"' in "".join(rows):
@@ -185,7 +187,7 @@ def _split(found: _Rows, delimiter: str, count: int, above: int) -> tuple[list[l
 
 
 def _take_header(
-    found: _Rows,
+    file_rows: _Rows,
     columns: Sequence[Sequence[str]],
     line: IntArray,
     delimiter: str,
@@ -198,11 +200,11 @@ def _take_header(
     while top < len(line) and not any(is_number(cells[top]) or is_stamp(cells[top]) for cells in columns):
         top += 1
     if top == len(line):
-        problems.add(int(line[0]), "no row has a number", found.rows[above].strip(), "rows of numbers")
+        problems.add(int(line[0]), "no row has a number", file_rows.rows[above].strip(), "rows of numbers")
         return _Header(None, 0, 0, above)
     tops = [tuple(cells[i] for cells in columns) for i in range(top)]
     if not tops:
-        return _header_above(found, line, delimiter, count, above, problems)
+        return _header_above(file_rows, line, delimiter, count, above, problems)
     units = [i for i in range(1, top) if _is_unit_row(tops[i])]
     named = [i for i in range(top) if i not in units]
     first = max(named, key=lambda i: (sum(map(bool, tops[i])), -i))
@@ -218,23 +220,23 @@ def _take_header(
 
 
 def _header_above(
-    found: _Rows, line: IntArray, delimiter: str, count: int, above: int, problems: ExportProblems
+    file_rows: _Rows, line: IntArray, delimiter: str, count: int, above: int, problems: ExportProblems
 ) -> _Header:
     """A header between other marks than the rows: with blanks in its names, or in a comment. None is refused, if it
     has another number of names than the rows have cells."""
     if above:
-        names = split_header(found.rows[above - 1], delimiter, count)
-        if len(names) == count and found.number[above - 1] < line[0]:
-            return _Header(tuple(names), found.number[above - 1], 0, above - 1)
+        names = split_header(file_rows.rows[above - 1], delimiter, count)
+        if len(names) == count and file_rows.number[above - 1] < line[0]:
+            return _Header(tuple(names), file_rows.number[above - 1], 0, above - 1)
         if len(names) > 1 and delimiter not in (BLANKS, WIDE_BLANKS):
             problems.add(
-                found.number[above - 1],
+                file_rows.number[above - 1],
                 f"the line above the rows has {_cells(len(names))}, the rows have {count}",
-                found.rows[above - 1].strip(),
+                file_rows.rows[above - 1].strip(),
                 "a name for every column",
                 "mend the header; where it is none, delete it or put # in front",
             )
-    last = [(number, text) for number, text in found.comments if number < line[0]][-1:]
+    last = [(number, text) for number, text in file_rows.comments if number < line[0]][-1:]
     for number, text in last:
         # "#;X;Y" has a first column of numbers
         numbered = delimiter.strip() and text.startswith("#" + delimiter)
@@ -242,7 +244,7 @@ def _header_above(
         names = split_header(bare, delimiter, count)
         # one column: any word would be its name
         if len(names) == count > 1 and not any(map(is_number, names)):
-            found.comments.remove((number, text))
+            file_rows.comments.remove((number, text))
             return _Header(tuple(names), number, 0, above)
     return _Header(None, 0, 0, above)
 
@@ -308,10 +310,10 @@ def _check_last_cell(
         )
 
 
-def _unit_in_comments(found: _Rows, problems: ExportProblems) -> str:
+def _unit_in_comments(file_rows: _Rows, problems: ExportProblems) -> str:
     """The unit of lengths that a comment names; "" for none. Two that differ are refused."""
     units: dict[str, int] = {}
-    for number, text in found.comments:
+    for number, text in file_rows.comments:
         for match in _UNIT_COMMENT.finditer(text):
             unit = unit_named(match[1])
             if unit in ("mm", "um", "nm", "cm", "m", "inch", "ft"):

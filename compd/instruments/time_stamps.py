@@ -189,9 +189,9 @@ class _Parsed:
             self.dates.clear()
             self.line_of_date.clear()
             return None
-        found = [known[part[0]] for part in parts]
-        self.date = np.array([value[0] for value in found if value], dtype=np.int64)
-        minute_s = np.array([value[1] for value in found if value], dtype=np.float64)
+        values = [known[part[0]] for part in parts]
+        self.date = np.array([value[0] for value in values if value], dtype=np.int64)
+        minute_s = np.array([value[1] for value in values if value], dtype=np.float64)
         second_s = list(map(float, "\n".join(seconds).replace(",", ".").split("\n")))
         self.second_s = minute_s + np.array(second_s, dtype=np.float64)
         self.decimals = max(0, max(map(len, seconds)) - 3)
@@ -203,10 +203,10 @@ class _Parsed:
         for i, cell in enumerate(cells):
             if cell not in known:
                 known[cell] = self._parse(cell, int(line[i]))
-        found = list(map(known.__getitem__, cells))
-        self.date = np.array([-1 if value is None else value[0] for value in found], dtype=np.int64)
-        self.second_s = np.array([np.nan if value is None else value[1] for value in found], dtype=np.float64)
-        return [i for i, value in enumerate(found) if value is None]
+        values = list(map(known.__getitem__, cells))
+        self.date = np.array([-1 if value is None else value[0] for value in values], dtype=np.int64)
+        self.second_s = np.array([np.nan if value is None else value[1] for value in values], dtype=np.float64)
+        return [i for i, value in enumerate(values) if value is None]
 
     def _parse(self, cell: str, line: int) -> tuple[int, float] | None:
         match = _STAMP.fullmatch(cell)

@@ -100,18 +100,18 @@ def _ids_of_names(ids: Sequence[str], names: Sequence[str]) -> dict[str, str]:
     """Name -> the id that it means; names without one are left out."""
     by_text = {own.strip().casefold(): own for own in ids if own}
     different = list(dict.fromkeys(names))
-    found = {name: by_text[name.strip().casefold()] for name in different if name.strip().casefold() in by_text}
+    id_by_name = {name: by_text[name.strip().casefold()] for name in different if name.strip().casefold() in by_text}
     by_number = {int(own): own for own in by_text.values() if own.isdecimal()}
     if len(by_number) < len(by_text):
-        return found
+        return id_by_name
     numbers = {
-        name: int(match[1]) for name in different if name not in found and (match := _LAST_NUMBER.fullmatch(name))
+        name: int(match[1]) for name in different if name not in id_by_name and (match := _LAST_NUMBER.fullmatch(name))
     }
     for name, number in numbers.items():
-        alone = list(numbers.values()).count(number) == 1 and by_number.get(number) not in found.values()
+        alone = list(numbers.values()).count(number) == 1 and by_number.get(number) not in id_by_name.values()
         if number in by_number and alone:
-            found[name] = by_number[number]
-    return found
+            id_by_name[name] = by_number[number]
+    return id_by_name
 
 
 def check_names(

@@ -58,14 +58,14 @@ def assign_by_order(expected_mm: FloatArray, measured_mm: FloatArray, sigma_mm: 
     for window in sorted({min(window, most) for window in _WINDOWS}, reverse=True):
         starts = _starts(place, point, window)
         grown = [_grown(expected_mm, measured_mm, int(stop[i]), int(group[j]), window, repeat_mm) for _, i, j in starts]
-        found = [assignment for assignment in grown if assignment is not None]
-        result = _decided(found, expected_mm, measured_mm) if found else None
+        assignments = [assignment for assignment in grown if assignment is not None]
+        result = _decided(assignments, expected_mm, measured_mm) if assignments else None
         if isinstance(result, Assignment) or (result is not None and result.point is None):
             return result
         mirrored = measured_mm.shape[1] == 3 and any(
             _grown(expected_mm, -measured_mm, int(stop[i]), int(group[j]), window, repeat_mm) for _, i, j in starts
         )
-        if not found and mirrored:
+        if not assignments and mirrored:
             return NoAssignment(
                 "the points are a mirror image of the dwells", "a left-handed frame", "x, y, z of a right-handed frame"
             )
@@ -137,9 +137,11 @@ def _grown(
     )
 
 
-def _decided(found: list[Assignment], expected_mm: FloatArray, measured_mm: FloatArray) -> Assignment | NoAssignment:
+def _decided(
+    assignments: list[Assignment], expected_mm: FloatArray, measured_mm: FloatArray
+) -> Assignment | NoAssignment:
     """The best of what was found, if it is clearly better than all others and right."""
-    different = {tuple(assignment.dwell.tolist()): assignment for assignment in found}
+    different = {tuple(assignment.dwell.tolist()): assignment for assignment in assignments}
     ordered = sorted(different.values(), key=lambda each: (-each.count, each.rms_mm))
     best = ordered[0]
     points = np.flatnonzero(best.dwell >= 0)

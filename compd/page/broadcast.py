@@ -46,7 +46,7 @@ class Broadcast:
         self._machine: Any = None
         self._live = self._slow = b""
         self._slow_count = 0
-        self._made = asyncio.Condition()
+        self._new_events = asyncio.Condition()
         self._ended = False
 
     async def run(self) -> None:
@@ -72,12 +72,12 @@ class Broadcast:
             self.history.note(unix_s, None if readings is None else readings["setpoint"], self._link.budget)
             self.moments.note(unix_s, data)
             self.traces.note(unix_s, live.get("gauges", ()))
-        async with self._made:
+        async with self._new_events:
             self._live = encoded("live", data)
             if slow:
                 self._slow = encoded("slow", plain(self._slow_event()))
                 self._slow_count += 1
-            self._made.notify_all()
+            self._new_events.notify_all()
 
     def end(self) -> None:
         """End every browser's events within a tick, so that the server can stop; called from a signal's handler too."""
@@ -90,8 +90,8 @@ class Broadcast:
             yield encoded("hello", plain(hello))
             machine, slow_count = self._machine, -1
             while not self._ended:
-                async with self._made:
-                    await self._made.wait()
+                async with self._new_events:
+                    await self._new_events.wait()
                 if self._machine is not machine:
                     machine = self._machine
                     yield encoded("machine", plain({"machine": machine}))
@@ -152,7 +152,7 @@ def gauges(readings: Event, columns: list[dict[str, Any]]) -> list[dict[str, Any
     machine zero to count from.  `age_s` : of a value.  `fault` : why there is none, or why it must not be used.
     """
     zero = readings.get("zero", {}).get("readings_mm", {})
-    shown: list[dict[str, Any]] = []
+    gauges: list[dict[str, Any]] = []
     for column in columns:
         reading = readings["readings"][column["channel"]]
         gauge: dict[str, Any] = {}
@@ -169,8 +169,8 @@ def gauges(readings: Event, columns: list[dict[str, Any]]) -> list[dict[str, Any
             gauge["fault"] = reading["quality"]
             if "detail" in reading:
                 gauge["detail"] = reading["detail"]
-        shown.append(gauge)
-    return shown
+        gauges.append(gauge)
+    return gauges
 
 
 def plain(event: Event) -> bytes:

@@ -87,13 +87,13 @@ class Guard:
         own = origin in self._origins and urlsplit(origin).netloc == host
         if not own and (not looks or "origin" in headers):
             return PlainTextResponse("requests come from this server's own pages only", 403)
-        given = connection.query_params.get("token")
-        if given is not None:
-            if self._known(given) is None:
+        token_text = connection.query_params.get("token")
+        if token_text is not None:
+            if self._known(token_text) is None:
                 return PlainTextResponse(_NEEDS_TOKEN, 403)
             response = RedirectResponse(connection.url.path, 303)
             secure = f"https://{host}" in self._origins
-            response.set_cookie(self._cookie, given, httponly=True, samesite="strict", secure=secure)
+            response.set_cookie(self._cookie, token_text, httponly=True, samesite="strict", secure=secure)
             return response
         token = self._known(connection.cookies.get(self._cookie, ""))
         if token is None:
@@ -101,9 +101,9 @@ class Guard:
         connection.scope["token"] = token
         return None
 
-    def _known(self, given: str) -> Token | None:
-        """The token that was given; each is compared in the same time."""
-        digest = hashed(given)
+    def _known(self, token_text: str) -> Token | None:
+        """The token of that text; each is compared in the same time."""
+        digest = hashed(token_text)
         known = [token for token in self._tokens if hmac.compare_digest(token.sha256, digest)]
         return known[0] if known else None
 
@@ -111,10 +111,10 @@ class Guard:
 def _with_headers(send: Send) -> Send:
     async def send_with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
-            given = list(message.get("headers", []))
-            names = {name.lower() for name, _ in given}
+            headers = list(message.get("headers", []))
+            names = {name.lower() for name, _ in headers}
             own = [(name.lower().encode(), value.encode()) for name, value in _HEADERS.items()]
-            message = {**message, "headers": [*given, *(header for header in own if header[0] not in names)]}
+            message = {**message, "headers": [*headers, *(header for header in own if header[0] not in names)]}
         await send(message)
 
     return send_with_headers

@@ -25,7 +25,7 @@ class ModelEffects:
 
     def __init__(self) -> None:
         self._models: object = None
-        self._seen: Message | None = None
+        self._last_budget: Message | None = None
         self._rows: deque[tuple[float, FloatArray, FloatArray]] = deque()
 
     def note(self, budget: Message | None, models: Message | None) -> None:
@@ -33,10 +33,10 @@ class ModelEffects:
         if models != self._models:
             self._models = models
             self._rows.clear()
-        elif budget is not None and budget is not self._seen and models is not None and "tip_um" in budget:
+        elif budget is not None and budget is not self._last_budget and models is not None and "tip_um" in budget:
             self._put(budget)
-        # a budget that came before the models were told to be others may be of those before
-        self._seen = budget
+        # a budget that came before the change of models may be of those before
+        self._last_budget = budget
 
     def _put(self, budget: Message) -> None:
         by_cause = {cause: np.array(moved_um) for cause, moved_um in budget["tip_um"].items()}

@@ -40,11 +40,11 @@ class ModelFiles:
         return None if path is None else str(path)
 
     def _paths(self, models: Message | None) -> dict[str, Path]:
-        found = {path.name: path for path in self._in_directory()}
+        paths = {path.name: path for path in self._in_directory()}
         for role, path in _running(models):
-            if path not in found.values():
-                found[f"{role}: {path.name}"] = path
-        return found
+            if path not in paths.values():
+                paths[f"{role}: {path.name}"] = path
+        return paths
 
     def _in_directory(self) -> list[Path]:
         if self.directory is None:

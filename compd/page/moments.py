@@ -56,8 +56,8 @@ class Moments:
 
     def nearest(self, time_s: float) -> bytes | None:
         """The event that is nearest to `time_s`, as it was noted; None before the first."""
-        found = [kept for kept in (kept.nearest(time_s) for kept in self._kept) if kept is not None]
-        return zlib.decompress(min(found, key=lambda kept: abs(kept[0] - time_s))[1]) if found else None
+        moments = [moment for moment in (kept.nearest(time_s) for kept in self._kept) if moment is not None]
+        return zlib.decompress(min(moments, key=lambda moment: abs(moment[0] - time_s))[1]) if moments else None
 
     @property
     def size_bytes(self) -> int:

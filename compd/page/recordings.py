@@ -46,13 +46,13 @@ class Recordings:
 
     def listed(self) -> list[dict[str, Any]]:
         """Every part of every recording, the newest first."""
-        found = []
+        parts = []
         for path in recording_tables(self.directory).values():
             try:
                 stat = path.stat()
             except FileNotFoundError:  # somebody has just removed it
                 continue
-            found.append(
+            parts.append(
                 {
                     "name": path.stem,
                     "bytes": stat.st_size,
@@ -61,7 +61,7 @@ class Recordings:
                     "command": f"cp {shlex.quote(str(path.with_suffix('')))}.* .",
                 }
             )
-        return sorted(found, key=lambda part: str(part["changed"]), reverse=True)
+        return sorted(parts, key=lambda part: str(part["changed"]), reverse=True)
 
     def command(self, name: str, burst_s: float | None) -> list[str]:
         """The command line that records."""

@@ -10,7 +10,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 
-from compd.json_text import nan_to_null
+from compd.text.json_text import nan_to_null
 
 LONGEST_BODY_BYTES = 8192
 LOOKS_ONLY = "this browser may look only"

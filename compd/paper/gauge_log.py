@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import compensate_cmm
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.machine_builder import build_model
 from compd.simulation.truth.frame import DISTANCES

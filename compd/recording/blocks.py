@@ -16,8 +16,8 @@ from compd.configuration import Configuration
 from compd.recording import table_file
 from compd.recording.recording import Recording
 from compd.recording.recording_builder import RecordingBuilder
-from compd.recording.table import TableBlock
 from compd.recording.table_file import table_blocks, table_path
+from compd.recording.tables.table import TableBlock
 
 BLOCK_ROWS = 100_000
 

@@ -25,8 +25,8 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.recording.columns import DISTANCE_COLUMN, ID_COLUMNS
-from compd.recording.problem_list import ProblemList, rows_text, values_text
-from compd.recording.table import Table
+from compd.recording.tables.problem_list import ProblemList, rows_text, values_text
+from compd.recording.tables.table import Table
 
 
 class Limit(NamedTuple):

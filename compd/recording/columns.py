@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from compd.configuration.operation import FRAME_DISTANCES
-from compd.recording.problem_list import ProblemList
-from compd.recording.table import Table
+from compd.recording.tables.problem_list import ProblemList
+from compd.recording.tables.table import Table
 from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")

@@ -22,9 +22,9 @@ from compd.recording.columns import (
     parse_name,
     scale_columns,
 )
-from compd.recording.problem_list import ProblemList
 from compd.recording.reference import OF_FIXED_PLACES, sigma_key
 from compd.recording.sidecar import EXTERNAL, PLACE, TIME, Sidecar
+from compd.recording.tables.problem_list import ProblemList
 from compd.units import REFERENCE_UNITS
 
 _IN_REFERENCE_UNIT = re.compile(r"(?:reference|model)_(?:[xyz]|link_[1-9]\d*)")

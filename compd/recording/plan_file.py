@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from compd.errors import CompdError, Problem, RecordingError
-from compd.files import write_files
+from compd.files.atomic_files import write_files
 from compd.recording.columns import approach_columns
 
 PURPOSE_COLUMN = "purpose"

@@ -35,10 +35,10 @@ from compd.recording.columns import (
     scale_columns,
 )
 from compd.recording.layout import Layout, machine_problems, read_layout
-from compd.recording.problem_list import ProblemList, rows_text
 from compd.recording.recording import Recording
 from compd.recording.sidecar import Sidecar, read_sidecar
-from compd.recording.table import FIRST_ROW, Table
+from compd.recording.tables.problem_list import ProblemList, rows_text
+from compd.recording.tables.table import FIRST_ROW, Table
 from compd.travel_direction import RowDirections
 from compd.units import UM_PER_MM
 

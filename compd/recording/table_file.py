@@ -7,11 +7,11 @@ from pathlib import Path
 
 from compd.errors import Problem, RecordingError
 from compd.recording.columns import ID_COLUMNS, is_header
-from compd.recording.csv_blocks import csv_blocks, csv_row_count
-from compd.recording.csv_table import read_table
-from compd.recording.parquet_table import ParquetTable
-from compd.recording.problem_list import ProblemList
-from compd.recording.table import Table, TableBlock
+from compd.recording.tables.csv_blocks import csv_blocks, csv_row_count
+from compd.recording.tables.csv_table import read_table
+from compd.recording.tables.parquet_table import ParquetTable
+from compd.recording.tables.problem_list import ProblemList
+from compd.recording.tables.table import Table, TableBlock
 
 CSV, PARQUET = ".csv", ".parquet"
 SUFFIXES = (CSV, PARQUET)

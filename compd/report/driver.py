@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.covariates import Covariate, covariates
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities

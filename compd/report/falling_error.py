@@ -13,8 +13,8 @@ from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import ErrorFall
 from compd.diagnosis.words.phrases import short_name
-from compd.number_text import number_text
 from compd.report.page import COLOURS, style_figure
+from compd.text.number_text import number_text
 
 # Letters of a name on one line beside its bar.
 NAME_WIDTH = 30

@@ -9,10 +9,10 @@ import numpy as np
 from plotly.graph_objects import Figure, Scatter
 
 from compd.comparison.display_unit import format_error
-from compd.model_document import StoredModel
-from compd.number_text import number_text
+from compd.model_file.model_document import StoredModel
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
+from compd.text.number_text import number_text
 
 LEDGER_HEAD = ("", "step", "fitted on", "before", "after", "floor", "unit", "date")
 

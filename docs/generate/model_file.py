@@ -16,8 +16,8 @@ from compd.model.formula.functions import FUNCTIONS, LAG
 from compd.model.formula.keys import FormulaDeclaration, FormulaParameter
 from compd.model.formula.parser import ALLOWED, DEEPEST, LARGEST_EXPONENT
 from compd.model.library import find_effect
-from compd.model_document import EffectEntry, ModelDocument, ModelStep, ParameterEntry
-from compd.model_file import ModelFile
+from compd.model_file.model_document import EffectEntry, ModelDocument, ModelStep, ParameterEntry
+from compd.model_file.model_file import ModelFile
 from docs.generate.markdown import code, codes, escape, fence, heading, join, link, table, term
 from docs.generate.schema import ModelSchema, default_text
 

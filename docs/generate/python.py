@@ -6,7 +6,7 @@ import inspect
 
 import compd
 from compd.client import Client
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import Comparison
 from compd.configuration import Configuration
 from compd.diagnosis.findings import (
@@ -29,8 +29,8 @@ from compd.errors import (
     StateError,
 )
 from compd.model.effect import FittedEffect
-from compd.model_document import ModelStep
-from compd.model_file import EffectNumber, ModelFile
+from compd.model_file.model_document import ModelStep
+from compd.model_file.model_file import EffectNumber, ModelFile
 from compd.simulation.campaign.simulate_campaign import CampaignFiles
 
 # What the functions return, and what is in it.

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from compd.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.model.frame import distances_mm, solve_frame
 from compd.model.kernels.rotation import to_inner
 from compd.model.kinematics import forward_kinematics, inverse_kinematics

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from compd.configuration import load
 from compd.errors import CompdError, ConfigurationError, RecordingError
 from compd.model.library.effects_file import load_effects
-from compd.model_file import read_model_file
+from compd.model_file.model_file import read_model_file
 from compd.recording.blocks import recording_blocks
 from compd.recording.convert import convert_recording
 from compd.recording.reader import read_recording

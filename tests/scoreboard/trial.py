@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.open import open_recording
 from compd.comparison.shape_search import search_constants

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from compd.comparison.align_recording import align_recording
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.align_recording import align_recording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.comparison import Comparison
 from compd.comparison.noise_floor import NoiseFloor

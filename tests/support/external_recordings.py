@@ -10,8 +10,8 @@ import numpy as np
 import yaml
 
 from compd.arrays import FloatArray
-from compd.comparison.align_recording import align_recording
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.align_recording import align_recording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.model.effect import Effect
 from compd.model.formula.declaration import formula_effect
 from compd.model.motion import Movement

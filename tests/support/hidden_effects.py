@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.align_recording import align_recording
-from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.align_recording import align_recording
+from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
 from compd.model.effect import FittedEffect

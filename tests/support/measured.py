@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from compd.comparison.align_recording import align_recording
-from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.align_recording import align_recording
+from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.configuration import Configuration, load
 from compd.configuration.shipped import shipped_configuration
 from compd.model.effect import FittedEffect

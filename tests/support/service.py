@@ -10,7 +10,7 @@ import threading
 import numpy as np
 
 from compd.clock import MonotonicClock
-from compd.compensation_values import CorrectionShares
+from compd.compensation.values import CorrectionShares
 from compd.configuration.operation import SocketSettings
 from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands

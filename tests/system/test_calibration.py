@@ -12,7 +12,7 @@ import pytest
 from scipy.stats import kstest
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.fit import fit, initial_effect
 from compd.diagnosis.diagnose import diagnose
 from compd.model.effect import FittedEffect

@@ -225,14 +225,14 @@ def learn(
 
     What the replies leave open is asked, each question with the option that answers it.
     """
-    from compd.commissioning.answers import Answers, error_reply, range_of
-    from compd.commissioning.capture import capture_live, read_capture, saved_capture
-    from compd.commissioning.describe import learn_gauge
+    from compd.commissioning.gauge_description.answers import Answers, error_reply, range_of
+    from compd.commissioning.gauge_description.capture import capture_live, read_capture, saved_capture
+    from compd.commissioning.gauge_description.describe import learn_gauge
+    from compd.commissioning.gauge_description.read_back import rounds
+    from compd.commissioning.gauge_description.reply_columns import DescriptionError
     from compd.commissioning.gauge_file import LEARNED_GAUGE, gauge_file_text
     from compd.commissioning.open_gauge import byte_line_settings
-    from compd.commissioning.read_back import rounds
-    from compd.commissioning.reply_columns import DescriptionError
-    from compd.output_file import check_replaceable
+    from compd.files.output_file import check_replaceable
 
     if to is not None:
         check_replaceable(to, (f"{LEARNED_GAUGE}:".encode(),), "a description of a gauge", overwrite)

@@ -11,7 +11,7 @@ import typer
 from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from compd.comparison.aligned_recording import AlignedRecording
+    from compd.comparison.alignment.aligned_recording import AlignedRecording
 
 
 def diagnose(

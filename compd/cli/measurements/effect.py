@@ -12,13 +12,13 @@ from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from compd.comparison.aligned_recording import AlignedRecording
+    from compd.comparison.alignment.aligned_recording import AlignedRecording
     from compd.configuration import Configuration
     from compd.diagnosis.model_changes import Refinement
     from compd.errors import Problem
     from compd.model.effect import Effect
-    from compd.model_document import Declaration
-    from compd.model_file import ModelFile
+    from compd.model_file.model_document import Declaration
+    from compd.model_file.model_file import ModelFile
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
 RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv or NAME.parquet.")]
@@ -127,7 +127,7 @@ def fit(
 def undo(model: ModelOption) -> None:
     """Take back the last step; undo again for the step before it. The ledger keeps both."""
     from compd.diagnosis.model_changes import undo as undo_step
-    from compd.model_document import read_stored, write_stored
+    from compd.model_file.model_document import read_stored, write_stored
 
     after = undo_step(read_stored(model), str(model))
     write_stored(model, after)
@@ -160,7 +160,7 @@ def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinemen
 
 
 def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:
-    from compd.model_file import read_model_file
+    from compd.model_file.model_file import read_model_file
 
     return read_model_file(path, aligned.recording.machine, aligned.rows.links)
 

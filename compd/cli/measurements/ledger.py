@@ -23,7 +23,7 @@ def ledger(
     from rich.console import Console
     from rich.table import Table
 
-    from compd.model_document import read_stored
+    from compd.model_file.model_document import read_stored
     from compd.report.ledger_page import LEDGER_HEAD, ledger_rows, write_ledger_page
     from compd.report.page import check_page_path
     from compd.report.terminal_table import keep_words_whole

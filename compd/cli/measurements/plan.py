@@ -75,7 +75,7 @@ def plan(
     from compd.api.measurements import plan_measurement
     from compd.comparison.open import open_recording
     from compd.diagnosis.planning.plan_formats import MARKS
-    from compd.output_file import check_replaceable
+    from compd.files.output_file import check_replaceable
     from compd.recording.plan_file import PURPOSE_COLUMN
 
     if out is not None:

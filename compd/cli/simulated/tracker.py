@@ -61,9 +61,9 @@ def tracker(
     from datetime import datetime
 
     from compd.errors import CompdError, Problem
-    from compd.files import write_files
+    from compd.files.atomic_files import write_files
+    from compd.files.output_file import check_replaceable
     from compd.instruments.writers.registry import FORMATS
-    from compd.output_file import check_replaceable
     from compd.simulation.wires.looks import Looks
 
     written = FORMATS[shape.value]

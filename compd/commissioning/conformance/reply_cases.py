@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from compd.commissioning.conformance import faults
@@ -51,6 +51,10 @@ class _Reply:
     others: Mapping[str, Sequence[bytes]]
 
 
+# Forgeries of a reply, and the channels that a driver must not take out of all of them.
+ForgedSet = tuple[Sequence[Forgery], Iterable[str]]
+
+
 def _forged(session: ConformanceSession, subject: Subject) -> CaseResult:
     case = "wrong unit, function, length"
     if not subject.registers:
@@ -80,69 +84,50 @@ def _errors(session: ConformanceSession, subject: Subject) -> CaseResult:
 
 def _unlisted_errors(session: ConformanceSession, subject: Subject) -> CaseResult:
     """Texts without a number, and numbers without digits: errors that no list has."""
-    case = "errors that no list has"
-    if why_not := _why_not(subject):
-        return CaseResult(case, "", why_not, "-")
-    complaints: list[str] = []
-    tried = 0
-    for reply in _replies(session):
+
+    def forgeries(reply: _Reply) -> Iterator[ForgedSet]:
         if not reply.text.is_text:
-            continue
-        forgeries = list(reply.text.errors())
-        forgeries += [
+            return
+        listed = [
             Forgery(f"{text!r} in its place", text)
-            for listed in subject.error_replies
-            for text in _other_digits(listed)
+            for error_reply in subject.error_replies
+            for text in _other_digits(error_reply)
             if text not in subject.error_replies and len(text) != len(reply.text.base)  # one of its length is a value
         ]
-        for forgery in forgeries:
-            complaints += _taken(session, reply, forgery, reply.channels)
-        tried += len(forgeries)
+        for forgery in [*reply.text.errors(), *listed]:
+            yield [forgery], reply.channels
         for channel in reply.channels:
             for forgery in reply.text.fields(reply.others[channel]):
-                complaints += _taken(session, reply, forgery, [channel])
-                tried += 1
-    if not tried:
-        return CaseResult(case, "", "its replies are no text", "-")
-    return result_of(case, NO_NUMBER, f"{tried} of them, no number", complaints)
+                yield [forgery], [channel]
+
+    case, none = "errors that no list has", "its replies are no text"
+    return _forged_replies(session, subject, case, forgeries, NO_NUMBER, "no number", none)
 
 
 def _exchanged_characters(session: ConformanceSession, subject: Subject) -> CaseResult:
     """Letters, units of length and signs exchanged in replies that are text."""
-    case = "letters, units and signs exchanged"
-    if why_not := _why_not(subject):
-        return CaseResult(case, "", why_not, "-")
-    complaints: list[str] = []
-    tried = 0
-    for reply in _replies(session):
+
+    def forgeries(reply: _Reply) -> Iterator[ForgedSet]:
         if not reply.text.is_text:
-            continue
-        for forgeries in reply.text.letters():
-            taken = [_taken(session, reply, forgery, reply.channels) for forgery in forgeries]
-            complaints += taken[0] if all(taken) else []  # one of a set of letters may be a judgement
-            tried += len(forgeries)
+            return
+        for letters in reply.text.letters():
+            yield letters, reply.channels  # one of a set of letters may be a judgement
         for forgery in [*reply.text.units(), *reply.text.signs()]:
-            complaints += _taken(session, reply, forgery, reply.channels)
-            tried += 1
-    if not tried:
-        return CaseResult(case, "", "its replies have none", "-")
-    return result_of(case, NO_NUMBER, f"{tried} of them, no wrong number", complaints)
+            yield [forgery], reply.channels
+
+    case, none = "letters, units and signs exchanged", "its replies have none"
+    return _forged_replies(session, subject, case, forgeries, NO_NUMBER, "no wrong number", none)
 
 
 def _wrong_checksums(session: ConformanceSession, subject: Subject) -> CaseResult:
     """Whole replies whose checksum, wherever one is known in them, is wrong in a single byte."""
-    case = "a wrong checksum"
-    if why_not := _why_not(subject):
-        return CaseResult(case, "", why_not, "-")
-    complaints: list[str] = []
-    tried = 0
-    for reply in _replies(session):
+
+    def forgeries(reply: _Reply) -> Iterator[ForgedSet]:
         for forgery in reply.text.checksums():
-            complaints += _taken(session, reply, forgery, reply.channels)
-            tried += 1
-    if not tried:
-        return CaseResult(case, "", "its replies have none that is known here", "-")
-    return result_of(case, DAMAGED, f"{tried} of them, no number", complaints)
+            yield [forgery], reply.channels
+
+    none = "its replies have none that is known here"
+    return _forged_replies(session, subject, "a wrong checksum", forgeries, DAMAGED, "no number", none)
 
 
 def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
@@ -179,6 +164,33 @@ def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
     if not tried:
         return CaseResult(case, "", "the driver has no options that another unit would have otherwise", "-")
     return result_of(case, NO_NUMBER, f"{tried} of them, no wrong number", complaints, undetectable)
+
+
+def _forged_replies(
+    session: ConformanceSession,
+    subject: Subject,
+    case: str,
+    forgeries: Callable[[_Reply], Iterable[ForgedSet]],
+    allowed: frozenset[Quality],
+    passed: str,
+    none: str,
+) -> CaseResult:
+    """Every set of forgeries in the place of its reply; of at least one of a set the driver must take no number.
+
+    allowed : qualities, as of `result_of`. passed : what there was where all is well. none : why there is no forgery.
+    """
+    if why_not := _why_not(subject):
+        return CaseResult(case, "", why_not, "-")
+    complaints: list[str] = []
+    tried = 0
+    for reply in _replies(session):
+        for forged_set, channels in forgeries(reply):
+            taken = [_taken(session, reply, forgery, channels) for forgery in forged_set]
+            complaints += taken[0] if all(taken) else []
+            tried += len(taken)
+    if not tried:
+        return CaseResult(case, "", none, "-")
+    return result_of(case, allowed, f"{tried} of them, {passed}", complaints)
 
 
 def _why_not(subject: Subject) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.comparison import NO_QUANTITY
 from compd.comparison.contributions import deltas_without

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.fit import CONVERGED, LEAST_RMS_UM, STEPS, FitResult
 from compd.comparison.initial_states import initial_states

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.comparison import Comparison
 from compd.comparison.contributions import deltas_without
 from compd.comparison.initial_states import InitialState, initial_states

@@ -9,8 +9,8 @@ from itertools import chain, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from compd.comparison.align_recording import align_observations, recorded_observations
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.align_recording import align_observations, recorded_observations
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.open import recorded_machine
 from compd.configuration import Configuration
 from compd.configuration.shipped import Machine

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.align_recording import align_observations, recorded_observations, session_starts
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.align_recording import align_observations, recorded_observations, session_starts
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.statistics.replicates import MOST_ROWS as MOST_ROWS_OF_VISIT
 from compd.comparison.stream.recording_stream import Block, RecordingStream

@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.period_search import longest_period, promising_constants
 from compd.diagnosis.criteria import Criteria
 from compd.model.effect import ConstantValues, Effect

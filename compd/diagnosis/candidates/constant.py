@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
-from compd.comparison.measured_attitude import LABELS as ATTITUDE_LABELS
-from compd.comparison.measured_attitude import MM_PER_RAD
-from compd.comparison.measured_attitude import UNIT as ATTITUDE_UNIT
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.alignment.measured_attitude import LABELS as ATTITUDE_LABELS
+from compd.comparison.alignment.measured_attitude import MM_PER_RAD
+from compd.comparison.alignment.measured_attitude import UNIT as ATTITUDE_UNIT
 from compd.comparison.statistics.least_squares import column_norms, solve_least_squares
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis

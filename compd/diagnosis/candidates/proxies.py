@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate, searched_parameters, variant
 from compd.model.effect import Effect
 from compd.model.effect_needs import needed_quantities, unmet_needs

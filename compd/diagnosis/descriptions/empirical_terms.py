@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.descriptions.search_covariates import (
     STAYED_THE_SAME,
     Kind,

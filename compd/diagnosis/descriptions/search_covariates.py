@@ -14,7 +14,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.covariates import why_no_covariate
 from compd.units import UNIT_KINDS, unit_of
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.statistics.least_squares import solve_least_squares
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.planning.programme_rows import ProgrammeRows, at_rows
@@ -17,7 +17,7 @@ from compd.model.effect import ConstantValues, Effect, FittedEffect
 from compd.units import UM_PER_MM
 
 
-class Columns(NamedTuple):
+class WhitenedColumns(NamedTuple):
     """Columns in standard deviations of the noise, on the recording's rows (N, m, P) and on possible ones (R, m, P)."""
 
     recorded: FloatArray
@@ -28,7 +28,7 @@ class Contender(NamedTuple):
     """An effect with its numbers, or whatever else may be the cause of an error. theta : (P,)."""
 
     name: str
-    columns: Columns
+    columns: WhitenedColumns
     theta: FloatArray
 
 
@@ -150,5 +150,5 @@ class MeasurementPlanner:
         finite = [np.isfinite(values).all(axis=(1, 2)) for values in columns]
         return np.asarray(self._aligned.usable.mask & np.all(finite, axis=0))
 
-    def _whitened(self, recorded_mm: FloatArray, possible_mm: FloatArray) -> Columns:
-        return Columns(*(values * UM_PER_MM / self._sigma_um[:, None] for values in (recorded_mm, possible_mm)))
+    def _whitened(self, recorded_mm: FloatArray, possible_mm: FloatArray) -> WhitenedColumns:
+        return WhitenedColumns(*(values * UM_PER_MM / self._sigma_um[:, None] for values in (recorded_mm, possible_mm)))

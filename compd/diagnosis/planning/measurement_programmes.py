@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.planning.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
 from compd.errors import Problem, RecordingError
 from compd.model.effect import Effect

@@ -9,7 +9,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.planning.measurement_plan import LEAST_SEPARATION, MeasurementPlan, NextMeasurement, as_factor
 from compd.diagnosis.planning.measurement_planner import MeasurementPlanner
 from compd.diagnosis.planning.measurement_programmes import ProgrammeLimits, machine_programmes, recorded_limits

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.model.observations import Observations
 
 # Times after a step, as shares of the time for which it is watched.

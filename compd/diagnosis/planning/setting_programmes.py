@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.planning.measurement_settings import MOST_COMBINATIONS, Setting, SettingLimits, settings_of
 from compd.diagnosis.planning.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
 from compd.errors import CompdError, Problem

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.errors import Problem, RecordingError
 from compd.recording.recording import BLOCKS
 from compd.recording.sidecar import PLACE, TIME

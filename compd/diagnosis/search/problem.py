@@ -10,7 +10,7 @@ from scipy.linalg import orth
 from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import Comparison
 from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.nuisance import nuisance_columns

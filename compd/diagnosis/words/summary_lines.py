@@ -24,8 +24,8 @@ from compd.diagnosis.words.phrases import (
     was_any_tried,
 )
 from compd.diagnosis.words.summary import CANNOT_KNOW
-from compd.labelled_lines import LabelledText, fit_lines
-from compd.number_text import fall_text, join_words, number_text, percent_text
+from compd.text.labelled_lines import LabelledText, fit_lines
+from compd.text.number_text import fall_text, join_words, number_text, percent_text
 
 # What a terminal shows without scrolling, and its usual width.
 MOST_LINES = 12

@@ -10,7 +10,7 @@ import structlog
 
 from compd.clock import Clock
 from compd.gauge import Quality, bad
-from compd.live.acquisition.polled_gauge import PolledGauge
+from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.pushed_gauge import Heard, Message, PushedGauge, PushedLine
 
 log = structlog.get_logger()
@@ -42,12 +42,21 @@ class PushedRound:
 
     Silence: where a value has been followed by nothing for `stale_after_s`, the channel has a timeout. A device that
     said that it has no value has not to repeat it.
+
+    Attributes
+    ----------
+    duration_s : nan, since nothing is asked.
     """
 
-    def __init__(self, gauges: Sequence[PolledGauge], stale_after_s: Mapping[str, float], clock: Clock) -> None:
-        """`stale_after_s`: by gauge, age (s) from which its readings are not used."""
+    duration_s = math.nan
+
+    def __init__(
+        self, gauges: Sequence[PolledGauge], stale_after_s: Mapping[str, float], clock: Clock, back_off: BackOff
+    ) -> None:
+        """`stale_after_s`: by gauge, age (s) from which its readings are not used. `back_off`: of the line, which any
+        message ends."""
         self._clock = clock
-        self._line: PushedLine | None = None
+        self._back_off = back_off
         self._subscribe_s = -math.inf  # when what was refused is asked for again
         self._listeners = [
             _Listener(gauge, gauge.driver, place, address, stale_after_s[gauge.name])
@@ -57,21 +66,28 @@ class PushedRound:
         ]
         self._noted: dict[str, bool] = {}  # by gauge: whether its clock was wrong
 
-    def take(self, line: PushedLine) -> bool:
-        """Publish what has come, or comes soon; whether anything did. Raises LineFault (LINE_LOST)."""
+    def opened(self) -> None:
+        """The line has been opened: nothing is subscribed to, and nothing was heard on it."""
+        self._subscribe_s = -math.inf
         now_s = self._clock.monotonic()
-        if line is not self._line or now_s >= self._subscribe_s:
+        for listener in self._listeners:
+            listener.heard_s, listener.quality = now_s, Quality.NEVER_READ
+
+    def lost(self) -> None:
+        """The line is lost; nothing waits to be published."""
+
+    def take(self, line: PushedLine) -> None:
+        """Publish what has come, or comes soon. Raises LineFault (LINE_LOST)."""
+        now_s = self._clock.monotonic()
+        if now_s >= self._subscribe_s:
             line.subscribe([listener.address for listener in self._listeners])
             self._subscribe_s = now_s + SUBSCRIBE_EVERY_S
-        if line is not self._line:
-            self._line = line
-            for listener in self._listeners:
-                listener.heard_s, listener.quality = now_s, Quality.NEVER_READ
         messages = line.messages(LONGEST_WAIT_S)
         for message in messages:
             self._publish(message)
         self._note_silence()
-        return bool(messages)
+        if messages:
+            self._back_off.succeeded()
 
     def _publish(self, message: Message) -> None:
         listeners = [listener for listener in self._listeners if listener.address == message.address]

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import compensate_cmm
-from compd.compensation_values import Compensation, GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm
+from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors

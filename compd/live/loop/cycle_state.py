@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation_values import WarmStart
+from compd.compensation.values import WarmStart
 from compd.configuration.operation import LimitSettings, LoopSettings
 from compd.errors import StateError
 from compd.live.loop.commands import Target

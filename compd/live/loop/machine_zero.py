@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.errors import Problem, StateError
-from compd.files import read_small_file, write_files
+from compd.files.atomic_files import read_small_file, write_files
 
 FILE_NAME = "machine-zero.json"
 # The machine zero before the present one, as its file was.

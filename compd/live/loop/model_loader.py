@@ -14,19 +14,19 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.configuration.yaml_reader import LARGEST_BYTES
 from compd.errors import Problem, StateError
-from compd.file_trust import own_users, trust_problem
-from compd.files import read_small_file
+from compd.files.atomic_files import read_small_file
+from compd.files.file_trust import own_users, trust_problem
 from compd.live.loop.wiring import MachineWires, WiredValues, Wires
 from compd.live.memory.latest import Snapshot
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import available_settings
-from compd.model_file import read_model_file
+from compd.model_file.model_file import read_model_file
 
 _HASH_DIGITS = 16
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from compd.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation_values import Compensation, GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleState
 from compd.live.loop.model_loader import LiveModel, Models

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.live.loop.commands import Target
 from compd.live.loop.models import compensate
 from compd.live.loop.wiring import MachineWires

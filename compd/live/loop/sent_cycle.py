@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation_values import WarmStart
+from compd.compensation.values import WarmStart
 from compd.errors import StateError
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.directions import Directions

@@ -11,7 +11,7 @@ import numpy as np
 import orjson
 
 from compd.arrays import FloatArray
-from compd.compensation_values import CorrectionShares
+from compd.compensation.values import CorrectionShares
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.packet_layout import (
     BODY,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation_values import GaugeValues
+from compd.compensation.values import GaugeValues
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
 from compd.model.effect_memory import EffectMemory

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from compd.files import sync_directory, write_new_file
-from compd.json_text import encode_compact
+from compd.files.atomic_files import sync_directory, write_new_file
 from compd.live.record.appended_file import AppendedFile
 from compd.live.record.part_table import Row, part_table
 from compd.recording.columns import SKEW_COLUMN, approach_columns, decimals
 from compd.recording.sidecar import sidecar_contents, sidecar_text
-from compd.recording.table_format import TableFormat
+from compd.recording.tables.table_format import TableFormat
+from compd.text.json_text import encode_compact
 from compd.units import UM_PER_MM
 
 Message = Mapping[str, Any]

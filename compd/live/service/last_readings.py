@@ -17,7 +17,7 @@ import structlog
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.clock import Clock
-from compd.files import write_files
+from compd.files.atomic_files import write_files
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
 FILE_NAME = "last-readings.json"

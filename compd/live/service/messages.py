@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, NoReturn, Self
 
 from pydantic import ValidationError
 
-from compd.json_text import encode_compact
+from compd.text.json_text import encode_compact
 
 PROTOCOL = 1
 MAX_LINE_BYTES = 4096

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading, ReadingMotion
-from compd.json_text import omit_unknown
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.machine_zero import MachineZero
@@ -25,6 +24,7 @@ from compd.live.memory.readings import Readings
 from compd.live.service.messages import line
 from compd.live.service.state_json import from_plain, to_plain
 from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.text.json_text import omit_unknown
 
 
 class RecordedCycle(NamedTuple):

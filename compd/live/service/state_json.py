@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from compd.compensation_values import WarmStart
+from compd.compensation.values import WarmStart
 from compd.live.loop.cycle_state import CycleState
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.model.effect_memory import EffectMemory

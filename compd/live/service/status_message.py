@@ -10,7 +10,6 @@ from typing import Any
 from compd.clock import Clock
 from compd.errors import StateError
 from compd.gauge import Quality
-from compd.json_text import omit_unknown
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.skew import skew_of
@@ -20,6 +19,7 @@ from compd.live.memory.latest import Latest
 from compd.live.processes.control import Control
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender
+from compd.text.json_text import omit_unknown
 
 
 @dataclass(frozen=True)

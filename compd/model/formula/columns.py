@@ -10,7 +10,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.errors import Problem
 from compd.model.effect import Port
-from compd.model.formula.program import Columns
+from compd.model.formula.program import ColumnCodes
 from compd.model.kernels import formula as machine_code
 from compd.model.observations import Observations
 
@@ -85,7 +85,7 @@ _READINGS: Mapping[Port, int] = {
 }
 
 
-def column_codes(names: Sequence[str], port: Port, links: int, quantities: Sequence[str]) -> Columns:
+def column_codes(names: Sequence[str], port: Port, links: int, quantities: Sequence[str]) -> ColumnCodes:
     """What formulas' columns are to a kernel.
 
     quantities : those that the effect needs, in their order, on a machine with so many links.
@@ -108,7 +108,7 @@ def column_codes(names: Sequence[str], port: Port, links: int, quantities: Seque
             own.add(name)
         else:
             codes[name] = (machine_code.QUANTITY, quantities.index(name))
-    return Columns(codes, frozenset(own))
+    return ColumnCodes(codes, frozenset(own))
 
 
 def column_values(rows: Observations, name: str, port: Port) -> FloatArray:

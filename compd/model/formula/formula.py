@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.model.formula.program import Columns, write_program
+from compd.model.formula.program import ColumnCodes, write_program
 from compd.model.kernels.formula import formula_factors
 
 
@@ -47,7 +47,7 @@ class Formula:
         # a column's kind is of no importance here: its values are at hand
         codes = dict.fromkeys(self.columns, (0, 0))
         program = write_program(
-            {0: self.tree}, self.linear, self.constants, Columns(codes, own), 1, places, [False] * len(self.linear)
+            {0: self.tree}, self.linear, self.constants, ColumnCodes(codes, own), 1, places, [False] * len(self.linear)
         )
         values = np.zeros((rows, places, len(self.columns)))
         for place, name in enumerate(self.columns):

@@ -27,7 +27,7 @@ class LaggedValue:
     tau_s: Expression
 
 
-class Columns(NamedTuple):
+class ColumnCodes(NamedTuple):
     """What the columns of formulas are.
 
     codes : (kind, argument) by name; see `compd.model.kernels.formula`.
@@ -55,7 +55,7 @@ def write_program(
     trees: Mapping[int, ast.expr],
     linear: Sequence[str],
     constants: Sequence[str],
-    columns: Columns,
+    columns: ColumnCodes,
     along: int,
     places: int,
     own: Sequence[bool],
@@ -121,7 +121,7 @@ class _Writer:
 
     linear: tuple[str, ...]
     constants: tuple[str, ...]
-    columns: Columns
+    columns: ColumnCodes
     places: int
     numbers: list[float] = field(default_factory=list)
     lag_widths: list[int] = field(default_factory=list)

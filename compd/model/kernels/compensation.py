@@ -1,5 +1,5 @@
 """The compensation of one snapshot after the other, in both modes, with the effects of a model; see
-`compd.compensation`."""
+`compd.compensation.compensation`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the compensation is computed from and what it gives, as C structures; see `compd.compensation`.
+"""What the compensation is computed from and what it gives, as C structures; see `compd.compensation.compensation`.
 
 Their arrays have room for six links and their 24 joint comparators. Every field is named as in the models and results
 that it is taken from.
@@ -107,7 +107,7 @@ SOLVED_MACHINE = np.dtype(
     ]
 )
 
-# Of `compd.compensation.Compensation`; warm_: of `WarmStart`. bare_: by the kinematics alone, without effects.
+# Of `Compensation` (compd/compensation); warm_: of `WarmStart`. bare_: by the kinematics alone, without effects.
 RESULT = np.dtype(
     [
         ("frame", SOLVED_FRAME),

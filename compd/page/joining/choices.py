@@ -70,7 +70,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
     """
     problems: list[Problem] = []
 
-    def taken(name: str, kind: type[Value], allowed: str, among: tuple[str, ...] = ()) -> Value | None:
+    def choice(name: str, kind: type[Value], allowed: str, among: tuple[str, ...] = ()) -> Value | None:
         value = keys.get(name)
         if value is None or value == "":
             return None
@@ -80,7 +80,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
         return None
 
     def text(name: str, among: tuple[str, ...] = ()) -> str | None:
-        return taken(name, str, ", ".join(among) or "a short text", among)
+        return choice(name, str, ", ".join(among) or "a short text", among)
 
     columns = keys.get("columns") or []
     if (
@@ -97,22 +97,22 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
         angle_unit=text("angle_unit"),
         decimal=text("decimal", (".", ",")),
         dates=text("dates", _DATES),
-        rate_hz=taken("rate_hz", float, "a number, Hz"),
+        rate_hz=choice("rate_hz", float, "a number, Hz"),
         group=text("group"),
         sheet=text("sheet"),
     )
     instrument = Instrument(
         frame="machine" if text("frame", _FRAMES) == "machine" else "instrument",
-        sigma_um=taken("sigma_um", float, "a number, um"),
-        link=taken("link", int, "the number of a link"),
-        sigma_urad=taken("sigma_urad", float, "a number, urad"),
-        ball=_positive("ball", taken("ball", int, "the number of a ball, from 1"), problems),
+        sigma_um=choice("sigma_um", float, "a number, um"),
+        link=choice("link", int, "the number of a link"),
+        sigma_urad=choice("sigma_urad", float, "a number, urad"),
+        ball=_positive("ball", choice("ball", int, "the number of a ball, from 1"), problems),
     )
     by = text("by", JOIN_BY)
     join = JoinOptions(
         instrument,
         by=next((known for known in JOIN_BY if known == by), None),
-        offset_s=taken("offset_s", float, "a number, s"),
+        offset_s=choice("offset_s", float, "a number, s"),
         moving=keys.get("moving") is True,
         machine=machine,
         plan=plan,

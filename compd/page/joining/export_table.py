@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compd.errors import RecordingError
-from compd.files import file_stamp
+from compd.files.atomic_files import file_stamp
 from compd.instruments.export import ReadOptions
 from compd.instruments.preview import ExportPreview, preview_export
 from compd.joining.join import choose_by

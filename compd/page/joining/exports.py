@@ -29,29 +29,29 @@ class Exports:
 
     def listed(self) -> list[str]:
         """Their names, the newest first."""
-        found = []
+        by_age = []
         for path in self.directory.glob("*"):
             try:
                 if EXPORT_NAME.fullmatch(path.name) and path.is_file() and not path.is_symlink():
-                    found.append((-path.stat().st_mtime, path.name))
+                    by_age.append((-path.stat().st_mtime, path.name))
             except FileNotFoundError:  # somebody has just removed it
                 continue
-        return [name for _, name in sorted(found)]
+        return [name for _, name in sorted(by_age)]
 
     def path_of(self, name: str) -> Path | None:
         """The file of that name; None where there is none."""
         path = self.directory / name
         return path if EXPORT_NAME.fullmatch(name) and path.is_file() and not path.is_symlink() else None
 
-    async def keep(self, given: str, pieces: AsyncIterator[bytes]) -> dict[str, Any]:
+    async def keep(self, file_name: str, pieces: AsyncIterator[bytes]) -> dict[str, Any]:
         """Write what a browser brings, and tell its `name` here and its `bytes`.
 
-        given : the file's name on the person's computer; what cannot stand in a name here becomes "-".
+        file_name : the file's name on the person's computer; what cannot stand in a name here becomes "-".
 
         Raises RecordingError for a name that is none, for a file that is empty, larger than MOST_BYTES, or another than
         the one that has its name already; and where the disk refuses.
         """
-        name = kept_name(given)
+        name = kept_name(file_name)
         self.directory.mkdir(parents=True, exist_ok=True)
         temporary = self.directory / f".{secrets.token_hex(8)}"
         try:
@@ -77,16 +77,16 @@ class Exports:
                 ) from None
 
 
-def kept_name(given: str) -> str:
+def kept_name(file_name: str) -> str:
     """The name under which a file is kept. Raises RecordingError for what is a path, or has no letter or digit."""
-    stem, dot, ending = given.rpartition(".")
+    stem, dot, ending = file_name.rpartition(".")
     if not dot:
         stem, ending = ending, ""
     stem = _NOT_IN_A_NAME.sub("-", stem).strip("-_")[:_LONGEST_STEM]
     name = f"{stem}.{ending}" if ending else stem
-    if "/" in given or "\\" in given or not EXPORT_NAME.fullmatch(name):
+    if "/" in file_name or "\\" in file_name or not EXPORT_NAME.fullmatch(name):
         allowed = "letters, digits, - and _, such as run-1.txt"
-        raise _refused("export", "is no name of a file", ascii(given[:_LONGEST_STEM]), allowed)
+        raise _refused("export", "is no name of a file", ascii(file_name[:_LONGEST_STEM]), allowed)
     return name
 
 

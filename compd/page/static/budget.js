@@ -24,7 +24,7 @@ export class Budget {
 
   show({ budget, shadow_budget, setpoint }) {
     const causes = budget ? Object.keys(budget) : [];
-    this.tellLegend(causes, setpoint);
+    this.drawLegend(causes, setpoint);
     const vectors = causes.map((cause) => budget[cause]);
     const ends = [0, 1, 2].map((axis) => Math.max(vectors.reduce((sum, vector) => sum + Math.abs(vector[axis]), 0), Math.abs(shadow_budget?.[axis] ?? 0)));
     this.scale_um = keptScale(this.scale_um, Math.max(...ends));
@@ -46,7 +46,7 @@ export class Budget {
     });
   }
 
-  tellLegend(causes, { u_tip_um, shadow }) {
+  drawLegend(causes, { u_tip_um, shadow }) {
     const why = shadow?.reason ?? "";
     const key = [...causes, Boolean(u_tip_um), Boolean(shadow), why].join();
     if (key === this.key) return;

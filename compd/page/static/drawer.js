@@ -44,7 +44,7 @@ export class Drawer {
       ...this.models.parts,
       element("div", { class: "row" }, button(nameOf("shadow", "a model"), () => this.ask("shadow", chosen()), { id: "order-shadow" }), order("shadow", () => "", "no-shadow"), button(nameOf("adopt"), () => this.ask("adopt", chosen()), { id: "order-adopt" }), order("no-model", () => "")),
       this.orders.consequence,
-      this.orders.said,
+      this.orders.answer,
       element("h2", {}, "Who is looking"),
       this.looking,
       element("h2", {}, "Recordings"),

@@ -9,7 +9,7 @@ import { bindKeys } from "./keys.js";
 import { Links } from "./links.js";
 import { listen } from "./live_events.js";
 import { Machine } from "./machine.js";
-import { NOT_KEPT, Past, clock, tellMoment } from "./past.js";
+import { NOT_KEPT, Past, clock, showMoment } from "./past.js";
 import { showTiming } from "./timing.js";
 
 export const page = { live: null, slow: null, machine: null, id: "", role: "view", frozen: false, selected: 0, unpainted: false };
@@ -55,7 +55,7 @@ function paint() {
 function showPast(event, at_s) {
   const minute = { at_s, traces: event?.traces ?? gauges.traces.copy(), ...hour.minute(at_s) };
   for (const part of parts) part.show(event?.setpoint ? event : NOTHING, minute);
-  tellMoment(event, at_s);
+  showMoment(event, at_s);
 }
 
 function take(message, late_s) {

@@ -12,7 +12,7 @@ export function nameOf(order, subject) {
 export class Orders {
   // page: {id, role, armed_until} of this browser's connection; confirm: id of the button of the second step
   constructor(page, confirm = "confirm") {
-    Object.assign(this, { page, confirm, consequence: element("div"), said: element("p", { class: "said", role: "status" }) });
+    Object.assign(this, { page, confirm, consequence: element("div"), answer: element("p", { class: "order-answer", role: "status" }) });
     this.arm = element("button", { type: "button", id: "arm", onclick: () => this.armOrNot() }, "Arm for 60 s");
   }
 
@@ -54,10 +54,10 @@ export class Orders {
     // what is shown is what is given: the file that a name stands for now, not later
     const give = element("button", { type: "button", id: this.confirm, onclick: () => this.give(name, consequence.subject || subject) }, title);
     give.disabled = !consequence.possible;
-    this.tell(element("b", {}, title), element("p", {}, consequence.text), new CommandLine(consequence.command).row, element("div", { class: "row" }, give, element("button", { type: "button", onclick: () => this.leave() }, "Leave it")));
+    this.showConsequence(element("b", {}, title), element("p", {}, consequence.text), new CommandLine(consequence.command).row, element("div", { class: "row" }, give, element("button", { type: "button", onclick: () => this.leave() }, "Leave it")));
   }
 
-  tell(...parts) {
+  showConsequence(...parts) {
     const box = element("div", { class: "consequence" }, ...parts);
     this.consequence.replaceChildren(box);
     box.scrollIntoView({ block: "nearest" });
@@ -79,14 +79,14 @@ export class Orders {
       const { command } = await (await fetch("orders/zero?subject=replace")).json();
       this.say(answer.reason);
       const replace = element("button", { type: "button", onclick: () => this.give("zero", "replace") }, "It is the zero position: take it");
-      return this.tell(element("p", {}, answer.reason), new CommandLine(command).row, replace);
+      return this.showConsequence(element("p", {}, answer.reason), new CommandLine(command).row, replace);
     }
     this.leave();
     this.say(answer.ok ? `Done: ${nameOf(name, subject).toLowerCase()}.` : `Refused: ${answer.reason}`);
   }
 
   say(text) {
-    this.said.textContent = text ?? "";
+    this.answer.textContent = text ?? "";
   }
 
   // Whether this browser is armed now.

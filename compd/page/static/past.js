@@ -42,7 +42,7 @@ export class Past {
 }
 
 // The line under the banner: which moment is shown, and its state, for the banner goes on with the present one.
-export function tellMoment(event, at_s) {
+export function showMoment(event, at_s) {
   at("frozen-at").textContent = clock(at_s);
   const setpoint = event?.setpoint;
   const sign = setpoint ? appearance(setpoint.state)[1] : "⚡";

@@ -8,7 +8,7 @@ export class Recordings {
     Object.assign(this, { page, say, listing: null, recording: null });
     const button = (text, onclick, id) => element("button", { type: "button", onclick, id }, text);
     this.name = element("input", { type: "text", placeholder: "name of a recording", "aria-label": "Name of the recording" });
-    this.name.addEventListener("input", () => this.tellCommands());
+    this.name.addEventListener("input", () => this.showCommands());
     this.record = button("Record", () => this.startOrStop(), "record");
     this.burst = button("Burst of 5 s", () => this.begin(5), "burst");
     this.recorded = element("p", { class: "note" });
@@ -41,7 +41,7 @@ export class Recordings {
   async list() {
     this.listing = await (await fetch("recordings")).json();
     this.where.textContent = `in ${this.listing.directory}`;
-    this.tellCommands();
+    this.showCommands();
     this.body.replaceChildren(...this.listing.parts.flatMap((part) => this.rows(part)));
   }
 
@@ -52,7 +52,7 @@ export class Recordings {
   }
 
   // As it is typed; a name that is none is refused by the server.
-  tellCommands() {
+  showCommands() {
     const name = this.name.value.trim();
     const named = (command) => (/^[\w-]+$/.test(name) ? command.replace("/NAME ", `/${name} `) : command);
     this.command.write(named(this.listing?.command ?? ""));

@@ -14,7 +14,7 @@ export function showTiming(list, status) {
     ["real time", granted.join(", ")],
     ["machine zero", status.zero.taken ? dateText(new Date(status.zero.taken_at)) : "none"],
     ["model", status.model.applied?.effects.join(", ") || "no effects"],
-    ["clients of the daemon", status.publisher.connected.map((one) => one.name + (one.controller ? " (controller)" : "")).join(", ")],
+    ["clients of the daemon", status.publisher.connected.map((client) => client.name + (client.controller ? " (controller)" : "")).join(", ")],
   ];
   list.replaceChildren(...rows.flatMap(([name, text]) => [element("dt", {}, name), element("dd", {}, text)]));
 }

@@ -21,9 +21,9 @@ from compd.diagnosis.search.gross_rows import RowWeights
 from compd.diagnosis.search.problem import DiagnosisProblem, build_problem, fitted_along_columns
 from compd.diagnosis.search.rivals import collinearity
 from compd.diagnosis.search.subset_losses import SubsetLosses
-from compd.json_text import nan_to_null
 from compd.model.effect import Effect
 from compd.page.workbench.trial import Trial, trial
+from compd.text.json_text import nan_to_null
 from compd.units import UM_PER_MM
 
 # Effects are told to be alike from this cosine on: a tenth of either's square is its own.

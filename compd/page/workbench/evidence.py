@@ -8,8 +8,6 @@ from compd.diagnosis.findings import DiagnosisStep
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import ErrorFall, error_fall
 from compd.diagnosis.words.summary_lines import summary_lines
-from compd.json_text import nan_to_null
-from compd.number_text import estimate_text, fall_text, number_text, percent_text
 from compd.report.diagnosis_evidence import (
     by_noise_text,
     candidates_table,
@@ -25,6 +23,8 @@ from compd.report.diagnosis_evidence import (
     without_gain,
 )
 from compd.report.page_table import PageTable
+from compd.text.json_text import nan_to_null
+from compd.text.number_text import estimate_text, fall_text, number_text, percent_text
 
 
 def evidence(diagnosis: Diagnosis) -> dict[str, Any]:

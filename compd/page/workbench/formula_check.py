@@ -66,12 +66,12 @@ def check(declaration: Mapping[str, Any], rows: Observations, present: Sequence[
             stand_in, further = _effect(_with_stand_ins(declaration, missing))
             problems += [problem for problem in further if _place(problem).field == "formula"]
             problems += _reasons_not_to_try(stand_in, rows) if stand_in else []
-        return Checked(None, _told(problems, declaration), missing)
+        return Checked(None, _field_problems(problems, declaration), missing)
     problems = _reasons_not_to_try(effect, rows)
     if effect.id in present:
         step = "give it another id, or take that one out of the model"
         problems.append(Problem(where=f"{_WHERE}, id", what="is in the model already", value=effect.id, next_step=step))
-    return Checked(effect, _told(problems, declaration), missing)
+    return Checked(effect, _field_problems(problems, declaration), missing)
 
 
 def _effect(declaration: Mapping[str, Any]) -> tuple[Effect | None, list[Problem]]:
@@ -125,7 +125,7 @@ def _place(problem: Problem) -> FieldProblem:
     return FieldProblem(where if where in _FIELDS else "", "")
 
 
-def _told(problems: Sequence[Problem], declaration: Mapping[str, Any]) -> tuple[FieldProblem, ...]:
+def _field_problems(problems: Sequence[Problem], declaration: Mapping[str, Any]) -> tuple[FieldProblem, ...]:
     formula = declaration.get("formula")
     typed = list(formula.values()) if isinstance(formula, Mapping) else [formula]
     return tuple(_place(problem)._replace(text=words(problem, typed)) for problem in problems)

@@ -95,12 +95,12 @@ async def _check(request: Request, workbench: Workbench) -> Response:
     def checked() -> dict[str, Any]:
         opened = workbench.opened
         present = [fitted.effect.id for fitted in opened.model.fitted]
-        found = check(declaration, opened.aligned.rows, present)
-        if found.effect is None or found.problems:
-            return found.as_json()
-        name = workbench.drafts.add(found.effect)
+        result = check(declaration, opened.aligned.rows, present)
+        if result.effect is None or result.problems:
+            return result.as_json()
+        name = workbench.drafts.add(result.effect)
         (ranked,) = workbench.drafts.find(name)[0].ranked()
-        return {**found.as_json(), "draft": {**ranked, "effect": name}}
+        return {**result.as_json(), "draft": {**ranked, "effect": name}}
 
     return answer(await workbench.ask(checked))
 

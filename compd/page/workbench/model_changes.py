@@ -9,11 +9,11 @@ from typing import Any
 from compd.api.models import add_effect
 from compd.diagnosis.model_changes import refit, remove, undo
 from compd.errors import Problem, StateError
-from compd.json_text import nan_to_null
 from compd.model.effect import Effect
-from compd.model_document import read_stored, write_stored
-from compd.model_file import EffectNumber, ModelFile, read_model_file
+from compd.model_file.model_document import read_stored, write_stored
+from compd.model_file.model_file import EffectNumber, ModelFile, read_model_file
 from compd.page.workbench.opened_recording import OpenedRecording
+from compd.text.json_text import nan_to_null
 
 
 def proposed(opened: OpenedRecording, kind: str, effect: str, library: Mapping[str, Effect]) -> OpenedRecording:

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.comparison import Comparison
 from compd.comparison.open import open_recording
 from compd.configuration.shipped import Machine
-from compd.json_text import nan_to_null
-from compd.model_file import ModelFile, read_model_file
+from compd.model_file.model_file import ModelFile, read_model_file
 from compd.page.packed import packed
+from compd.text.json_text import nan_to_null
 
 # Pictures have about so many rows at most; numbers are always of all rows.
 MOST_PICTURED = 5000

@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from compd.api.measurements import plan_measurement
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.planning.measurement_programmes import recorded_limits
 from compd.diagnosis.planning.plan_formats import DWELL_S, PlanFormat

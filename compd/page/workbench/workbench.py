@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from compd.configuration.shipped import Machine
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.errors import CompdError, Problem, RecordingError, StateError
-from compd.files import file_stamp, write_files
+from compd.files.atomic_files import file_stamp, write_files
 from compd.live.loop.model_loader import ModelText
 from compd.model.effect_needs import can_concern
 from compd.model.library import load_library

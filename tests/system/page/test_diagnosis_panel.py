@@ -69,7 +69,7 @@ def test_stages_then_the_verdict_then_the_evidence_and_its_buttons(open_tab, tmp
     assert "plausible" in text
     assert "rows left out" in text
     assert "1 time in" in text
-    assert tab.locator(".effect .said", has_text="named, number").count() == 2
+    assert tab.locator(".effect .remark", has_text="named, number").count() == 2
     tab.locator("[data-try=link_elasticity]").click()
     until(tab, "bench.trial && document.querySelector('#card h2').textContent === 'link elasticity'")
     tab.locator("[data-add=link_expansion]").click()
@@ -114,7 +114,7 @@ def test_it_is_cancelled_and_seen_in_another_browser_and_after_a_reload(open_tab
     until(second, f"{RUNNING} && document.querySelectorAll('.stages .been, .stages .now').length >= 1")
     second.locator("#diagnose").click()
     for tab in (first, second):
-        until(tab, "document.getElementById('diagnosis-said').textContent.startsWith('cancelled')")
+        until(tab, "document.getElementById('diagnosis-state').textContent.startsWith('cancelled')")
     diagnosed(first)
     until(second, DONE)
     first.reload()
@@ -131,7 +131,7 @@ def test_of_a_model_that_has_changed_since_it_says_so(open_tab):
     tab.locator("#confirm").click()
     until(tab, "document.getElementById('diagnosis-behind').textContent.includes('model before the last step')")
     assert tab.locator(".word").count() == 1, "what it has found stays"
-    assert tab.locator(".effect .said", has_text="named").count() == 0
+    assert tab.locator(".effect .remark", has_text="named").count() == 0
 
 
 def test_its_page_works_in_a_sandbox_of_its_own(open_tab):

@@ -32,7 +32,7 @@ def confirmed(tab, order, done):
     until(tab, "document.querySelector('#confirm') && !document.querySelector('#confirm').disabled")
     command = tab.locator(".consequence code").inner_text()
     tab.locator("#confirm").click()
-    until(tab, f"document.querySelector('.said').textContent === 'Done: {done}.'")
+    until(tab, f"document.querySelector('.order-answer').textContent === 'Done: {done}.'")
     return command
 
 
@@ -76,7 +76,7 @@ def test_a_name_that_is_not_in_the_list_is_refused_and_an_absolute_path_is_the_d
     tab.locator("#order-shadow").click()
     until(tab, "document.querySelector('#confirm')?.disabled === false")
     tab.locator("#confirm").click()
-    until(tab, "document.querySelector('.said').textContent.startsWith('Refused')")
+    until(tab, "document.querySelector('.order-answer').textContent.startsWith('Refused')")
 
 
 def test_an_answer_that_comes_after_another_question_is_not_shown(with_models):

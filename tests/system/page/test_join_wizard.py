@@ -165,17 +165,17 @@ def test_an_export_is_brought_from_this_computer(tab, recordings, tmp_path):
     assert (recordings / "exports" / "My-points-2.csv").read_bytes() == own.read_bytes()
     own.write_text("something else 1 2 3\n")
     tab.locator("#file").set_input_files(own)
-    until(tab, "document.getElementById('said').textContent.includes('other content')")
+    until(tab, "document.getElementById('problem-line').textContent.includes('other content')")
     own.write_bytes(b"")
     tab.locator("#file").set_input_files(own)
-    until(tab, "document.getElementById('said').textContent.includes('is empty')")
+    until(tab, "document.getElementById('problem-line').textContent.includes('is empty')")
     binary = tmp_path / "binary.dat"
     binary.write_bytes(bytes(range(256)) * 10)
     tab.locator("#file").set_input_files(binary)
     until(tab, "document.querySelector('.problem')?.textContent.includes('is not text')")
     tab.evaluate("wizard.sources.most_bytes = 100")
     tab.locator("#file").set_input_files(binary)
-    until(tab, "document.getElementById('said').textContent.includes('too large')")
+    until(tab, "document.getElementById('problem-line').textContent.includes('too large')")
 
 
 def test_the_server_refuses_what_is_too_large_without_keeping_it(tab, recordings):

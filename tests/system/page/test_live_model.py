@@ -66,9 +66,9 @@ def order(tab, name):
     return tab.locator("#live-model .consequence code").inner_text()
 
 
-def said(tab):
-    until(tab, "!['', '…'].includes(document.querySelector('#live-model .said').textContent)")
-    return tab.locator("#live-model .said").inner_text()
+def order_answer(tab):
+    until(tab, "!['', '…'].includes(document.querySelector('#live-model .order-answer').textContent)")
+    return tab.locator("#live-model .order-answer").inner_text()
 
 
 def numbers(tab):
@@ -91,7 +91,7 @@ def test_an_effect_is_added_run_as_a_shadow_and_adopted_by_mouse(chromium, live,
 
         assert order(tab, "live-shadow") == f"compd shadow {model} --daemon {live.socket}"
         tab.locator("#confirm-order").click()
-        assert said(tab) == "Arm the page first."
+        assert order_answer(tab) == "Arm the page first."
         refused = tab.evaluate(
             "(model) => fetch('orders/shadow', {method: 'POST', body: JSON.stringify({id: '', subject: model})})"
             ".then((answer) => answer.status)",
@@ -103,7 +103,7 @@ def test_an_effect_is_added_run_as_a_shadow_and_adopted_by_mouse(chromium, live,
         tab.locator("#arm").click()
         until(tab, "document.getElementById('arm').textContent === 'Disarm'")
         tab.locator("#confirm-order").click()
-        assert said(tab) == "Done: run as a shadow."
+        assert order_answer(tab) == "Done: run as a shadow."
         assert daemon.model()["shadow"]["file"] == str(model)
         assert daemon.model()["applied"]["effects"] == []
         until(tab, "document.getElementById('live-models').textContent.includes('link zero, this model as it is')")
@@ -116,7 +116,8 @@ def test_an_effect_is_added_run_as_a_shadow_and_adopted_by_mouse(chromium, live,
         order(tab, "live-adopt")
         assert "The correction changes by" in tab.locator("#live-model .consequence").inner_text()
         tab.locator("#confirm-order").click()
-        until(tab, "document.querySelector('#live-model .said').textContent === 'Done: adopt the shadow\\'s model.'")
+        done = "Done: adopt the shadow's model."
+        until(tab, f'document.querySelector("#live-model .order-answer").textContent === "{done}"')
         assert daemon.model()["applied"]["file"] == str(model)
         assert daemon.model()["applied"]["effects"] == ["link_zero"]
         until(tab, "document.getElementById('live-models').textContent.startsWith('Applied: tripod.model.yaml')")
@@ -126,7 +127,7 @@ def test_an_effect_is_added_run_as_a_shadow_and_adopted_by_mouse(chromium, live,
 
         assert order(tab, "live-no-model") == f"compd adopt --none --daemon {live.socket}"
         tab.locator("#confirm-order").click()
-        until(tab, "document.querySelector('#live-model .said').textContent === 'Done: run without effects.'")
+        until(tab, "document.querySelector('#live-model .order-answer').textContent === 'Done: run without effects.'")
         assert daemon.model()["applied"]["effects"] == []
 
 
@@ -159,7 +160,7 @@ def test_who_may_look_only_sees_numbers_and_command_lines_and_gives_no_order(chr
         until(tab, "document.querySelector('#confirm-order')")
         assert "compd adopt --none" in tab.locator("#live-model .consequence code").inner_text()
         tab.locator("#confirm-order").click()
-        assert said(tab) == "This browser may look only."
+        assert order_answer(tab) == "This browser may look only."
 
 
 def test_a_recording_of_another_machine_is_offered_nothing(chromium, live, daemon, directory):

@@ -84,9 +84,9 @@ def takes_zero(tab, daemon):
                 raise
 
 
-def said(tab):
-    until(tab, "!['', '…'].includes(document.querySelector('.said').textContent)")
-    return tab.locator(".said").inner_text()
+def order_answer(tab):
+    until(tab, "!['', '…'].includes(document.querySelector('.order-answer').textContent)")
+    return tab.locator(".order-answer").inner_text()
 
 
 def asked(tab, order, numbers=""):
@@ -113,7 +113,7 @@ def arm(tab):
 def refuses_unless_armed(tab, order, subject=""):
     """The page tells to arm; the server refuses whoever asks it directly."""
     tab.locator("#confirm").click()
-    assert "Arm the page first" in said(tab)
+    assert "Arm the page first" in order_answer(tab)
     answer = tab.evaluate(
         "([order, subject]) => fetch(`orders/${order}`,"
         " {method: 'POST', body: JSON.stringify({id: compd.id, subject})})"
@@ -133,7 +133,7 @@ def given(tab, order):
     """The second step, once armed; the answer to it, or to the next try where a gauge was late."""
     for tries_left in reversed(range(TRIES)):
         tab.locator("#confirm").click()
-        answer = said(tab)
+        answer = order_answer(tab)
         if not (LATE.search(answer) and tries_left):
             return answer
         until(tab, "document.body.dataset.state === 'ok'")
@@ -171,7 +171,7 @@ def test_a_zero_that_is_elsewhere_is_taken_when_a_person_says_that_it_is_meant(t
         assert daemon.status()["zero"]["taken_at"] == before
         assert f"compd zero {live.socket} --yes" in tab.locator(".consequence code").inner_text()
         tab.locator(".consequence button", has_text="It is the zero position").click()
-        answer = said(tab)
+        answer = order_answer(tab)
         if not LATE.search(answer):
             break
         asked(tab, "zero")

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from compd.api.models import add_effect
-from compd.model_document import read_stored
+from compd.model_file.model_document import read_stored
 from compd.recording.sidecar import read_sidecar
 from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
@@ -119,7 +119,7 @@ def test_of_two_browsers_the_second_is_told(open_tab):
     second.locator("#add").click()
     second.wait_for_selector("#confirm")
     second.locator("#confirm").click()
-    until(second, "document.getElementById('said').textContent.includes('somebody else')")
+    until(second, "document.getElementById('problem-line').textContent.includes('somebody else')")
     assert big(second, "summary?.ledger.length") == 0
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from compd.api.models import add_effect
 from compd.configuration.shipped import shipped_effects
-from compd.model_document import read_stored
+from compd.model_file.model_document import read_stored
 from tests.support.live_page import until
 from tests.support.paths import SHARED
 from tests.support.workbench_page import page_without_machine
@@ -47,8 +47,8 @@ def test_effects_of_a_real_machine_are_found_and_added_by_mouse(
         tab.locator(f"#libraries input[value='{library}']").click()
         until(tab, "document.querySelectorAll('.effect').length > 1")
         tab.locator("#diagnose").click()
-        until(tab, "document.querySelectorAll('.effect .said').length > 0", 120.0)
-        named = tab.locator(".effect:has(.said)").evaluate_all(
+        until(tab, "document.querySelectorAll('.effect .remark').length > 0", 120.0)
+        named = tab.locator(".effect:has(.remark)").evaluate_all(
             "effects => effects.filter((effect) => effect.textContent.includes('named')).map((e) => e.dataset.effect)"
         )
         assert wanted <= set(named)

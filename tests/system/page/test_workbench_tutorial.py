@@ -11,7 +11,7 @@ import shutil
 
 import pytest
 
-from compd.model_document import read_stored
+from compd.model_file.model_document import read_stored
 from tests.support.hidden_run import hidden_run
 from tests.support.hidden_visits import check_visits, survey_visits
 from tests.support.live_page import page_process, until
@@ -29,7 +29,7 @@ def order(tab, name, done):
     tab.locator(f"#{name}").click()
     until(tab, "document.querySelector('#confirm-order')?.disabled === false")
     tab.locator("#confirm-order").click()
-    until(tab, f"document.querySelector('#live-model .said').textContent === {json.dumps(done)}")
+    until(tab, f"document.querySelector('#live-model .order-answer').textContent === {json.dumps(done)}")
 
 
 def test_a_hidden_effect_is_found_added_and_adopted_by_mouse_with_the_ledger_of_the_commands(chromium):

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from compd.cli.live import driver as driver_cli
 from compd.cli.live import gauge as gauge_cli
 from compd.clock import MonotonicClock
-from compd.commissioning.capture import read_capture
+from compd.commissioning.gauge_description.capture import read_capture
 from compd.commissioning.open_gauge import open_tapped_line
 from compd.commissioning.probe import PresetCandidate, preset_candidates, probe_port
 from compd.commissioning.scan import serial_ports
@@ -25,7 +25,7 @@ from compd.lines import open_line
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.paths import ROOT
-from tests.unit.commissioning.test_capture import talker
+from tests.unit.commissioning.gauge_description.test_capture import talker
 
 RUNNER = CliRunner()
 MAP = "channels=[{name: a, function: 4, address: 0, type: int16, unit: mm}]"

@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 from compd.cli.main import app
 from compd.diagnosis.planning.plan_formats import MARKS, target_name
 from compd.errors import CompdError
-from compd.output_file import check_replaceable
+from compd.files.output_file import check_replaceable
 from compd.simulation.truth.mechanism import Mechanism
 from tests.support.hidden_effects import record_with_effects
 from tests.support.simulated import tripod

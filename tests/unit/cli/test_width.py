@@ -11,8 +11,8 @@ from compd.cli.main import app
 from compd.cli.reflow import reflowed
 from compd.commissioning.catalogue import catalogue
 from compd.configuration import load
-from compd.number_text import number_text
 from compd.report.terminal_table import keep_words_whole
+from compd.text.number_text import number_text
 from tests.support.paths import CONFIG
 
 CUT = "…"

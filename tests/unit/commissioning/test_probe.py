@@ -19,7 +19,7 @@ from compd.gauge import Quality
 from compd.lines import open_stream
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
-from tests.unit.commissioning.test_capture import talker
+from tests.unit.commissioning.gauge_description.test_capture import talker
 
 CANDIDATES = preset_candidates()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from compd.comparison.align_recording import align_recording
+from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.compare import compare
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration

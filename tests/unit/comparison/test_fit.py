@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from compd.comparison.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.compare import compare
 from compd.comparison.fit import fit, initial_effect
 from compd.comparison.prediction_uncertainty import first_order_uncertainty, gauge_noise, monte_carlo

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.fit import fit, initial_effect
 from compd.comparison.initial_states import initial_state_columns

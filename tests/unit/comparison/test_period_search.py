@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.period_search import promising_constants
 from compd.comparison.shape_search import search_constants

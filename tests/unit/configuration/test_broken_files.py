@@ -10,7 +10,7 @@ import pytest
 from compd.configuration.machine_configuration import Examined
 from compd.errors import ConfigurationError, Problem, StateError
 from compd.machine_check import examine_whole, load_whole
-from compd.model_document import read_stored
+from compd.model_file.model_document import read_stored
 from compd.recording.sidecar import read_sidecar
 from tests.support.paths import CONFIG
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.diagnose import diagnose

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.comparison.align_recording import align_recording
+from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.open import read_with_machine
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.holdout import evaluate_holdout

@@ -25,7 +25,7 @@ from compd.model.effect_needs import NEEDS
 from compd.model.formula.declaration import FormulaDeclaration, FormulaParameter
 from compd.model.formula.functions import FUNCTIONS
 from compd.model.library import BUNDLED
-from compd.model_document import EffectEntry, ModelDocument, ModelStep, ParameterEntry
+from compd.model_file.model_document import EffectEntry, ModelDocument, ModelStep, ParameterEntry
 from compd.plugins import GAUGES, load, names
 from compd.recording.checks import LIMITS
 from compd.recording.columns import COLUMN_KINDS, parse_name

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison.aligned_recording import AlignedRecording
-from compd.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.configuration import load
 from compd.model.effect import FittedEffect
 from compd.model.machine import MachineModel, machine_constants, machine_model

@@ -10,7 +10,7 @@ import zlib
 import numpy as np
 import pytest
 
-from compd.compensation_values import CorrectionShares
+from compd.compensation.values import CorrectionShares
 from compd.live.loop.packet_layout import PACKET_SIZE
 from compd.live.loop.setpoint import Setpoint, SetpointValues
 from compd.live.loop.states import Mode, State

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compd.compensation import compensate_cmm
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.live.loop.model_loader import Models
 from tests.support.live_machine import Machine, machine
 from tests.support.live_models import file_with, thermal, with_noise

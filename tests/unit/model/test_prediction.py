@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.compensation import compensate_cmm
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.model.deltas import deltas_by_effect, effect_deltas, sum_deltas
 from compd.model.effect import PORTS, FittedEffect, Port
 from compd.model.effect_basis import evaluate_basis, port_size

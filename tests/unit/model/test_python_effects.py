@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numba.core import event
 
-from compd.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.errors import CompdError
 from compd.model.effect import ConstantValues, Effect, FittedEffect, Memory
 from compd.model.effect_basis import evaluate_basis

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.model.frame import solve_frame
 from compd.model.kinematics import forward_kinematics, inverse_kinematics
 from compd.model.machine import MachineModel, machine_model

@@ -12,7 +12,7 @@ import pytest
 import yaml
 from plotly.graph_objects import Figure
 
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.covariates import Covariate
 from compd.diagnosis.findings import CandidateResult, GrossRows, UntestedEffect

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.configuration.geometry import Geometry
 from compd.configuration.operation import Wiring
 from compd.machine_builder import build_model

@@ -262,7 +262,7 @@ def test_what_does_not_exist_cannot_be_sensed() -> None:
 def test_the_truth_loads_nothing_of_the_model() -> None:
     code = (
         "import sys, compd.simulation.truth.world\n"
-        "model = ('compd.model', 'compd.compensation', 'compd.machine_builder')\n"
+        "model = ('compd.model', 'compd.compensation.compensation', 'compd.machine_builder')\n"
         "found = [m for m in sys.modules if m.startswith(model)]\n"
         "sys.exit(', '.join(found) or 0)"
     )

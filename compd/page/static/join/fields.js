@@ -33,8 +33,8 @@ export class Choice extends Field {
     this.options(options, "as found");
   }
 
-  options(options, found) {
-    const all = [["", found], ...options];
+  options(options, automatic) {
+    const all = [["", automatic], ...options];
     const text = JSON.stringify(all);
     if (text !== this.shown) this.control.replaceChildren(...all.map(([value, name]) => element("option", { value }, name)));
     this.shown = text;
@@ -42,7 +42,7 @@ export class Choice extends Field {
   }
 
   // What stands there without a choice.
-  found(text) {
+  automatic(text) {
     this.options(JSON.parse(this.shown).slice(1), text);
   }
 }

@@ -6,7 +6,7 @@ import { Wizard } from "./wizard.js";
 import { Writing } from "./writing.js";
 
 const at = (id) => document.getElementById(id);
-const wizard = new Wizard(at("said"));
+const wizard = new Wizard(at("problem-line"));
 const sources = new Sources(at("recording"), at("export"), at("file"), at("sources-note"));
 sources.begin(wizard);
 wizard.panels = [

@@ -42,8 +42,8 @@ export class Putting {
     const { by, plan, frame, sigma_urad, link, ball, offset_s, moving } = this.fields;
     const chosen = choices.by || table.by;
     const length = table.axes.includes("length");
-    by.found(table.by ? `as found: ${BY[table.by]}` : "choose …");
-    frame.found("the instrument's own, fitted");
+    by.automatic(table.by ? `as found: ${BY[table.by]}` : "choose …");
+    frame.automatic("the instrument's own, fitted");
     frame.offer(!length);
     plan.offer(chosen === "name");
     sigma_urad.offer(table.axes.includes("rx") && chosen === "time");

@@ -39,13 +39,13 @@ export class Reading {
     const { shape, unit, angle_unit, decimal, dates, rate_hz, group, sheet } = this.fields;
     const { assumed } = table;
     const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
-    shape.found(`as found: ${SHAPES.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
-    unit.found(lengthUnit && !choices.unit ? `as found: ${lengthUnit[1]}` : "as the file says");
+    shape.automatic(`as found: ${SHAPES.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
+    unit.automatic(lengthUnit && !choices.unit ? `as found: ${lengthUnit[1]}` : "as the file says");
     angle_unit.offer(table.roles.some((role) => /^r[xyz]$/.test(role)));
-    angle_unit.found("as the file says");
-    decimal.found(assumed["decimal mark"] && !choices.decimal ? `as found: ${assumed["decimal mark"]}` : "as found");
+    angle_unit.automatic("as the file says");
+    decimal.automatic(assumed["decimal mark"] && !choices.decimal ? `as found: ${assumed["decimal mark"]}` : "as found");
     const order = /dates ([a-z]+-[a-z]+-[a-z]+)/.exec(assumed.time ?? "");
-    dates.found(order && !choices.dates ? `as found: ${order[1].replaceAll("-", " ")}` : "as found");
+    dates.automatic(order && !choices.dates ? `as found: ${order[1].replaceAll("-", " ")}` : "as found");
     rate_hz.offer(!table.roles.includes("time"));
     group.offer(table.groups.length > 1 || choices.group != null);
     group.options([...each(table.groups), ["all", "all of them"]], table.groups.length > 1 ? "choose …" : "the only one");

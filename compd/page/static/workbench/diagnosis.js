@@ -15,19 +15,19 @@ export class Diagnosis {
     this.button = element("button", { type: "button", id: "diagnose", onclick: () => this.startOrCancel() }, "Diagnose (d)");
     this.command = new CommandLine();
     this.stages = element("ol", { class: "stages", "aria-label": "Stages of the diagnosis" });
-    this.said = element("p", { class: "note", role: "status", id: "diagnosis-said" });
+    this.state = element("p", { class: "note", role: "status", id: "diagnosis-state" });
     this.behind = element("p", { class: "behind", id: "diagnosis-behind" });
     this.outcome = element("div", { id: "diagnosis-outcome" });
     this.page = element("p", { class: "note", id: "diagnosis-page" });
     this.text = element("pre", { class: "verdict", tabindex: 0 });
     this.whole = element("details", {}, element("summary", {}, "As the terminal prints it"), copyButton(this.text, "Copy this text"), this.text);
-    place.replaceChildren(element("div", { class: "row" }, this.button), this.command.row, this.stages, this.said, this.behind, this.outcome, this.page, this.whole);
+    place.replaceChildren(element("div", { class: "row" }, this.button), this.command.row, this.stages, this.state, this.behind, this.outcome, this.page, this.whole);
     this.clear();
   }
 
   clear() {
     this.shown = "";
-    for (const part of [this.stages, this.said, this.behind, this.outcome, this.page]) part.replaceChildren();
+    for (const part of [this.stages, this.state, this.behind, this.outcome, this.page]) part.replaceChildren();
     this.whole.hidden = true;
     this.act.named?.(null);
   }
@@ -69,26 +69,26 @@ export class Diagnosis {
     this.button.textContent = this.running ? `Cancel, ${seconds.toFixed(0)} s` : "Diagnose (d)";
     if (state === "none") return;
     if (this.running) this.clear();
-    this.tellStages(job);
-    this.said.textContent = { cancelled: `cancelled after ${seconds.toFixed(1)} s`, failed: "it failed:", done: `done in ${seconds.toFixed(1)} s` }[state] ?? "";
+    this.showStages(job);
+    this.state.textContent = { cancelled: `cancelled after ${seconds.toFixed(1)} s`, failed: "it failed:", done: `done in ${seconds.toFixed(1)} s` }[state] ?? "";
     this.behind.textContent = behind && !this.running ? `Of the model before the last ${behind === 1 ? "step" : `${behind} steps`}: what is there now is not diagnosed yet.` : "";
     if (job.evidence && !this.running && id !== this.shown) this.showOutcome(job);
     if (state === "done") {
       this.act.named?.(behind ? null : this.result);
-      this.tellPage(job.page);
+      this.showPage(job.page);
     }
   }
 
-  showOutcome({ id, state, text, result, evidence: found }) {
+  showOutcome({ id, state, text, result, evidence: parts }) {
     Object.assign(this, { shown: id, result });
-    this.outcome.replaceChildren(...(state === "done" ? [summaryLines(found.verdict, found.lines), ...evidence(found, this.act)] : []));
+    this.outcome.replaceChildren(...(state === "done" ? [summaryLines(parts.verdict, parts.lines), ...evidence(parts, this.act)] : []));
     this.text.textContent = text;
     this.whole.hidden = !text;
     this.whole.open = state === "failed";
   }
 
   // Which of the stages have been, with their times; how long the others take nobody knows.
-  tellStages({ stages, steps, seconds, state }) {
+  showStages({ stages, steps, seconds, state }) {
     const ends = steps.map((_, k) => steps[k + 1]?.at_s ?? seconds);
     const last = steps.at(-1)?.text;
     this.stages.replaceChildren(...stages.map(({ text, only_where_needed }, place) => {
@@ -103,7 +103,7 @@ export class Diagnosis {
   }
 
   // page: true, false where it could not be drawn, null while it may still come
-  tellPage(page) {
+  showPage(page) {
     const link = () => element("a", { href: `workbench/${this.bench.key}/diagnosis/page`, target: "_blank", rel: "noopener" }, "Open the page with pictures in a new tab");
     const content = { true: link, false: () => "Its pictures could not be drawn; the command line with --html tells why.", null: () => "The page with pictures is being drawn …" }[page]();
     if (this.page.firstChild?.textContent !== (content.textContent ?? content)) this.page.replaceChildren(content);

@@ -4,7 +4,7 @@ import { element, micro } from "../format.js";
 export class Effects {
   // choose: called with an effect; ranked: with what the server says of all
   constructor(place, filter, note, { choose, ranked }) {
-    Object.assign(this, { place, filter, note, choose, ranked, effects: [], draft: null, chosen: "", said: {} });
+    Object.assign(this, { place, filter, note, choose, ranked, effects: [], draft: null, chosen: "", remarks: {} });
     filter.addEventListener("input", () => this.draw());
   }
 
@@ -23,15 +23,15 @@ export class Effects {
   name(result) {
     const steps = result?.steps ?? [];
     const rivals = steps.flatMap(({ effect, rivals }) => rivals.map((rival) => [rival, `as good as ${effect.replaceAll("_", " ")}`]));
-    const said = Object.fromEntries([...rivals, ...steps.map(({ effect }, k) => [effect, `named, number ${k + 1}`])]);
-    if (JSON.stringify(said) === JSON.stringify(this.said)) return;
-    this.said = said;
+    const remarks = Object.fromEntries([...rivals, ...steps.map(({ effect }, k) => [effect, `named, number ${k + 1}`])]);
+    if (JSON.stringify(remarks) === JSON.stringify(this.remarks)) return;
+    this.remarks = remarks;
     this.draw();
   }
 
   // An effect that is being written stands among the others; null for none.
   write(draft) {
-    this.draft = draft && { ...draft, said: "being written" };
+    this.draft = draft && { ...draft, remark: "being written" };
     this.draw();
   }
 
@@ -65,7 +65,7 @@ export class Effects {
     this.place.replaceChildren(...shown.map((effect) => this.row(effect)));
   }
 
-  row({ effect, status, why, explained, left_out_rms, own, said = this.said[effect] }) {
+  row({ effect, status, why, explained, left_out_rms, own, remark = this.remarks[effect] }) {
     const percent = explained === null ? 0 : Math.round(100 * Math.max(0, Math.min(1, explained)));
     const bar = element("i");
     bar.style.width = `${percent}%`;
@@ -74,7 +74,7 @@ export class Effects {
       { type: "button", class: "effect", role: "option", "aria-selected": String(effect === this.chosen), "data-effect": effect, title: why, onclick: () => this.pick(effect) },
       element("span", { class: "name" }, element("b", {}, effect.split("@")[0].replaceAll("_", " "), ...(own ? [element("small", { class: "own" }, " own")] : [])), element("span", {}, status === "not_testable" ? "–" : `${percent} %`)),
       element("div", { class: "share" }, bar),
-      element("small", { class: said ? "said" : "" }, said ?? this.left(status, why, left_out_rms)),
+      element("small", { class: remark ? "remark" : "" }, remark ?? this.left(status, why, left_out_rms)),
     );
   }
 

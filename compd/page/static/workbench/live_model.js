@@ -29,7 +29,7 @@ export class LiveModel {
     this.state = element("p", { id: "live-state", "aria-live": "polite" });
     this.models = element("p", { id: "live-models" });
     this.why = element("p", { class: "note", id: "live-why" });
-    this.offered = element("div", {}, element("div", { class: "row" }, this.orders.arm, this.run, this.adopt, button("End the shadow", "live-no-shadow", () => ask("shadow", "")), button("Run without effects", "live-no-model", () => ask("no-model", ""))), this.why, this.orders.consequence, this.orders.said);
+    this.offered = element("div", {}, element("div", { class: "row" }, this.orders.arm, this.run, this.adopt, button("End the shadow", "live-no-shadow", () => ask("shadow", "")), button("Run without effects", "live-no-model", () => ask("no-model", ""))), this.why, this.orders.consequence, this.orders.answer);
     this.bars = element("div", { id: "live-bars" });
     place.replaceChildren(element("h2", {}, "Machine ", element("small", {}, "the model on the machine that runs")), element("div", { class: "halves" }, element("div", {}, this.state, this.models, this.offered), this.bars));
     listen(this.page, this.age, { machine: (machine) => (this.page.machine = machine), live: () => {}, slow: () => this.hear() });

@@ -15,7 +15,7 @@ import { Selection } from "./selection.js";
 import { Strip } from "./strip.js";
 
 const at = (id) => document.getElementById(id);
-const bench = new Bench(at("said"));
+const bench = new Bench(at("problem-line"));
 const selection = new Selection();
 const strip = new Strip(at("errors"), at("verdict"));
 const picture = new Picture({ canvas: at("picture"), tabs: at("tabs"), against: at("against"), note: at("picture-note") }, selection);

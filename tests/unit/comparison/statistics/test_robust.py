@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.comparison.registration import register
+from compd.comparison.alignment.registration import register
 from compd.comparison.statistics.robust import (
     HUBER,
     SCALE_EFFICIENCY,

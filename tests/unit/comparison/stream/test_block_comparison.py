@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.comparison.align_recording import align_recording
+from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.compare import compare
 from compd.comparison.stream.block_comparison import compare_blocks
 from compd.comparison.stream.sample import draw_sample

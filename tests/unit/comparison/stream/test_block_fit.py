@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.comparison.align_recording import align_recording
+from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.fit import fit, initial_effect
 from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.stream.block_fit import fit_blocks

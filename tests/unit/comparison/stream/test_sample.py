@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.comparison.align_recording import align_recording
+from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.stream.sample import draw_sample
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording

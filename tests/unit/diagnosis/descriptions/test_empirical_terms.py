@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.comparison.align_recording import align_recording
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.align_recording import align_recording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.descriptions.empirical_terms import EmpiricalTerm, empirical_terms
 from compd.diagnosis.descriptions.search_covariates import round_within, untried_quantities
 from compd.diagnosis.descriptions.term_formula import formula_text

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import compd
 from compd.cli.measurements.diagnose import diagnose as diagnose_command
 from compd.cli.measurements.plan import plan as plan_command
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.planning.measurement_plan import LEAST_SEPARATION, MeasurementPlan, NextMeasurement
 from compd.diagnosis.planning.measurement_programmes import ProgrammeLimits, recorded_limits

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import compd
 from compd.arrays import FloatArray
 from compd.cli.measurements.plan import plan as plan_command
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.fit import fit, initial_effect
 from compd.diagnosis.planning.next_measurement import (
     measurement_of_constant,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.fit import fit, initial_effect
 from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.verdict import Diagnosis
@@ -124,7 +124,7 @@ def test_the_real_frame_needs_two_temperatures() -> None:
     path = SHARED / "real" / "voron-frame-expansion.csv"
     if not path.exists():
         pytest.skip("the real recording (../shared/real) is not here")
-    from compd.comparison.align_recording import align_recording
+    from compd.comparison.alignment.align_recording import align_recording
     from compd.comparison.open import read_with_machine
 
     diagnosis = diagnose(align_recording(*read_with_machine(path, None)), (), None, EFFECTS)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.comparison.aligned_recording import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.fit import fit, initial_effect
 from compd.diagnosis.candidates.candidates import CandidatePool, library_pool

@@ -14,7 +14,7 @@ from compd.live.processes import loop_succession
 from compd.live.processes.control import Control
 from compd.live.processes.loop_process import ModelChange
 from compd.live.processes.loop_succession import LoopSuccession
-from compd.model_document import read_document
+from compd.model_file.model_document import read_document
 from tests.support.live_models import file_with
 
 NOBODY = 65534

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.compensation import compensate_cmm
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.live.loop.model_loader import Models
 from compd.live.service.budget_message import BudgetMessage
 from compd.model.kernels.rotation import rotation_matrix

@@ -11,7 +11,7 @@ from compd.api.diagnosis import compare
 from compd.api.models import add_effect
 from compd.comparison.open import open_recording
 from compd.errors import StateError
-from compd.model_document import read_stored
+from compd.model_file.model_document import read_stored
 from compd.page.workbench.workbench import Workbench
 from tests.support.measured import gauges, hidden, record
 

@@ -1,0 +1,195 @@
+"""Aligning a recording with its machine: what the model predicts from the gauges, and the reference in its frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.alignment.external_machine import external_observations
+from compd.comparison.alignment.fixed_ends import place_balls, place_pins
+from compd.comparison.alignment.measured_attitude import LABELS as ATTITUDE_LABELS
+from compd.comparison.alignment.measured_attitude import attitude_mm, measured_attitude
+from compd.comparison.alignment.registration import Registration, register
+from compd.comparison.alignment.velocity import velocities
+from compd.comparison.criteria import ComparisonCriteria
+from compd.configuration import Configuration
+from compd.errors import Problem, RecordingError
+from compd.machine_builder import build_model
+from compd.model.machine import MachineModel
+from compd.model.motion import Movement
+from compd.model.observations import Observations
+from compd.model.observe import observe
+from compd.recording.recording import Recording
+
+
+def align_recording(
+    recording: Recording,
+    configuration: Configuration | None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> AlignedRecording:
+    """A recording on the machine that the configuration describes; None only for an external model.
+
+    Raises RecordingError where there is no reference, or where nothing can be computed from any row.
+    """
+    model = None if configuration is None else build_model(configuration.geometry, configuration.wiring)
+    geometry_hash = "" if configuration is None else configuration.geometry_hash
+    return align_observations(recording, model, recorded_observations(recording, model), geometry_hash, criteria)
+
+
+def recorded_observations(recording: Recording, model: MachineModel | None) -> Observations:
+    """Every row of the recording, as effects take it.  model : None for an external one.
+
+    Raises RecordingError as `align_recording` does.
+    """
+    if recording.reference is None:
+        where = str(recording.path)
+        raise RecordingError(Problem(where=where, what="names no reference", next_step="add one with `compd join`"))
+    starts = session_starts(recording)
+    return external_observations(recording, starts) if model is None else _observations(recording, model, starts)
+
+
+def align_observations(
+    recording: Recording,
+    model: MachineModel | None,
+    observations: Observations,
+    geometry_hash: str = "",
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    part_of: AlignedRecording | None = None,
+) -> AlignedRecording:
+    """As `align_recording`, for rows that are observed already.
+
+    part_of : of a block of a long recording the sample of it that places the instrument's frame.
+    """
+    assert recording.reference is not None
+    if recording.reference_link_mm is not None:
+        labels = tuple(f"link {i}" for i in recording.reference_links)
+        links = tuple(i - 1 for i in recording.reference_links)
+        return AlignedRecording(
+            recording, model, observations, labels, links, recording.reference_link_mm, None, geometry_hash
+        )
+    if (end := recording.fixed_end) is not None:
+        return _at_fixed_ends(
+            AlignedRecording(
+                recording,
+                model,
+                observations,
+                ("x", "y", "z"),
+                (0, 1, 2),
+                np.full((recording.rows, 3), np.nan),
+                None,
+                geometry_hash,
+            ),
+            end,
+        )
+    measured_mm = recording.reference_mm
+    if measured_mm is None:
+        raise RecordingError(Problem(where=str(recording.path), what="has no column of the reference"))
+    axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
+    registration = None if part_of is None else part_of.registration
+    if registration is not None:
+        measured_mm = registration.into_M(_in_space(measured_mm, axes))[:, list(axes)]
+    elif recording.reference.frame == "instrument" and part_of is None:
+        registration, measured_mm = _registered(recording, measured_mm, observations.tip_M_mm, axes, criteria)
+    labels = recording.reference_axes
+    # without a known noise nothing says what a urad counts beside a um: the attitude is compared, and fits no effect
+    weighed = model is not None and len(axes) == 3 and np.isfinite(recording.reference.sigma_urad)
+    if weighed and recording.reference_rotation_rad is not None:
+        nominal = observations.rotation_M_P
+        attitude = measured_attitude(recording.reference_rotation_rad, nominal, registration)
+        measured_mm = np.concatenate([measured_mm, attitude_mm(attitude, nominal)], axis=1)
+        labels = (*labels, *ATTITUDE_LABELS)
+    return AlignedRecording(
+        recording, model, observations, labels, axes, measured_mm, registration, geometry_hash, part_of=part_of
+    )
+
+
+def _at_fixed_ends(aligned: AlignedRecording, end: IntArray) -> AlignedRecording:
+    """The recording with the fixed balls or pins found, and what was measured from them. end : (N,)."""
+    recording, where = aligned.recording, str(aligned.recording.path)
+    assert recording.reference is not None
+    tip_mm = np.where(recording.excluded[:, None], np.nan, aligned.nominal_tip_mm)
+    if recording.reference_distance_mm is None:
+        ends = place_pins(tip_mm, end, recording.end_name, where)
+        return replace(aligned, ends=ends, measured_mm=ends.place_of_row_mm)
+    distance_mm = recording.reference_distance_mm
+    ends = place_balls(tip_mm, distance_mm, end, recording.reference.absolute, recording.end_name, where)
+    measured_mm = np.where(ends.of_row >= 0, distance_mm + ends.added_mm[ends.of_row], np.nan)[:, None]
+    return replace(aligned, ends=ends, labels=("distance",), measured_mm=measured_mm)
+
+
+def _registered(
+    recording: Recording,
+    measured_mm: FloatArray,
+    tip_M_mm: FloatArray,
+    axes: tuple[int, ...],
+    criteria: ComparisonCriteria,
+) -> tuple[Registration | None, FloatArray]:
+    """How the instrument's frame lies in {M}, and what was measured (N, m), in {M}; None where nothing fixes it.
+
+    Points in the plane z = 0 are turned in it. Along fewer axes, or of a point of which the third coordinate matters,
+    no frame can be laid over another: it must lie near already.
+    """
+    in_plane = axes == (0, 1) and not np.isfinite(tip_M_mm[:, 2]).any()
+    if len(axes) < 3 and not in_plane:
+        return None, measured_mm
+    points, predicted = _in_space(measured_mm, axes), _in_space(tip_M_mm[:, list(axes)], axes)
+    registration = register(np.where(recording.excluded[:, None], np.nan, points), predicted, criteria)
+    if registration is not None:
+        measured_mm = registration.into_M(points)[:, list(axes)]
+    return registration, measured_mm
+
+
+def _observations(recording: Recording, model: MachineModel, starts: BoolArray) -> Observations:
+    """Every row of the recording, as effects take it; comparators that were not recorded count as unmoved.
+
+    starts : (N,) rows without a history.
+    """
+    assert model.constants is not None
+    count = recording.rows
+    scale_mm = recording.scale_mm
+    if scale_mm is None:
+        raise RecordingError(
+            Problem(
+                where=str(recording.path),
+                what="has no scale columns",
+                allowed="scale_1_mm ...",
+                next_step="a machine's recording needs its scales; `machine: external` needs none",
+            )
+        )
+    comparators = model.joint_weights.shape[1]
+    joint_mm = np.zeros((count, comparators)) if recording.joint_mm is None else recording.joint_mm
+    frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
+    approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
+    at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
+    velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm)
+    movement = Movement(approach, *np.split(velocity, [scale_mm.shape[1]], axis=1))
+    return observe(
+        model,
+        model.constants,
+        scale_mm=scale_mm,
+        joint_mm=joint_mm,
+        frame_mm=frame_mm,
+        quantities=recording.quantities,
+        time_s=recording.time_s,
+        session_start=starts,
+        movement=movement,
+    )
+
+
+def session_starts(recording: Recording) -> BoolArray:
+    """(N,) rows without a history: the first of each session."""
+    starts = np.zeros(recording.rows, dtype=bool)
+    starts[:1] = True
+    if recording.session is not None:
+        starts[1:] = recording.session[1:] != recording.session[:-1]
+    return starts
+
+
+def _in_space(values_mm: FloatArray, axes: tuple[int, ...]) -> FloatArray:
+    """(N, 3) coordinates along `axes` (N, m), the others 0."""
+    points = np.zeros((len(values_mm), 3))
+    points[:, list(axes)] = values_mm
+    return points

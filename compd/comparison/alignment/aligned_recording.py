@@ -1,0 +1,334 @@
+"""A recording aligned with its machine: the measured coordinates beside the model's prediction from the gauges."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.alignment.external_machine import external_change, external_prediction
+from compd.comparison.alignment.fixed_ends import FixedEnds
+from compd.comparison.alignment.measured_attitude import LABELS as ATTITUDE_LABELS
+from compd.comparison.alignment.measured_attitude import (
+    MM_PER_RAD,
+    attitude_mm,
+    attitude_registration_columns,
+    measured_attitude,
+)
+from compd.comparison.alignment.measured_attitude import UNIT as ATTITUDE_UNIT
+from compd.comparison.alignment.registration import (
+    Registration,
+    displacement_columns,
+    points_spread_mm,
+    registration_columns,
+)
+from compd.comparison.display_unit import in_place_unit
+from compd.errors import CompdError
+from compd.model.deltas import Deltas, deltas_by_effect, split_by_port, sum_deltas
+from compd.model.effect import ConstantValues, Effect, FittedEffect, Port
+from compd.model.effect_basis import evaluate_basis
+from compd.model.effect_needs import unmet_needs
+from compd.model.machine import MachineModel
+from compd.model.observations import Observations
+from compd.model.prediction import predict
+from compd.model.sensitivity import Sensitivity, sensitivities
+from compd.model.solve_status import MEANING, Reason
+from compd.recording.gaps import filled
+from compd.recording.recording import Recording, UsableRows
+from compd.tables import Columns, data_frame, html_table
+from compd.units import REFERENCE_UNITS, UM_PER_MM
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AlignedRecording:
+    """A recording with its machine: N rows with m measured coordinates each.
+
+    These are x, y, z of the tip, with rx, ry, rz of the attitude where that was measured too; or lengths of links; or
+    the distance from a fixed ball.
+
+    Attributes
+    ----------
+    recording : Recording
+        The columns of the file by name, and what the sidecar says.
+    model : MachineModel or None
+        Kinematics and frame of the machine; None for ``machine: external``.
+    rows : Observations
+        What effects are computed from, for all N rows, also those that are not used: effects with memory need their
+        history.
+    labels : tuple of str
+        The m coordinates: ``"x"``, ``"y"``, ``"z"``, ``"rx"`` ..., or ``"link 1"`` ..., or ``"distance"``.
+    axes : tuple of int
+        The axes of the tip that are measured, 0, 1, 2 for x, y, z; all three of a distance; or the links, from 0.
+    measured_mm : (N, m) array
+        The reference in {M}, or changes of link lengths, or distances, mm; a urad of the attitude counts as a um. nan
+        where nothing was measured.
+    registration : Registration or None
+        How `measured_mm` came from the instrument's frame into {M}; None where it was measured there.
+    ends : FixedEnds or None
+        Of distances and pins the fixed balls or pins, whose places are always fitted along; None for others.
+    geometry_hash : str
+        Of the configuration that the model was built from; ``""`` for ``machine: external``.
+    part_of : AlignedRecording or None
+        Of a block of a long recording the sample of it that places the instrument's frame; None for a whole recording.
+    """
+
+    recording: Recording
+    model: MachineModel | None
+    rows: Observations
+    labels: tuple[str, ...]
+    axes: tuple[int, ...]
+    measured_mm: FloatArray
+    registration: Registration | None
+    geometry_hash: str = ""
+    ends: FixedEnds | None = None
+    part_of: AlignedRecording | None = None
+    _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
+
+    @property
+    def unit(self) -> str:
+        """The unit in which people read the residual: ``"um"``, or what the sidecar names, such as ``"arcsec"``."""
+        return self.recording.unit
+
+    @property
+    def of_links(self) -> bool:
+        """Whether link lengths were measured, not the tip."""
+        return self.recording.reference_link_mm is not None
+
+    @property
+    def of_distance(self) -> bool:
+        """Whether the distance from fixed balls was measured."""
+        return self.ends is not None and self.ends.of_lengths
+
+    @property
+    def with_attitude(self) -> bool:
+        """Whether the attitude is among the measured coordinates, as the last three of them."""
+        return self.labels[-len(ATTITUDE_LABELS) :] == ATTITUDE_LABELS
+
+    @property
+    def shows_tip(self) -> bool:
+        """Whether all three coordinates of the tip are measured; they are the first three then."""
+        return self.labels[:3] == ("x", "y", "z")
+
+    @property
+    def lengths(self) -> slice:
+        """The measured coordinates that are in `unit`: all but those of the attitude."""
+        return slice(len(self.labels) - 3 * self.with_attitude)
+
+    def unit_of(self, label: str) -> str:
+        """The unit in which people read the residual of a coordinate."""
+        return ATTITUDE_UNIT if label in ATTITUDE_LABELS else self.unit
+
+    @property
+    def registered(self) -> bool:
+        """Whether the parameters of the instrument's frame, or the places of fixed ends, are always fitted along."""
+        reference = self.recording.reference
+        return reference is not None and reference.frame == "instrument" and not self.of_links
+
+    def predicted_mm(self, added: Deltas, rows: Observations | None = None) -> FloatArray:
+        """(N, m) prediction of the reference when effects add `added` at their ports; nan where there is no pose.
+
+        rows : other observations than the recording's own, None for those.
+        """
+        rows = self.rows if rows is None else rows
+        if self.model is None:
+            predicted = external_prediction(self.recording)
+            predicted = predicted + external_change(added, self.axes, self.of_links) if added else predicted
+            return self._from_ends(predicted)
+        prediction = predict(self.model, rows, added)
+        if self.of_links:
+            return (prediction.link_length_mm - self.model.zero.link_length_mm)[:, list(self.axes)]
+        shown = self._from_ends(prediction.tip_mm[:, list(self.axes)])
+        if self.with_attitude:
+            return np.concatenate([shown, attitude_mm(prediction.rotation_M_P, rows.rotation_M_P)], axis=1)
+        return shown
+
+    def _from_ends(self, tip_mm: FloatArray) -> FloatArray:
+        """(N, m) what is measured of the tip (N, axes): its distance from the row's fixed ball, or the tip itself."""
+        return self.ends.lengths_mm(tip_mm) if self.ends is not None and self.ends.of_lengths else tip_mm
+
+    @cached_property
+    def nominal_tip_mm(self) -> FloatArray:
+        """(N, 3) the tip that is predicted without effects, in the frame in which the reference shows it."""
+        if self.model is None:
+            return self.rows.tip_M_mm
+        return predict(self.model, self.rows, {}).tip_mm
+
+    def shown(self, sensitivity: Sensitivity) -> FloatArray:
+        """(N, m, size) the measured coordinates' share of a prediction's derivatives."""
+        if self.of_links:
+            return sensitivity.link_length[:, list(self.axes)]
+        shown = self.along_ends(sensitivity.tip[:, list(self.axes)])
+        if self.with_attitude:
+            return np.concatenate([shown, sensitivity.rotation * MM_PER_RAD], axis=1)
+        return shown
+
+    def along_ends(self, change: FloatArray) -> FloatArray:
+        """(N, m, size) changes of the tip (N, axes, size) along what is measured: of a distance from the fixed ball."""
+        if self.ends is None or not self.ends.of_lengths:
+            return change
+        return np.asarray(self.ends.directions(self.nominal_tip_mm) @ change)
+
+    def select(self, index: IntArray | slice) -> AlignedRecording:
+        """The rows of this index (R,), in its order; of a slice without a copy."""
+        return replace(
+            self,
+            recording=self.recording.select(index),
+            rows=self.rows.select(index),
+            measured_mm=self.measured_mm[index],
+            ends=None if self.ends is None else self.ends.select(index),
+            _by_port={},
+        )
+
+    def sensitivity(self, ports: Collection[Port]) -> Mapping[Port, Sensitivity]:
+        """Derivatives of the prediction by what is added at `ports`; each is computed once."""
+        new = [port for port in ports if port not in self._by_port]
+        if new and self.model is not None:
+            self._by_port.update(sensitivities(self.model, self.rows, new))
+        return self._by_port
+
+    def columns(self, effect: Effect, shape: ConstantValues) -> FloatArray:
+        """(N, m, P) derivatives of the prediction (mm) by each parameter of the effect."""
+        basis, _ = evaluate_basis(effect, self.rows, shape, None)
+        return self.propagated(effect, basis)
+
+    def propagated(self, effect: Effect, basis: FloatArray) -> FloatArray:
+        """(N, m, P) changes of the prediction (mm) by what is added at the effect's ports (N, sum of sizes, P), mm."""
+        added = split_by_port(effect, self.rows, basis)
+        if self.model is None:
+            return self.along_ends(external_change(added, self.axes, self.of_links))
+        by_port = self.sensitivity(effect.ports)
+        changes = [self.shown(by_port[port]) @ values for port, values in added.items()]
+        return np.asarray(sum(changes[1:], start=changes[0]))
+
+    @cached_property
+    def registration_columns(self) -> FloatArray:
+        """(N, m, Q) derivatives (mm) of what is always fitted along; none of a machine's own frame, Q = 0.
+
+        Of an instrument's frame its small motion; of fixed ends their places; of an external model a constant of each
+        coordinate, because where its zero lies says nothing about the machine.
+        """
+        if self.ends is not None:
+            return self.ends.columns(self.nominal_tip_mm)
+        if self.registered:
+            points_M_mm = self.rows.tip_M_mm if self.part_of is None else self.part_of.rows.tip_M_mm
+            columns = registration_columns(self.rows.tip_M_mm, self.axes, points_M_mm)
+            if not self.with_attitude:
+                return columns
+            return attitude_registration_columns(columns, self.rows.rotation_M_P, points_spread_mm(points_M_mm))
+        if self.model is None:
+            return displacement_columns(*self.measured_mm.shape)
+        return np.zeros((*self.measured_mm.shape, 0))
+
+    @cached_property
+    def gaps_filled(self) -> AlignedRecording:
+        """The same recording, single empty cells of its quantities filled from the nearest row in time.
+
+        For what describes a residual; what the effects of a model compute is never made of filled values.
+        """
+        quantities = {name: filled(values, self.rows.time_s) for name, values in self.rows.quantities.items()}
+        if all(values is self.rows.quantities[name] for name, values in quantities.items()):
+            return self
+        return replace(self, rows=replace(self.rows, quantities=quantities))
+
+    @cached_property
+    def usable(self) -> UsableRows:
+        """Rows with every gauge and reference value and a pose; why the others are left out."""
+        recording = self.recording
+        # a link's length needs neither the frame nor the other links' references
+        needed = [*recording.gauge_columns, *recording.reference_columns, *recording.model_columns]
+        mask, left, reason = recording.usable(needed)
+        left_out = {**recording.left_out, **left}
+        at_pose = self.model is not None and self.ends is None
+        predicted = self.rows.origin_M_mm if at_pose else self.predicted_mm({})
+        nowhere = mask & ~np.isfinite(predicted).all(axis=1)
+        if nowhere.any():
+            why = self._why_no_pose(nowhere)
+            left_out[why] = int(nowhere.sum())
+            reason[nowhere] = why
+        return UsableRows(mask & ~nowhere, left_out, reason)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The rows, as a pandas data frame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            N rows: `row`, the row as a spreadsheet shows it; every column of the file under its own name, in its own
+            unit; then for each measured coordinate `measured_x_mm` and `predicted_x_mm` in {M} (or
+            `measured_link_1_mm`, changes of length), predicted from the gauges without any effect; for a reference in
+            another unit `measured_x_arcsec` ... nan where a cell is empty and where there is no pose.
+
+        Raises
+        ------
+        CompdError
+            Where pandas is not installed.
+        """
+        measured, predicted = (in_place_unit(place, self.unit) for place in (self.measured_mm, self.predicted_mm({})))
+        ending = REFERENCE_UNITS[self.unit]
+        columns: dict[str, Any] = {"row": self.recording.row, **self.recording.columns}
+        for k, name in enumerate(self.label_names):
+            columns[f"measured_{name}_{ending}"] = measured[:, k]
+            columns[f"predicted_{name}_{ending}"] = predicted[:, k]
+        return data_frame(columns)
+
+    @property
+    def label_names(self) -> tuple[str, ...]:
+        """The m measured coordinates as parts of column names, such as "x" and "link_1"."""
+        return tuple(label.replace(" ", "_") for label in self.labels)
+
+    def _repr_html_(self) -> str:
+        columns = {name: values for name, values in self.recording.columns.items() if np.isfinite(values).any()}
+        table: Columns = {
+            "column": list(columns),
+            "values": [int(np.isfinite(values).sum()) for values in columns.values()],
+            "smallest": [float(np.nanmin(values)) for values in columns.values()],
+            "largest": [float(np.nanmax(values)) for values in columns.values()],
+        }
+        return html_table(
+            str(self), table, [f"{count} rows left out: {why}" for why, count in self.usable.left_out.items()]
+        )
+
+    def __str__(self) -> str:
+        recording = self.recording
+        hours = (recording.time_s[-1] - recording.time_s[0]) / 3600.0
+        when = f"over {hours:.3g} h" if recording.has_time else "in order, without time"
+        return (
+            f"{recording.path.name}: {recording.machine}, {recording.rows} rows {when}, "
+            f"{int(self.usable.mask.sum())} of them with a prediction and a measured {', '.join(self.labels)}"
+        )
+
+    def __repr__(self) -> str:
+        return f"<AlignedRecording {self}>"
+
+    def attitude_residual_urad(self, added: Deltas) -> FloatArray | None:
+        """(N, 3) rotation vector from the modelled to the measured attitude, in {M}; None where none was measured."""
+        measured = self.recording.reference_rotation_rad
+        if measured is None or self.model is None:
+            return None
+        attitude = measured_attitude(measured, self.rows.rotation_M_P, self.registration)
+        return attitude_mm(attitude, predict(self.model, self.rows, added).rotation_M_P) * UM_PER_MM
+
+    def _why_no_pose(self, rows: BoolArray) -> str:
+        if self.model is None:
+            return "the model's prediction is empty"
+        reasons = predict(self.model, self.rows, {}).reason[rows]
+        return "no pose: " + "; ".join(MEANING[Reason(int(code))] for code in np.unique(reasons[reasons > 0]))
+
+
+def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[str, Deltas], Deltas]:
+    """What each effect adds at its ports, by the effect's id; and the sum over all effects.
+
+    Raises CompdError with everything that the effects need and the recording has not.
+    """
+    problems = [problem for effect in fitted for problem in unmet_needs(effect.effect, rows.available, rows.links)]
+    if problems:
+        raise CompdError(problems)
+    by_effect, _ = deltas_by_effect(fitted, rows, {})
+    return by_effect, sum_deltas(list(by_effect.values()))

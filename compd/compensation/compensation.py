@@ -1,0 +1,245 @@
+"""From gauge values and a model to a compensated tip and a scale setpoint: pure functions, shared by daemon and replay.
+
+Both modes go the same way: machine frame (3), joints (1), kinematics, and then the effects of the model
+(`compd.model.effect_program`), if it has any. In both, the correction is what is added to the command, and the command
+is what a controller that knows nothing of joints and frame would send to bring the tip to its target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compd.arrays import FloatArray
+from compd.compensation.rows import Rows, kernel_rows
+from compd.compensation.values import Compensation, CorrectionShares, GaugeValues, Wanted, WarmStart
+from compd.errors import KinematicsError, Problem
+from compd.model.effect import Memory
+from compd.model.effect_memory import EffectMemory, PackedMemory
+from compd.model.frame import Frame
+from compd.model.kernels.compensation import compensate_rows
+from compd.model.kernels.rotation import compose, rotation_matrix
+from compd.model.kernels.solver_structures import RESULT, WORKSPACE
+from compd.model.kinematics import Pose
+from compd.model.machine import MachineModel
+from compd.model.python_effects import EffectInputs, python_effects
+
+# In machine-tool mode effects are computed at the scale setpoint, which they shift themselves. After the first pass the
+# error left is at most a scale's cyclic error, 1 % of its period; the second leaves 2 pi times 1 % of that: nanometres.
+_EFFECT_PASSES = 2
+
+
+def compensate_machine_tool(
+    model: MachineModel,
+    target_mm: ArrayLike,
+    target_rotation_B0_rad: ArrayLike | None,
+    values: GaugeValues,
+    warm: WarmStart,
+) -> tuple[Compensation, WarmStart]:
+    """Machine-tool mode: equation (8), inverse kinematics with the base joints as they are now, (1) solved for gL.
+
+    target_mm : (..., 3), in {B0}; with the tool on the plate the place on the work, in {P}.
+    target_rotation_B0_rad : (..., 3), hexapod only, rotation vector of the attitude wanted for {P} in {B0}; None
+        for machine zero's attitude.
+    values : the scales are not used and may be nan; effects are computed at the setpoint.
+    A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
+    Raises KinematicsError for an attitude asked of a tripod.
+    """
+    attitude_M_P = _attitude(model, target_rotation_B0_rad, warm)
+    contact = model.arrangement.target_contact(model.frame, target_mm)
+    return _compensate(model, values, warm, Wanted(*contact, attitude_M_P))
+
+
+def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) -> tuple[Compensation, WarmStart]:
+    """CMM mode: equations (1) and (3), forward kinematics with the base joints as they are now, and (9).
+
+    The correction is that of the command which the scales show now: its target is where uncompensated kinematics
+    takes the tip to be.
+    A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
+    """
+    return _compensate(model, values, warm, None)
+
+
+def _compensate(
+    model: MachineModel, values: GaugeValues, warm: WarmStart, wanted: Wanted | None
+) -> tuple[Compensation, WarmStart]:
+    """The compensation in machine-tool mode, or in CMM mode where nothing is wanted."""
+    rows = kernel_rows(model, values, warm, wanted)
+    memory, machine_tool = warm.effects, wanted is not None
+    if not model.program.given:
+        passes = _EFFECT_PASSES if machine_tool else 1
+        solved = _solve(model, rows, memory, machine_tool, passes, None, None)
+        return _result(model, rows, solved, memory, {}, machine_tool)
+    # the kernel computes without effects, Python what its effects add there, and the kernel the whole
+    without = replace(model, effects=())
+    bare = _solve(without, rows, EffectMemory(), machine_tool, 1, None, None)
+    effects_at_mm = bare.results["scale_setpoint_mm"][:, : model.links].copy() if machine_tool else rows.scale_mm
+    for _ in range(_EFFECT_PASSES if machine_tool else 1):
+        inputs = _effect_inputs(model, rows, bare.results, values, effects_at_mm)
+        given_mm, memories = python_effects(model, inputs, memory, machine_tool)
+        solved = _solve(model, rows, memory, machine_tool, 1, effects_at_mm, given_mm)
+        effects_at_mm = solved.results["scale_setpoint_mm"][:, : model.links].copy()
+    return _result(model, rows, solved, memory, memories, machine_tool)
+
+
+class _Solved(NamedTuple):
+    """What the kernel leaves: results (N,), shares_mm (N, 2 + K, n), and the memory after the last row."""
+
+    results: NDArray[np.void]
+    shares_mm: FloatArray
+    memory: PackedMemory
+
+
+def _solve(
+    model: MachineModel,
+    rows: Rows,
+    memory: EffectMemory,
+    machine_tool: bool,
+    passes: int,
+    effects_at_mm: FloatArray | None,
+    given_mm: FloatArray | None,
+) -> _Solved:
+    program, structure = model.program, model.structure
+    count, links = rows.scale_mm.shape
+    solved = _Solved(
+        _room(count, RESULT),
+        np.empty((count, 2 + len(program.effects), links)),
+        memory.pack(model, rows.joint_mm.shape[1]),
+    )
+    compensate_rows(
+        machine_tool,
+        passes,
+        memory.is_empty,
+        memory.commanded != machine_tool,
+        structure,
+        program.machine,
+        program.effects,
+        program.theta,
+        program.numbers,
+        program.code,
+        program.quantity_places,
+        program.targets,
+        rows.scale_mm,
+        rows.joint_mm,
+        rows.frame_mm,
+        rows.quantities,
+        rows.time_s,
+        rows.wanted_mm,
+        rows.attitude_M_P,
+        _not_given(count, links) if effects_at_mm is None else effects_at_mm,
+        np.empty((0, 0, program.size)) if given_mm is None else given_mm,
+        *rows.warm,
+        solved.memory.motion,
+        solved.memory.memories,
+        _room(1, WORKSPACE),
+        solved.results,
+        solved.shares_mm,
+    )
+    return solved
+
+
+@lru_cache(maxsize=8)
+def _not_given(count: int, links: int) -> FloatArray:
+    return np.full((count, links), np.nan)
+
+
+def _room(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:
+    """So many structures, not filled; `np.empty` takes 5 us for nested ones."""
+    return np.ndarray(count, structure, np.empty(count * structure.itemsize, dtype=np.uint8))
+
+
+def _effect_inputs(
+    model: MachineModel, rows: Rows, bare: NDArray[np.void], values: GaugeValues, effects_at_mm: FloatArray
+) -> EffectInputs:
+    """What Python effects are computed from: the machine without effects."""
+    n, pose = model.links, bare["bare_pose"]
+    count = len(bare)
+    return EffectInputs(
+        effects_at_mm,
+        rows.joint_mm,
+        rows.frame_mm,
+        {
+            name: np.broadcast_to(quantity, rows.lead or (1,)).reshape(count)
+            for name, quantity in values.quantities.items()
+        },
+        rows.time_s,
+        bare["bare_frame"]["base_joints_M_mm"][:, :n],
+        Pose(
+            pose["origin_M_mm"],
+            pose["rotation_M_P"],
+            pose["link_length_mm"][:, :n],
+            pose["iterations"][:, 0],
+            pose["residual_mm"][:, 0],
+            pose["reason"][:, 0],
+        ),
+        bare["tip_M_mm"],
+    )
+
+
+def _result(
+    model: MachineModel,
+    rows: Rows,
+    solved: _Solved,
+    memory: EffectMemory,
+    memories: Mapping[str, Memory],
+    machine_tool: bool,
+) -> tuple[Compensation, WarmStart]:
+    """The compensation and the next warm start. memories : of the Python effects."""
+    n, lead = model.links, rows.lead
+    results: Any = solved.results.reshape(lead) if lead else solved.results[0]
+    shares_mm = solved.shares_mm.reshape(*lead, *solved.shares_mm.shape[1:]) if lead else solved.shares_mm[0]
+    frame, pose = results["frame"], results["pose"]
+    compensation = Compensation(
+        results["tip_M_mm"],
+        results["tip_B0_mm"],
+        results["tip_P_mm"],
+        pose["rotation_M_P"],
+        Frame(
+            frame["supports_M_mm"],
+            frame["origin_M_mm"],
+            frame["rotation_M_B"],
+            frame["base_joints_M_mm"][..., :n, :],
+            frame["displacement_M_mm"],
+            frame["rotation_M_rad"],
+            frame["iterations"][..., 0],
+            frame["residual_mm"][..., 0],
+            frame["reason"][..., 0],
+        ),
+        pose["link_length_mm"][..., :n],
+        results["target_B_mm"],
+        results["nominal_scale_mm"][..., :n],
+        results["scale_setpoint_mm"][..., :n],
+        results["correction_mm"][..., :n],
+        CorrectionShares(model.source_names, np.moveaxis(shares_mm, -2, 0) if lead else shares_mm),
+        results["reason"],
+    )
+    if model.live_effects:
+        memory = EffectMemory(commanded=machine_tool, packed=solved.memory)
+        if memories:
+            memory = EffectMemory(memory.motion, {**memory.memories, **memories}, machine_tool)
+    warm = WarmStart(results["warm_supports_M_mm"], results["warm_origin_M_mm"], results["warm_rotation_M_P"], memory)
+    return compensation, warm
+
+
+def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, warm: WarmStart) -> FloatArray:
+    """The attitude wanted of a hexapod in {M}; for a tripod the guess to start from."""
+    if not model.attitude_is_free:
+        if target_rotation_B0_rad is not None:
+            raise KinematicsError(
+                Problem(
+                    where="target",
+                    what="a tripod's attitude follows from its tip",
+                    value=str(target_rotation_B0_rad),
+                    allowed="a position alone",
+                    next_step="leave the attitude out",
+                )
+            )
+        return warm.rotation_M_P
+    if target_rotation_B0_rad is None:
+        return model.zero.rotation_M_P
+    return np.asarray(compose(model.frame.zero_rotation_M_B, rotation_matrix(target_rotation_B0_rad)))

@@ -1,0 +1,89 @@
+"""The arguments of a compensation as its kernel takes them: N rows, contiguous, of float64."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.compensation.values import GaugeValues, Wanted, WarmStart
+from compd.errors import CompdError, Problem
+from compd.model.machine import MachineModel
+
+
+class Rows(NamedTuple):
+    """The arguments of a compensation as the kernel takes them: N rows, contiguous, of float64.
+
+    lead : the leading axes of the result; () for a single snapshot.
+    wanted : (N, 6) tip in {M} and in {P}.  warm : one row, or N.
+    """
+
+    lead: tuple[int, ...]
+    scale_mm: FloatArray
+    joint_mm: FloatArray
+    frame_mm: FloatArray
+    quantities: FloatArray
+    time_s: FloatArray
+    wanted_mm: FloatArray
+    attitude_M_P: FloatArray
+    warm: tuple[FloatArray, FloatArray, FloatArray]
+
+
+def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wanted: Wanted | None) -> Rows:
+    readings = (values.joint_mm, values.frame_mm) if wanted else (values.scale_mm, values.joint_mm, values.frame_mm)
+    starts = (warm.supports_M_mm, 2), (warm.origin_M_mm, 1), (warm.rotation_M_P, 2)
+    targets = ((wanted.tip_M_mm, 1), (wanted.tip_P_mm, 1), (wanted.attitude_M_P, 2)) if wanted else ()
+    parts = [*((reading, 1) for reading in readings), *starts, *targets]
+    lead: tuple[int, ...] = ()
+    if any(part.ndim > core for part, core in parts):
+        lead = np.broadcast_shapes(*(part.shape[: part.ndim - core] for part, core in parts))
+    count = math.prod(lead)
+    names = model.program.quantities
+    quantities = np.empty((count, len(names)))
+    for place, name in enumerate(names):
+        quantities[:, place] = _quantity(values.quantities, name)
+    wanted_mm, attitude_M_P = np.empty((count, 6)), np.empty((count, 3, 3))
+    if wanted:
+        wanted_mm[:, :3] = _row_copy(wanted.tip_M_mm, lead, 1)
+        wanted_mm[:, 3:] = _row_copy(wanted.tip_P_mm, lead, 1)
+        attitude_M_P[:] = _row_copy(wanted.attitude_M_P, lead, 2)
+    return Rows(
+        lead,
+        _row_copy(values.scale_mm, lead, 1),
+        _row_copy(values.joint_mm, lead, 1),
+        _row_copy(values.frame_mm, lead, 1),
+        quantities,
+        _row_copy(np.asarray(values.time_s), lead, 0),
+        wanted_mm,
+        attitude_M_P,
+        (
+            _row_copy(warm.supports_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 2),
+            _row_copy(warm.origin_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 1),
+            _row_copy(warm.rotation_M_P, lead if warm.supports_M_mm.ndim > 2 else (), 2),
+        ),
+    )
+
+
+def _row_copy(values: FloatArray, lead: tuple[int, ...], core: int) -> FloatArray:
+    """(N, ...), a copy: the kernel takes none that is read-only."""
+    if not lead:
+        return np.array(values, dtype=np.float64, ndmin=core + 1)
+    shape = values.shape[values.ndim - core :]
+    return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64).reshape(math.prod(lead), *shape)
+
+
+def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:
+    if name not in quantities:
+        raise CompdError(
+            Problem(
+                where="rows for effects",
+                what="this quantity is not measured",
+                value=name,
+                allowed=", ".join(sorted(quantities)) or "nothing is",
+                next_step="add a gauge or a column of this name",
+            )
+        )
+    return quantities[name]

@@ -1,0 +1,315 @@
+"""A machine's model: its effects with their fitted numbers, and the ledger of how they came to be.
+
+`compd.model_file.model_document` has the keys of the file that a model is kept in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.errors import CompdError, Problem, StateError
+from compd.model.effect import Effect, FittedEffect
+from compd.model.library import find_effect
+from compd.model_file.model_document import (
+    Declaration,
+    EffectEntry,
+    ModelStep,
+    State,
+    StoredModel,
+    read_document,
+    write_stored,
+)
+from compd.tables import Columns, data_frame, html_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class EffectNumber:
+    """One number of an effect, in the unit that people read.
+
+    Attributes
+    ----------
+    effect : str
+        Id of the effect.
+    parameter : str
+        Name of the parameter; with ``_1``, ``_x`` where there is one per link or axis.
+    value : float
+        Its value, in `unit`.
+    standard_error : float
+        In `unit`; nan where it is not known.
+    unit : str
+        For instance ``"ppm/K"``.
+    plausible_low : float
+        Lower end of the plausible range, in `unit`.
+    plausible_high : float
+        Upper end of the plausible range, in `unit`.
+    searched : bool
+        A nonlinear constant, which was searched and has no standard error.
+    """
+
+    effect: str
+    parameter: str
+    value: float
+    standard_error: float
+    unit: str
+    plausible_low: float
+    plausible_high: float
+    searched: bool
+
+    @property
+    def plausible(self) -> bool:
+        """Whether it lies in the plausible range."""
+        return self.plausible_low <= self.value <= self.plausible_high
+
+
+@dataclass(frozen=True, repr=False)
+class ModelFile:
+    """The effects that a machine's model has, with their fitted numbers, and the ledger of how they came to be.
+
+    `open_model` reads one, `add_effect` begins one or adds to it, `write` keeps it. It is never changed in place.
+
+    Attributes
+    ----------
+    machine : str
+        Name of the machine's configuration, or ``"external"``.
+    links : int
+        Number of the machine's links; of an external model 0, or the number of links whose length it predicts.
+    declared : tuple of str or dict
+        Each effect as it was named: an id, ``/absolute/file.py:NAME``, or a formula written out.
+    fitted : tuple of FittedEffect
+        The same effects with their P fitted numbers.
+    covariance : (P, P) array
+        Of all fitted numbers jointly, in the order of `fitted`.
+    steps : tuple of ModelStep
+        The ledger: every change, with the recording it was fitted on and the error before and after.
+    geometry : str
+        Hash of the geometry that it was fitted on; ``""`` where that is not known.
+    """
+
+    machine: str
+    links: int
+    declared: tuple[Declaration, ...] = ()
+    fitted: tuple[FittedEffect, ...] = ()
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    steps: tuple[ModelStep, ...] = ()
+    geometry: str = ""
+
+    def write(self, path: str | Path) -> None:
+        """Write the model file (YAML), whole or not at all; an existing file is replaced.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to. `compd adopt` takes the file into the running daemon.
+
+        Raises
+        ------
+        StateError
+            Where the disk refuses.
+        """
+        write_stored(Path(path), StoredModel(self.machine, self.state(), self.steps, self.geometry))
+
+    def state(self) -> State:
+        """The effects as plain data, for the file."""
+        effects = [
+            {
+                "effect": declared if isinstance(declared, str) else dict(declared),
+                "shape": {name: float(value) for name, value in fitted.constants.items()},
+                "parameters": _estimates(fitted, self.links),
+            }
+            for declared, fitted in zip(self.declared, _with_own_covariance(self.fitted, self.covariance), strict=True)
+        ]
+        return {"effects": effects, "covariance": self.covariance.tolist()}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """One row per number of each effect, as a pandas data frame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns `effect`, `parameter`; `value`, `standard_error`, `plausible_low` and `plausible_high`, all in
+            `unit`; and `searched`, true for a nonlinear constant, which has no standard error: nan.
+
+        Raises
+        ------
+        CompdError
+            Where pandas is not installed.
+        """
+        return data_frame(self._columns())
+
+    def _repr_html_(self) -> str:
+        remarks = [
+            f"{step.kind} {step.effect} on {step.recording}: "
+            f"{step.rms_before_um:.3g} to {step.rms_after_um:.3g} {step.unit}" + (" (undone)" if step.undone else "")
+            for step in self.steps
+        ]
+        return html_table(str(self), self._columns(), remarks)
+
+    def __str__(self) -> str:
+        names = ", ".join(fitted.effect.id for fitted in self.fitted) or "no effects"
+        return f"Model of {self.machine}: {names}"
+
+    def __repr__(self) -> str:
+        return f"<{self}>"
+
+    def numbers(self) -> list[EffectNumber]:
+        """Every number of every effect: its parameters, then its searched nonlinear constants."""
+        numbers: list[EffectNumber] = []
+        for fitted in _with_own_covariance(self.fitted, self.covariance):
+            effect = fitted.effect
+            for column, estimate in zip(effect.columns(self.links), _estimates(fitted, self.links), strict=True):
+                name, value, std, unit = estimate.values()
+                numbers.append(
+                    EffectNumber(effect.id, name, value, std, unit, column.parameter.low, column.parameter.high, False)
+                )
+            for constant in effect.constants:
+                value, unit = float(fitted.constants[constant.name]), constant.unit
+                numbers.append(
+                    EffectNumber(effect.id, constant.name, value, np.nan, unit, constant.low, constant.high, True)
+                )
+        return numbers
+
+    def _columns(self) -> Columns:
+        numbers = self.numbers()
+        return {name: [getattr(number, name) for number in numbers] for name in EffectNumber.__dataclass_fields__}
+
+
+def read_model_file(
+    path: Path, machine: str, links: int | None, geometry: str = "", content: bytes | None = None
+) -> ModelFile:
+    """Read a model file for the machine of this name with so many links.
+
+    links : 0 for an external model of a tip; None for an external model, of as many links as the file has numbers of.
+    geometry : hash of the machine's geometry, where numbers that were fitted on another one are of no use.
+    content : of the file, where it has been read already.
+    Raises StateError with every problem: what `read_stored` refuses, another machine, an effect that is not
+    installed, numbers that are missing.
+    """
+    document, stored = read_document(path, content)
+    if stored.machine != machine:
+        raise StateError(
+            Problem(
+                where=str(path),
+                what="belongs to another machine",
+                value=stored.machine,
+                allowed=machine,
+                next_step="give this machine's model file, or begin a new one",
+            )
+        )
+    if geometry and stored.geometry and stored.geometry != geometry:
+        raise StateError(
+            Problem(
+                where=str(path),
+                what="was fitted on another geometry of this machine",
+                value=stored.geometry,
+                allowed=geometry,
+                next_step="fit it again with `compd effect fit`",
+            )
+        )
+    problems: list[Problem] = []
+    found: list[tuple[Effect, EffectEntry, str]] = []
+    for number, entry in enumerate(document.effects, start=1):
+        where = f"{path}, effect {number}"
+        try:
+            found.append((find_effect(entry.effect, where), entry, where))
+        except CompdError as error:
+            problems += error.problems
+    if links is None:
+        links = max((_links_of(effect, entry) for effect, entry, _ in found), default=0)
+    fitted = [_fitted_effect(effect, entry, links, where, problems) for effect, entry, where in found]
+    parameters = sum(len(effect.theta) for effect in fitted)
+    size = len(document.covariance)
+    covariance = np.array(document.covariance, dtype=np.float64).reshape(size, size)
+    if not problems and len(covariance) != parameters:
+        problems.append(
+            Problem(
+                where=f"{path}, covariance",
+                what="has another size than the parameters",
+                value=str(covariance.shape),
+                allowed=f"({parameters}, {parameters})",
+                next_step="fit it again with `compd effect fit`",
+            )
+        )
+    if problems:
+        raise StateError(problems)
+    return ModelFile(
+        stored.machine,
+        links,
+        tuple(entry.effect for entry in document.effects),
+        _with_own_covariance(fitted, covariance),
+        covariance,
+        stored.steps,
+        stored.geometry,
+    )
+
+
+def _with_own_covariance(fitted: Sequence[FittedEffect], covariance: FloatArray) -> tuple[FittedEffect, ...]:
+    """The effects, each with its block of the joint covariance."""
+    ends = np.cumsum([0, *(len(effect.theta) for effect in fitted)])
+    return tuple(
+        replace(effect, covariance=covariance[begin:end, begin:end])
+        for effect, begin, end in zip(fitted, ends[:-1], ends[1:], strict=True)
+    )
+
+
+def _links_of(effect: Effect, entry: EffectEntry) -> int:
+    """How many links the file has numbers of an effect for; 0 where it has none for single links."""
+    names = {parameter.name for parameter in entry.parameters}
+    of_links = [parameter for parameter in effect.parameters if parameter.per == "link"]
+    return next(i for i in count() if not any(f"{parameter.name}_{i + 1}" in names for parameter in of_links))
+
+
+def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, problems: list[Problem]) -> FittedEffect:
+    """The effect with its numbers; what is missing goes to `problems`."""
+    values = {parameter.name: parameter.value for parameter in entry.parameters}
+    columns = effect.columns(links)
+    names = [column.name for column in columns]
+    if sorted(values) != sorted(names):
+        problems.append(
+            Problem(
+                where=where,
+                what=f"has not the parameters of {effect.id}",
+                value=", ".join(values),
+                allowed=", ".join(names),
+                next_step="fit it again with `compd effect fit`",
+            )
+        )
+        return FittedEffect(effect, np.zeros(len(columns)))
+    theta = np.array([column.parameter.to_theta(values[column.name]) for column in columns])
+    missing = [constant.name for constant in effect.constants if constant.name not in entry.shape]
+    if missing:
+        problems.append(
+            Problem(
+                where=where,
+                what=f"has not the shape constants of {effect.id}",
+                allowed=", ".join(missing),
+                next_step="remove the effect and add it again: `compd effect add` searches them",
+            )
+        )
+    return FittedEffect(effect, theta, entry.shape)
+
+
+def _estimates(fitted: FittedEffect, links: int) -> list[dict[str, Any]]:
+    """Each number as people read it: value, standard error, unit."""
+    estimates = []
+    for k, column in enumerate(fitted.effect.columns(links)):
+        std = float(np.sqrt(fitted.covariance[k, k])) if k < len(fitted.covariance) else float("nan")
+        value, value_std = column.parameter.from_theta(float(fitted.theta[k]), std)
+        estimates.append(
+            {"name": column.name, "value": float(value), "std": float(value_std), "unit": column.parameter.unit}
+        )
+    return estimates
+
+
+def parameter_estimates(fitted: Sequence[FittedEffect], links: int) -> list[tuple[str, dict[str, Any]]]:
+    """(effect id, {name, value, std, unit}) of every number."""
+    return [(effect.effect.id, estimate) for effect in fitted for estimate in _estimates(effect, links)]

@@ -1,0 +1,108 @@
+"""The attitude beside the tip: it counts with its own noise and unit, and its derivatives are those of the model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.compare import compare
+from compd.comparison.fit import fit, initial_effect
+from compd.configuration import Configuration, load
+from compd.configuration.shipped import shipped_configuration
+from compd.model.prediction import predict
+from compd.recording.writer import write_recording
+from tests.support.measured import SIGMA_UM, aligned, gauges, hidden, record
+
+SIGMA_URAD = 2.0
+
+
+def hexapod() -> Configuration:
+    return load(shipped_configuration("hexapod.yaml"))
+
+
+def poses(
+    directory: Path, effects: tuple[Any, ...] = (), *, moved: bool = False, sigma_urad: float | None = None
+) -> Path:
+    """A hexapod's poses with noise; moved: in an instrument's frame, by a target that is turned on the platform."""
+    machine = hexapod()
+    columns = gauges(150, 31, links=6, joints=len(machine.wiring.joint))
+    for i in range(1, 7):
+        columns[f"scale_{i}_mm"] = columns[f"scale_{i}_mm"] * 0.3
+    plain = record(directory, columns, effects, machine="hexapod", configuration=machine, name="plain")
+    first = aligned(plain, machine)
+    _, added = effect_deltas(effects, first.rows)
+    predicted = predict(first.model, first.rows, added)  # type: ignore[arg-type]
+    rng = np.random.default_rng(8)
+    noise = Rotation.from_rotvec(rng.normal(0, SIGMA_URAD * 1e-6, (150, 3)))
+    attitude, tip_mm = noise * Rotation.from_matrix(predicted.rotation_M_P), first.measured_mm
+    reference: dict[str, Any] = {"quantity": "tool_pose", "frame": "machine", "sigma_um": SIGMA_UM}
+    reference["sigma_urad"] = sigma_urad or SIGMA_URAD
+    if moved:
+        frame = Rotation.from_rotvec([0.02, -0.4, 1.1])
+        attitude = frame * attitude * Rotation.from_rotvec([0.7, 0.1, -0.2])
+        tip_mm = frame.apply(tip_mm) + np.array([800.0, -300.0, 45.0])
+        reference["frame"] = "instrument"
+    measured = {f"reference_{axis}_mm": tip_mm[:, k] for k, axis in enumerate("xyz")}
+    measured |= {f"reference_r{axis}_rad": attitude.as_rotvec()[:, k] for k, axis in enumerate("xyz")}
+    path = directory / "poses.csv"
+    write_recording(path, {**first.recording.columns, **measured}, {"machine": "hexapod", "reference": reference})
+    return path
+
+
+def opened(directory: Path, effects: tuple[Any, ...] = (), **options: Any) -> AlignedRecording:
+    return aligned(poses(directory, effects, **options), hexapod())
+
+
+def test_poses_without_an_error_are_at_both_floors(tmp_path: Path) -> None:
+    comparison = compare(opened(tmp_path))
+    assert comparison.aligned.labels == ("x", "y", "z", "rx", "ry", "rz")
+    assert comparison.rms_um == pytest.approx(SIGMA_UM, rel=0.12)
+    assert comparison.attitude_rms_urad == pytest.approx(SIGMA_URAD, rel=0.12)
+    assert comparison.floor.um == pytest.approx(SIGMA_UM, rel=0.15)
+    assert comparison.floor.by_axis_um[3:] == pytest.approx(np.full(3, SIGMA_URAD), rel=0.3)
+    assert comparison.at_floor
+    assert comparison.as_json()["attitude_counts"] is True
+
+
+def test_noise_of_the_attitude_beyond_what_is_declared_is_told(tmp_path: Path) -> None:
+    comparison = compare(opened(tmp_path, sigma_urad=0.2))
+    assert comparison.rms_um == pytest.approx(SIGMA_UM, rel=0.12)
+    # the noise of the attitude is ten times what was declared; repeats show it all the same
+    assert "contradict" in comparison.floor.how
+    assert "urad" in comparison.floor.how
+
+
+def test_an_instruments_frame_and_the_targets_turn_are_fitted_along(tmp_path: Path) -> None:
+    comparison = compare(opened(tmp_path, moved=True))
+    assert comparison.aligned.registration_columns.shape == (150, 6, 9)
+    assert comparison.rms_um == pytest.approx(SIGMA_UM, rel=0.12)
+    assert comparison.attitude_rms_urad == pytest.approx(SIGMA_URAD, rel=0.12)
+    assert comparison.at_floor
+
+
+def test_the_derivative_of_the_attitude_is_the_models(tmp_path: Path) -> None:
+    recording = opened(tmp_path)
+    effect = initial_effect(hidden("link_elasticity", 50.0).effect, {}, 6)
+    theta = np.array([1.0 / 50.0])
+    columns = recording.columns(effect.effect, effect.constants) @ theta
+    _, added = effect_deltas([hidden("link_elasticity", 50.0)], recording.rows)
+    small = {port: 1e-2 * values for port, values in added.items()}
+    difference = (recording.predicted_mm(small) - recording.predicted_mm({})) / 1e-2
+    assert columns == pytest.approx(difference, abs=1e-7)
+    assert np.abs(columns[:, 3:]).max() > 1e-3
+
+
+def test_the_attitude_alone_finds_an_effect(tmp_path: Path) -> None:
+    recording = opened(tmp_path, (hidden("link_elasticity", 50.0),))
+    effect = initial_effect(hidden("link_elasticity", 50.0).effect, {}, 6)
+    result = fit(recording, [effect], np.array([1e4 * SIGMA_UM] * 3 + [SIGMA_URAD] * 3))
+    value, _ = effect.effect.columns(6)[0].parameter.from_theta(float(result.fitted[0].theta[0]))
+    assert value == pytest.approx(50.0, rel=0.1)
+    after = compare(recording, result.fitted)
+    assert after.attitude_rms_urad == pytest.approx(SIGMA_URAD, rel=0.15)
+    assert after.attitude_rms_urad < compare(recording).attitude_rms_urad

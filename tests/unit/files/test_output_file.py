@@ -1,0 +1,65 @@
+"""Nothing is written over that a command of compd has not written itself."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from typer.testing import CliRunner
+
+from compd.cli.main import app
+from compd.errors import CompdError
+from compd.files.output_file import check_replaceable
+from compd.report.page import check_page_path, write_page
+
+PRECIOUS = "row,time_s,reference_x_mm\n1,0.0,1.25\n"
+
+
+def test_a_page_is_written_over_a_page_and_over_nothing_else(tmp_path):
+    page = tmp_path / "page.html"
+    check_page_path(page)
+    write_page(page, "My machine", "At the noise floor.", [], "")
+    check_page_path(page)
+    recording = tmp_path / "run.csv"
+    recording.write_text(PRECIOUS)
+    with pytest.raises(CompdError, match="not a page of compd") as caught:
+        check_page_path(recording, overwrite=False)
+    assert "--overwrite" in str(caught.value)
+    check_page_path(recording, overwrite=True)
+
+
+def test_an_empty_file_is_nobodys(tmp_path):
+    (tmp_path / "page.html").touch()
+    check_page_path(tmp_path / "page.html")
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
+def test_what_is_no_file_is_never_written_over(tmp_path, make):
+    make(tmp_path / "x")
+    with pytest.raises(CompdError, match="is not a file"):
+        check_replaceable(tmp_path / "x", (b"mark",), "a page", overwrite=True)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("compare", "RUN", "--html", "RUN"),
+        ("diagnose", "RUN", "--html", "RUN"),
+        ("effect", "show", "link_expansion", "--html", "RUN"),
+        ("plan", "RUN", "--rivals", "link_expansion,link_zero", "--out", "RUN"),
+        ("tracker", "DIRECTORY", "--out", "RUN"),
+        ("gauge", "learn", "--unit", "mm", "CAPTURE", "--to", "RUN"),
+        ("demo", "--page", "RUN"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_no_command_writes_over_a_recording(tmp_path, command):
+    recording = tmp_path / "run.csv"
+    recording.write_text(PRECIOUS)
+    paths = {"RUN": recording, "DIRECTORY": tmp_path, "CAPTURE": tmp_path / "capture"}
+    words = [str(paths.get(word, word)) for word in command]
+    result = CliRunner().invoke(app, words)
+    assert isinstance(result.exception, CompdError), result.output
+    assert str(recording) in str(result.exception)
+    assert "there already" in str(result.exception)
+    assert recording.read_text() == PRECIOUS

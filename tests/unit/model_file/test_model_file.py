@@ -1,0 +1,191 @@
+"""The model file: what is written is read, whole or not at all, and only for its own machine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from compd.errors import StateError
+from compd.model_file.model_document import ModelStep, read_stored
+from compd.model_file.model_file import ModelFile, read_model_file
+from tests.support.measured import hidden
+
+FORMULA = {
+    "id": "granite_swelling",
+    "port": "link",
+    "formula": "k * (humidity_pct - 50)",
+    "parameters": {"k": {"unit": "um", "plausible": [-1, 1], "source": "my notes"}},
+}
+
+
+def example() -> ModelFile:
+    """Two effects that know of each other's errors."""
+    fitted = (hidden("link_elasticity", 28.0), hidden("link_expansion_lag", 1.1, tau=1300.0))
+    covariance = np.array([[1e-7, 2e-8], [2e-8, 4e-6]])
+    step = ModelStep(
+        "add",
+        "link_elasticity",
+        "2026-11-20T10:00:00+00:00",
+        "run.csv",
+        "0f",
+        1.6,
+        0.2,
+        0.15,
+        {"effects": [], "covariance": []},
+    )
+    return ModelFile("tripod-cmm", 3, ("link_elasticity", "link_expansion_lag"), fitted, covariance, (step,))
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    example().write(path)
+    found = read_model_file(path, "tripod-cmm", 3)
+    assert found.declared == example().declared
+    assert found.steps == example().steps
+    np.testing.assert_allclose(found.fitted[0].theta, 1 / 28.0, rtol=1e-15)
+    assert dict(found.fitted[1].constants) == {"tau": 1300.0}
+    np.testing.assert_array_equal(found.covariance, example().covariance)
+    np.testing.assert_array_equal(found.fitted[1].covariance, [[4e-6]])
+
+
+def test_a_model_whose_effects_were_all_taken_out_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    ModelFile("tripod-cmm", 3).write(path)
+    found = read_model_file(path, "tripod-cmm", 3)
+    assert found.fitted == ()
+    assert found.covariance.shape == (0, 0)
+
+
+def test_a_step_names_its_unit_only_where_release_0_2_0_would_take_it_for_um(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    (step,) = example().steps
+    replace(example(), steps=(step, replace(step, unit="arcsec"))).write(path)
+    assert ["unit" in data for data in yaml.safe_load(path.read_text())["steps"]] == [False, True]
+    assert [read.unit for read in read_stored(path).steps] == ["um", "arcsec"]
+
+
+def test_people_read_values_with_errors_and_units(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    example().write(path)
+    (number,) = yaml.safe_load(path.read_text())["effects"][0]["parameters"]
+    assert number["unit"] == "N/um"
+    assert number["value"] == pytest.approx(28.0)
+    assert number["std"] == pytest.approx(np.sqrt(1e-7) * 28.0**2)
+
+
+def test_an_unknown_error_stays_unknown(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    file = ModelFile("tripod-cmm", 3, ("link_expansion",), (hidden("link_expansion", 1.1),), np.full((1, 1), np.nan))
+    file.write(path)
+    assert np.isnan(read_model_file(path, "tripod-cmm", 3).covariance).all()
+
+
+def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
+    from compd.model.effect import FittedEffect
+    from compd.model.library import find_effect
+
+    path = tmp_path / "m.yaml"
+    effect = find_effect(FORMULA, "here")
+    file = ModelFile("tripod-cmm", 3, (FORMULA,), (FittedEffect(effect, np.array([0.1])),), np.full((1, 1), 1e-4))
+    file.write(path)
+    found = read_model_file(path, "tripod-cmm", 3)
+    assert found.declared == (FORMULA,)
+    assert found.fitted[0].effect.equation == effect.equation
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (lambda data: data.update(machine="hexapod"), "belongs to another machine"),
+        (lambda data: data.update(format=9), "was written by a later release(.|\n)*format: 1 to 2(.|\n)*next: install"),
+        (lambda data: data.update(format=0), "format: "),
+        (lambda data: data.update(colour="red"), "m.yaml, colour: is no key that belongs here"),
+        (lambda data: data["effects"][0].update(effect="link_elastisity"), "no such effect"),
+        (lambda data: data["effects"][0].update(parameters=[]), "has not the parameters of link_elasticity"),
+        (lambda data: data["effects"][1].update(shape={}), "has not the shape constants"),
+        (lambda data: data["effects"][1].pop("parameters"), "effects 2, parameters: is missing"),
+        (lambda data: data.update(covariance=[[1.0]]), "another size"),
+        (lambda data: data["effects"][0].update(effect=None), "effects 1, effect: is no text"),
+        (lambda data: data["effects"][0]["parameters"][0].update(value="much"), "parameters 1, value: is no number"),
+        (lambda data: data["steps"][0].update(kind="guess"), "steps 1, kind: is none of the choices"),
+        (lambda data: data["steps"][0].update(colour="red"), "steps 1, colour: is no key that belongs here"),
+        (lambda data: data["steps"][0].pop("kind"), "steps 1, kind: is missing"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_words(tmp_path: Path, edit: object, said: str) -> None:
+    path = tmp_path / "m.yaml"
+    example().write(path)
+    data = yaml.safe_load(path.read_text())
+    edit(data)  # type: ignore[operator]
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(StateError, match=said):
+        read_model_file(path, "tripod-cmm", 3)
+
+
+@pytest.mark.parametrize("format_", [1, None])
+def test_files_of_release_0_1_0_are_read(tmp_path: Path, format_: int | None) -> None:
+    path = tmp_path / "m.yaml"
+    example().write(path)
+    data = yaml.safe_load(path.read_text())
+    assert data.pop("format") == 2
+    path.write_text(yaml.safe_dump(data if format_ is None else {"format": format_, **data}))
+    assert read_model_file(path, "tripod-cmm", 3).declared == example().declared
+
+
+def test_every_mistake_in_the_structure_is_in_one_message(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    example().write(path)
+    data = yaml.safe_load(path.read_text())
+    data["covariance"] = [[1.0, 2.0], [3.0]]
+    data["effects"][0].pop("parameters")
+    data["steps"][0]["rms_after_um"] = "little"
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(StateError) as caught:
+        read_stored(path)
+    places = [problem.where.removeprefix(f"{path}, ") for problem in caught.value.problems]
+    assert places == ["effects 1, parameters", "covariance", "steps 1, rms_after_um"]
+    assert all(problem.next_step for problem in caught.value.problems)
+
+
+def test_every_problem_is_in_one_message(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    example().write(path)
+    data = yaml.safe_load(path.read_text())
+    data["effects"][0]["effect"] = "nothing"
+    data["effects"][1]["shape"] = {}
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(StateError) as caught:
+        read_model_file(path, "tripod-cmm", 3)
+    assert len(caught.value.problems) == 2
+
+
+@pytest.mark.parametrize("text", ["", "- a", "a: [", "\x00"])
+def test_what_is_no_model_file_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(text)
+    with pytest.raises(StateError):
+        read_model_file(path, "tripod-cmm", 3)
+
+
+def test_no_file(tmp_path: Path) -> None:
+    with pytest.raises(StateError, match="cannot be read"):
+        read_model_file(tmp_path / "none.yaml", "tripod-cmm", 3)
+
+
+def test_a_disk_that_refuses_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "m.yaml"
+    example().write(path)
+    before = path.read_bytes()
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(StateError, match="No space left"):
+        ModelFile("tripod-cmm", 3).write(path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["m.yaml"]
