@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.compensation import compensate_cmm
-from compd.compensation_values import GaugeValues, WarmStart
+from compd.compensation.compensation import compensate_cmm
+from compd.compensation.values import GaugeValues, WarmStart
 from compd.model.effect import Effect, FittedEffect
 from compd.model.effect_basis import evaluate_basis
 from compd.model.effect_memory import EffectMemory
