@@ -9,7 +9,6 @@ and calls it; a replay calls it with states and inputs from a recording, and get
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -19,20 +18,20 @@ from compd.compensation.compensation import compensate_cmm
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.errors import StateError
 from compd.live.loop.commands import Target
+from compd.live.loop.cycle_readings import age_uncertainty_mm, read_comparators, read_scales
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors
-from compd.live.loop.degraded import GroupReadings, degraded_comparators
 from compd.live.loop.limits import LimitedCorrection, limit_correction, slewed, stroke_problem
 from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import LiveModel, Models
+from compd.live.loop.model_loader import Models
 from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
 from compd.live.loop.reasons import shortened
 from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
-from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
+from compd.live.loop.stale_policy import UsableComparators
 from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_uncertainty import TipUncertainty, tip_uncertainty, with_absent, with_age
-from compd.live.loop.wiring import MachineWires, Wires
+from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
 from compd.model.solve_status import MEANING, Reason
@@ -121,12 +120,12 @@ def _compute(
         zero_vectors = ZeroVectors(wires.scale.zero_vector(zero), wires.comparators.zero_vector(zero))
         state = _with_zero(state, zero, zero_vectors, settings)
 
-    live, usable = _comparators(state.last_good, inputs, zero_vectors.comparators_mm, applied, settings)
+    live, usable = read_comparators(state.last_good, inputs, zero_vectors.comparators_mm, applied, settings)
     comparators = usable.comparators
     if comparators is None:
         return _Outcome(usable.state, usable.reason), state
 
-    scales = _scales(snapshot, zero_vectors.scale_mm, target, state.scales_seen, settings)
+    scales = read_scales(snapshot, zero_vectors.scale_mm, target, state.scales_seen, settings)
     if scales.state is not None and not scales.state.valid:
         reason = "; ".join(filter(None, (scales.reason, usable.reason)))
         return _Outcome(scales.state, reason), state if live is None else state._replace(last_good=live)
@@ -190,7 +189,7 @@ def _compute(
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
     reported = max(limited.state, usable.state, scales.state or State.OK, key=lambda state: state.rank)
     reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason)))
-    u_tip_um = with_age(*u_tip, lambda: _age_uncertainty_mm(snapshot, comparators, target, settings))
+    u_tip_um = with_age(*u_tip, lambda: age_uncertainty_mm(snapshot, comparators, target, settings))
     setpoint_values = _setpoint_values(compensation, limited.applied_mm, u_tip_um, shadow, wires.tool_on_plate)
     return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state
 
@@ -230,38 +229,6 @@ def _with_zero(state: CycleState, zero: MachineZero, zero_vectors: ZeroVectors, 
     )
 
 
-class _Scales(NamedTuple):
-    """The scales of a cycle: values (n) in mm since machine zero, and the times of the oldest and the newest reading.
-
-    state, reason : where they make the setpoint invalid or worse than it were; None and "" otherwise.
-    """
-
-    values: FloatArray
-    oldest_s: float
-    newest_s: float
-    state: State | None = None
-    reason: str = ""
-
-
-def _scales(
-    snapshot: Snapshot, zero_mm: FloatArray, target: Target | None, seen: bool, settings: CycleSettings
-) -> _Scales:
-    """The scales in CMM mode. In machine-tool mode they are not used, but they may be compared with the setpoints."""
-    wires = settings.wires.scale
-    if target is not None:
-        unread = _Scales(settings.unread_scales_mm, math.inf, -math.inf)
-        if not (settings.scales_checked and (lost := wires.lost(snapshot))):
-            return unread
-        state = State.FAULT if lost.distrusted else State.DEGRADED
-        return unread._replace(state=state, reason=f"not compared with the setpoint: {lost}")
-    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, settings.loop.extrapolate)
-    if not lost:
-        return _Scales(values, oldest_s, newest_s)
-    # no policy replaces a scale: without it the tip is not known
-    state = State.FAULT if lost.distrusted else State.STOP if seen else State.STARTING
-    return _Scales(values, oldest_s, newest_s, state, f"the tip is not known: {lost}")
-
-
 def _uncertainty_is_due(
     tick: int, u_tip_um: FloatArray | None, usable: UsableComparators, settings: CycleSettings
 ) -> bool:
@@ -269,70 +236,6 @@ def _uncertainty_is_due(
     if settings.noise is None:
         return False
     return u_tip_um is None or usable.absent_mm is not None or tick % settings.uncertainty_every == 0
-
-
-def _age_uncertainty_mm(
-    snapshot: Snapshot, comparators: ComparatorSet, target: Target | None, settings: CycleSettings
-) -> FloatArray:
-    """(n + k + 9) standard uncertainty of each length by its age, mm; 0 for the scales where they are not used.
-
-    A held set is not carried on: since its oldest reading each of its lengths may have moved on.
-    """
-    wires, extrapolate = settings.wires, settings.loop.extrapolate
-    age_mm = wires.lengths.age_uncertainty_mm(snapshot, extrapolate)
-    if comparators.time_s < snapshot.time_s and comparators.drift_mm_per_s:
-        held_s = snapshot.time_s - comparators.oldest_s
-        age_mm[len(wires.scale.wires) :] = np.array(comparators.drift_mm_per_s) * held_s
-    if target is not None:
-        age_mm[: len(wires.scale.wires)] = 0.0
-    return age_mm
-
-
-def _comparators(
-    last_good: ComparatorSet | None,
-    inputs: CycleInputs,
-    zero_mm: FloatArray,
-    applied: LiveModel,
-    settings: CycleSettings,
-) -> tuple[ComparatorSet | None, UsableComparators]:
-    """The live set of this cycle, and the comparators with which to compute."""
-    snapshot = inputs.snapshot
-    now_s = snapshot.time_s
-    if inputs.ending:
-        return None, held_comparators(last_good, inputs.ending, now_s, settings.loop)
-    wires = settings.wires
-    extrapolate = settings.loop.extrapolate
-    lengths = wires.comparators.read(snapshot, zero_mm, extrapolate)
-    lost, oldest_s = lengths.lost, lengths.oldest_s
-    quantities: Mapping[str, FloatArray] = {}
-    if applied.quantities:
-        needed = applied.read(snapshot)
-        lost = lost.and_also(needed.lost)
-        oldest_s = min(oldest_s, needed.oldest_s)
-        quantities = applied.by_name(needed)
-    if not lost:
-        length_times_s = lengths.oldest_s, lengths.newest_s
-        drift_mm_per_s = () if settings.noise is None else wires.comparators.drift_mm_per_s(snapshot)
-        live = ComparatorSet(lengths.values, now_s, oldest_s, quantities, (), length_times_s, drift_mm_per_s)
-        return live, usable_comparators(live, last_good, lost, now_s, settings.loop)
-    if settings.loop.on_stale == "degrade":
-        groups = (
-            _group(wires.joint, snapshot, zero_mm[: wires.joints], extrapolate),
-            _group(wires.frame, snapshot, zero_mm[wires.joints :], extrapolate),
-            _quantity_group(applied, snapshot),
-        )
-        return degraded_comparators(groups, quantities, last_good, now_s, settings.loop)
-    return None, usable_comparators(None, last_good, lost, now_s, settings.loop)
-
-
-def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray, extrapolate: bool) -> GroupReadings:
-    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, extrapolate)
-    return GroupReadings(values, lost, oldest_s, newest_s)
-
-
-def _quantity_group(applied: LiveModel, snapshot: Snapshot) -> GroupReadings:
-    needed = applied.read(snapshot)
-    return GroupReadings(needed.values, needed.lost, needed.oldest_s, needed.newest_s)
 
 
 def _tip_correction(
