@@ -59,11 +59,8 @@ def test_diagnose_takes_a_sample_and_says_so(recorded: Path) -> None:
     assert json.loads(run("diagnose", recorded, "--json"))["sample"] == {"rows": ROWS, "of": ROWS}
 
 
-def test_a_recording_with_fixed_pins_is_read_whole(recorded: Path) -> None:
+def test_a_file_that_cannot_be_counted_is_left_to_who_reads_it_whole(recorded: Path) -> None:
     assert recording_stream.is_long(recorded)
-    sidecar = recorded.with_suffix(".yaml")
-    sidecar.write_text("machine: tripod-cmm\nreference: {quantity: fixed_point}\n", encoding="utf-8")
-    assert not recording_stream.is_long(recorded)
     assert not recording_stream.is_long(recorded.with_name("none.csv"))
 
 
