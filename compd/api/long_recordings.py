@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,9 +11,10 @@ from compd.api.arguments import Model, opened_model
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.fit import FitResult
+from compd.comparison.open import open_recording
 from compd.comparison.stream.block_comparison import compare_blocks
 from compd.comparison.stream.block_fit import fit_blocks
-from compd.comparison.stream.recording_stream import RecordingStream, open_stream
+from compd.comparison.stream.recording_stream import RecordingStream, is_long, open_stream
 from compd.comparison.stream.sample import SAMPLE_ROWS, Sample, draw_sample
 from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.configuration.shipped import Machine
@@ -33,15 +35,30 @@ class LongRecording(NamedTuple):
     stream: RecordingStream
     sample: Sample
 
-    def refine(self, result: FitResult, sigma_um: FloatArray) -> FitResult:
-        """A fit on the sample, with weights sigma_um (m,), fitted to all rows."""
-        return fit_blocks(self.stream, self.sample, result, sigma_um)
+    def refine(self, result: FitResult, sigma_um: FloatArray, progress: Progress = _silent) -> FitResult:
+        """A fit on the sample, with weights sigma_um (m,), fitted to all rows.
+
+        progress : called with the number of rows that are done of each pass; there are two to five.
+        """
+        return fit_blocks(self.stream, self.sample, result, sigma_um, progress=progress)
 
 
 def open_long(path: Path, machine: Machine | None = None, progress: Progress = _silent) -> LongRecording:
     """Draw the sample of a recording; arguments and errors as of `open_sample`."""
     stream = open_stream(path, machine)
     return LongRecording(stream, draw_sample(stream, progress=progress))
+
+
+def open_whole_or_sample(path: Path, machine: Machine | None = None) -> tuple[AlignedRecording, int]:
+    """The recording, and how many rows its file has; of one that is too long for the memory a sample of the rows.
+
+    Arguments and errors as of `open_recording`.
+    """
+    if not is_long(path):
+        aligned = open_recording(path, machine)
+        return aligned, aligned.recording.rows
+    long = open_long(path, machine)
+    return long.sample.aligned, long.sample.rows
 
 
 def compare_stream(
@@ -142,7 +159,7 @@ def fit_stream(
     machine : str, Path or Configuration, optional
         As for `open_recording`.
     progress : callable
-        Called with the number of rows of the sample's pass that are done.
+        Called with the number of rows that are done of each pass: that of the sample, then two to five of the fit.
 
     Returns
     -------
@@ -163,4 +180,5 @@ def fit_stream(
     [1.11]
     """
     long = open_long(Path(path), machine, progress)
-    return model_changes.refit(opened_model(model, long.sample.aligned), long.sample.aligned, long.refine)
+    refine = partial(long.refine, progress=progress)
+    return model_changes.refit(opened_model(model, long.sample.aligned), long.sample.aligned, refine)

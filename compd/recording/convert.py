@@ -24,6 +24,8 @@ from compd.recording.writer import write_recording_files
 
 # Columns that may hold text in some recording; a reader knows in which.
 _ID_COLUMNS = ("point", "ball", "pin")
+# Rows that are text at the same time: a cell takes 60 bytes then.
+_TEXT_ROWS = 4096
 
 
 def convert_recording(
@@ -126,7 +128,9 @@ def _csv(source: Path, rows: _RowsWritten) -> Content:
         for i, block in enumerate(_blocks(source)):
             if i == 0:
                 writer.writerow(block.columns)
-            writer.writerows(zip(*(_cells(block, name) for name in block.columns), strict=True))
+            for begin in range(0, len(block.row), _TEXT_ROWS):
+                rows_as_text = slice(begin, begin + _TEXT_ROWS)
+                writer.writerows(zip(*(_cells(block, name, rows_as_text) for name in block.columns), strict=True))
             rows.add(len(block.row))
         text.detach()  # flushed, and left open for whoever opened it
 
@@ -156,14 +160,14 @@ def _blocks(source: Path) -> Iterator[Table]:
         yield replace(table, row=row, columns=columns)
 
 
-def _texts(table: Table, name: str) -> list[str | None]:
+def _texts(table: Table, name: str, rows: slice = slice(None)) -> list[str | None]:
     """A column of ids that are text."""
     labels = table.labels[name]
-    return [None if math.isnan(code) else labels[int(code)] for code in table.columns[name].tolist()]
+    return [None if math.isnan(code) else labels[int(code)] for code in table.columns[name][rows].tolist()]
 
 
-def _cells(table: Table, name: str) -> Sequence[str | None]:
+def _cells(table: Table, name: str, rows: slice) -> Sequence[str | None]:
     """A column's cells in CSV."""
     if name in table.labels:
-        return _texts(table, name)
-    return [None if math.isnan(value) else number_text(value) for value in table.columns[name].tolist()]
+        return _texts(table, name, rows)
+    return [None if math.isnan(value) else number_text(value) for value in table.columns[name][rows].tolist()]

@@ -27,7 +27,7 @@ from compd.report.page_table import PageTable
 from compd.report.small_multiples import plot_residual_against
 from compd.text.number_text import number_text
 
-HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all rows; a flat line at zero is right."
+HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all {rows}; a flat line at zero is right."
 
 
 def summary(comparisons: Sequence[Comparison]) -> PageTable:
@@ -113,6 +113,10 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
     placed = {name for names in groups.values() for name in names}
     groups["everything else measured"] = [name for name in by_name if name not in placed]
     vectors, enlarged = plot_residual_vectors(comparison)
+    rows, of_sample = "rows", ""
+    if isinstance(comparison, StreamedComparison):
+        rows, of_sample = f"{comparison.sample_rows} rows of the sample", " Of the sample."
+    how_to_read = HOW_TO_READ.format(rows=rows)
     sentences = [trend.text for trend in comparison.trends] or [no_trend_text(comparison)]
     panels = [
         Panel(
@@ -126,13 +130,14 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
         Panel(
             "Residual vectors",
             "Measured minus modelled at the tip"
-            + (f", enlarged {enlarged:g} times." if isinstance(vectors, Figure) else "."),
+            + (f", enlarged {enlarged:g} times." if isinstance(vectors, Figure) else ".")
+            + of_sample,
             vectors,
         ),
         *(
             Panel(
                 f"Residual against {group}",
-                HOW_TO_READ,
+                how_to_read,
                 plot_residual_against(comparison, [by_name[name] for name in names]),
             )
             for group, names in groups.items()
@@ -141,17 +146,18 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
         Panel(
             "Residual pulled back to the links",
             "The errors of link lengths that would explain the residual at "
-            "the tip: where one link stands out, look there.",
+            f"the tip: where one link stands out, look there.{of_sample}",
             plot_link_residuals(comparison),
         ),
         Panel(
             "Histogram against the noise floor",
-            " ".join(_sentence(text) for text in (comparison.floor.how, comparison.floor.contradiction) if text),
+            " ".join(_sentence(text) for text in (comparison.floor.how, comparison.floor.contradiction) if text)
+            + of_sample,
             plot_histogram(comparison),
         ),
         Panel(
             "Map over the workspace",
-            "Rms residual in cells of the workspace; white where nothing was measured.",
+            f"Rms residual in cells of the workspace; white where nothing was measured.{of_sample}",
             plot_workspace_map(comparison),
         ),
         Panel("Rows that do not count", "Kept in the file, not used for any number here.", _excluded(comparison)),

@@ -36,9 +36,12 @@ from compd.report.time_figure import plot_time
 
 
 def write_diagnosis_page(
-    path: Path, diagnosis: Diagnosis, holdouts: Sequence[Holdout], shared_script: bool = False
+    path: Path, diagnosis: Diagnosis, holdouts: Sequence[Holdout], shared_script: bool = False, recorded_rows: int = 0
 ) -> None:
-    """Write the page; it works offline. shared_script : as in `write_page`."""
+    """Write the page; it works offline.
+
+    shared_script : as in `write_page`.  recorded_rows : of the file, where a sample of it was diagnosed.
+    """
     recording = diagnosis.before.aligned.recording
     fall = error_fall(diagnosis)
     panels = [
@@ -48,8 +51,9 @@ def write_diagnosis_page(
         *_description_panels(diagnosis, fall),
         *_table_panels(diagnosis, fall),
     ]
+    sample = f"a sample of {recording.rows} rows of {recorded_rows}, spread evenly; " if recorded_rows else ""
     footer = (
-        f"{recording.path}, sha256 {recording.sha256[:16]}; {int(diagnosis.after.used.sum())} rows used; "
+        f"{recording.path}, sha256 {recording.sha256[:16]}; {sample}{int(diagnosis.after.used.sum())} rows used; "
         f"noise floor: {diagnosis.before.floor.how}."
     )
     title = f"Diagnosis of {recording.machine}: {diagnosis.verdict}"

@@ -55,7 +55,7 @@ def diagnose(
     if html is not None:
         from compd.report.diagnosis_page import write_diagnosis_page
 
-        write_diagnosis_page(html, diagnosis, holdouts)
+        write_diagnosis_page(html, diagnosis, holdouts, recorded_rows=all_rows)
     if as_json:
         data: dict[str, Any] = {**diagnosis.as_json(), "sealed": [holdout.as_json() for holdout in holdouts]}
         if all_rows:

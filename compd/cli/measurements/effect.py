@@ -12,7 +12,9 @@ from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from compd.arrays import FloatArray
     from compd.comparison.alignment.aligned_recording import AlignedRecording
+    from compd.comparison.fit import FitResult
     from compd.configuration import Configuration
     from compd.diagnosis.model_changes import Refinement
     from compd.errors import Problem
@@ -155,8 +157,13 @@ def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinemen
     with count_shown(rows, f"drawing a sample of {path.name}") as progress:
         long = open_long(path, machine, progress)
     aligned = long.sample.aligned
+
+    def refine(result: FitResult, sigma_um: FloatArray) -> FitResult:
+        with count_shown(rows, f"fitting to {path.name}, one of 2 to 5 passes") as progress:
+            return long.refine(result, sigma_um, progress)
+
     typer.echo(f"Fitted to {rows} rows; errors are of a sample of {aligned.recording.rows}, spread evenly.")
-    return aligned, long.refine
+    return aligned, refine
 
 
 def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:

@@ -11,7 +11,7 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.alignment.external_machine import external_observations
 from compd.comparison.alignment.fixed_ends import place_balls, place_pins
 from compd.comparison.alignment.measured_attitude import LABELS as ATTITUDE_LABELS
-from compd.comparison.alignment.measured_attitude import attitude_mm, measured_attitude
+from compd.comparison.alignment.measured_attitude import attitude_mm, measured_attitude, target_turn
 from compd.comparison.alignment.registration import Registration, register
 from compd.comparison.alignment.velocity import velocities
 from compd.comparison.criteria import ComparisonCriteria
@@ -61,7 +61,7 @@ def align_observations(
 ) -> AlignedRecording:
     """As `align_recording`, for rows that are observed already.
 
-    part_of : of a block of a long recording the sample of it that places the instrument's frame.
+    part_of : of a block of a long recording the sample of it that places the instrument's frame, or the fixed ends.
     """
     assert recording.reference is not None
     if recording.reference_link_mm is not None:
@@ -81,6 +81,7 @@ def align_observations(
                 np.full((recording.rows, 3), np.nan),
                 None,
                 geometry_hash,
+                part_of=part_of,
             ),
             end,
         )
@@ -97,8 +98,9 @@ def align_observations(
     # without a known noise nothing says what a urad counts beside a um: the attitude is compared, and fits no effect
     weighed = model is not None and len(axes) == 3 and np.isfinite(recording.reference.sigma_urad)
     if weighed and recording.reference_rotation_rad is not None:
-        nominal = observations.rotation_M_P
-        attitude = measured_attitude(recording.reference_rotation_rad, nominal, registration)
+        nominal, rotation_rad = observations.rotation_M_P, recording.reference_rotation_rad
+        turn = target_turn(rotation_rad, nominal, registration) if part_of is None else part_of.target_turn
+        attitude = measured_attitude(rotation_rad, registration, turn)
         measured_mm = np.concatenate([measured_mm, attitude_mm(attitude, nominal)], axis=1)
         labels = (*labels, *ATTITUDE_LABELS)
     return AlignedRecording(
@@ -107,15 +109,23 @@ def align_observations(
 
 
 def _at_fixed_ends(aligned: AlignedRecording, end: IntArray) -> AlignedRecording:
-    """The recording with the fixed balls or pins found, and what was measured from them. end : (N,)."""
+    """The recording with the fixed balls or pins found, and what was measured from them. end : (N,).
+
+    Of a block of a long recording they are where its sample has found them.
+    """
     recording, where = aligned.recording, str(aligned.recording.path)
     assert recording.reference is not None
-    tip_mm = np.where(recording.excluded[:, None], np.nan, aligned.nominal_tip_mm)
-    if recording.reference_distance_mm is None:
-        ends = place_pins(tip_mm, end, recording.end_name, where)
-        return replace(aligned, ends=ends, measured_mm=ends.place_of_row_mm)
     distance_mm = recording.reference_distance_mm
-    ends = place_balls(tip_mm, distance_mm, end, recording.reference.absolute, recording.end_name, where)
+    tip_mm = np.where(recording.excluded[:, None], np.nan, aligned.nominal_tip_mm)
+    if aligned.part_of is not None:
+        assert aligned.part_of.ends is not None
+        ends = aligned.part_of.ends.at_rows(end, recording.end_name, where)
+    elif distance_mm is None:
+        ends = place_pins(tip_mm, end, recording.end_name, where)
+    else:
+        ends = place_balls(tip_mm, distance_mm, end, recording.reference.absolute, recording.end_name, where)
+    if distance_mm is None:
+        return replace(aligned, ends=ends, measured_mm=ends.place_of_row_mm)
     measured_mm = np.where(ends.of_row >= 0, distance_mm + ends.added_mm[ends.of_row], np.nan)[:, None]
     return replace(aligned, ends=ends, labels=("distance",), measured_mm=measured_mm)
 

@@ -18,6 +18,7 @@ from compd.comparison.alignment.measured_attitude import (
     attitude_mm,
     attitude_registration_columns,
     measured_attitude,
+    target_turn,
 )
 from compd.comparison.alignment.measured_attitude import UNIT as ATTITUDE_UNIT
 from compd.comparison.alignment.registration import (
@@ -76,7 +77,8 @@ class AlignedRecording:
     geometry_hash : str
         Of the configuration that the model was built from; ``""`` for ``machine: external``.
     part_of : AlignedRecording or None
-        Of a block of a long recording the sample of it that places the instrument's frame; None for a whole recording.
+        Of a block of a long recording the sample of it that places the instrument's frame, or fixed balls and pins;
+        None for a whole recording.
     """
 
     recording: Recording
@@ -312,8 +314,16 @@ class AlignedRecording:
         measured = self.recording.reference_rotation_rad
         if measured is None or self.model is None:
             return None
-        attitude = measured_attitude(measured, self.rows.rotation_M_P, self.registration)
+        attitude = measured_attitude(measured, self.registration, self.target_turn)
         return attitude_mm(attitude, predict(self.model, self.rows, added).rotation_M_P) * UM_PER_MM
+
+    @cached_property
+    def target_turn(self) -> FloatArray | None:
+        """(3, 3) how the instrument's target is turned on the platform; None where nothing is to be found of it."""
+        if self.part_of is not None:
+            return self.part_of.target_turn
+        measured = self.recording.reference_rotation_rad
+        return None if measured is None else target_turn(measured, self.rows.rotation_M_P, self.registration)
 
     def _why_no_pose(self, rows: BoolArray) -> str:
         if self.model is None:

@@ -37,7 +37,7 @@ PLANE_SHARE = 1e-4
 class FixedEnds:
     """E fixed ends and which of them each of N rows was measured at.
 
-    name : (E,) as the file names them.
+    name : (E,) as the file names them.  number : (E,) their numbers in the recording, rising.
     place_mm : (E, 3) where they were found to be, in the frame of the prediction.
     added_mm : (E,) what was added to each length, the constant b.
     of_row : (N,) index of the row's end, -1 for none.
@@ -46,6 +46,7 @@ class FixedEnds:
     """
 
     name: tuple[str, ...]
+    number: IntArray
     place_mm: FloatArray
     added_mm: FloatArray
     of_row: IntArray
@@ -60,6 +61,24 @@ class FixedEnds:
     def select(self, index: IntArray | slice) -> FixedEnds:
         """The rows of this index (R,)."""
         return replace(self, of_row=self.of_row[index])
+
+    def at_rows(self, end: IntArray, name: Callable[[int], str], where: str) -> FixedEnds:
+        """The same ends at other rows of their recording.  end, name, where : as of `place_balls`.
+
+        Raises RecordingError where a row has another end.
+        """
+        of_row = _indices(end, self.number)
+        unknown = np.unique(end[(end >= 0) & (of_row < 0)])
+        if len(unknown):
+            raise RecordingError(
+                Problem(
+                    where=where,
+                    what=f"too few rows have {', '.join(name(int(number)) for number in unknown[:5])}: none is among "
+                    "the rows that were drawn as a sample",
+                    next_step="exclude these rows, or make a recording of them by itself",
+                )
+            )
+        return replace(self, of_row=of_row)
 
     @property
     def place_of_row_mm(self) -> FloatArray:
@@ -120,7 +139,7 @@ def place_balls(
     if problems:
         raise RecordingError(problems)
     names = tuple(name(int(number)) for number in numbers)
-    return FixedEnds(names, np.array(places), np.array(added), _indices(end, numbers), True, absolute)
+    return FixedEnds(names, numbers, np.array(places), np.array(added), _indices(end, numbers), True, absolute)
 
 
 def place_pins(tip_mm: FloatArray, end: IntArray, name: Callable[[int], str], where: str) -> FixedEnds:
@@ -136,7 +155,7 @@ def place_pins(tip_mm: FloatArray, end: IntArray, name: Callable[[int], str], wh
         )
     places = np.array([np.median(tip_mm[known & (end == number)], axis=0) for number in numbers])
     names = tuple(name(int(number)) for number in numbers)
-    return FixedEnds(names, places, np.zeros(len(numbers)), _indices(end, numbers), False, True)
+    return FixedEnds(names, numbers, places, np.zeros(len(numbers)), _indices(end, numbers), False, True)
 
 
 def _indices(end: IntArray, numbers: IntArray) -> IntArray:

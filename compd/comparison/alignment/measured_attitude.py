@@ -28,24 +28,33 @@ def attitude_mm(rotation_M_P: FloatArray, nominal_M_P: FloatArray) -> FloatArray
     return np.asarray(rotation_vector(compose(rotation_M_P, nominal_M_P.transpose(0, 2, 1)))) * MM_PER_RAD
 
 
-def measured_attitude(
+def target_turn(
     rotation_rad: FloatArray, nominal_M_P: FloatArray, registration: Registration | None
+) -> FloatArray | None:
+    """(3, 3) how an instrument's target is turned on the platform: the mean over all rows that have both attitudes.
+
+    Arguments as of `measured_attitude`.  None for attitudes of {P} in {M}, and where no row has both.
+    """
+    if registration is None:
+        return None
+    attitude = compose(registration.rotation, rotation_matrix(rotation_rad))
+    on_platform = compose(nominal_M_P.transpose(0, 2, 1), attitude)
+    known = np.isfinite(on_platform).all(axis=(1, 2))
+    return Rotation.from_matrix(on_platform[known]).mean().as_matrix() if known.any() else None
+
+
+def measured_attitude(
+    rotation_rad: FloatArray, registration: Registration | None, turn: FloatArray | None
 ) -> FloatArray:
     """(N, 3, 3) attitudes in {M} from rotation vectors (N, 3) as they were measured.
 
-    registration : of the instrument's frame; None for attitudes of {P} in {M}. In its own frame an instrument knows
-    its target's attitude, not that of {P}: how the target is turned on the platform is found as the mean over all rows.
+    registration : of the instrument's frame; None for attitudes of {P} in {M}.  turn : (3, 3) of the `target_turn`: in
+    its own frame an instrument knows its target's attitude, not that of {P}.
     """
     attitude = rotation_matrix(rotation_rad)
-    if registration is None:
-        return np.asarray(attitude)
-    attitude = compose(registration.rotation, attitude)
-    on_platform = compose(nominal_M_P.transpose(0, 2, 1), attitude)
-    known = np.isfinite(on_platform).all(axis=(1, 2))
-    if not known.any():
-        return np.asarray(attitude)
-    turned = Rotation.from_matrix(on_platform[known]).mean().as_matrix()
-    return np.asarray(compose(attitude, turned.T))
+    if registration is not None:
+        attitude = compose(registration.rotation, attitude)
+    return np.asarray(attitude if turn is None else compose(attitude, turn.T))
 
 
 def attitude_registration_columns(tip_columns: FloatArray, nominal_M_P: FloatArray, spread_mm: float) -> FloatArray:

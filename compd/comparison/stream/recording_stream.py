@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
@@ -17,7 +16,6 @@ from compd.configuration.shipped import Machine
 from compd.errors import Problem, RecordingError
 from compd.recording.blocks import recording_blocks, row_count
 from compd.recording.recording import Recording
-from compd.recording.sidecar import read_sidecar
 
 # In memory a comparison takes 9 kB a row: more rows than these would take more than 2 GB.
 LONG_ROWS = 200_000
@@ -74,23 +72,14 @@ class RecordingStream:
 
 
 def is_long(path: Path) -> bool:
-    """Whether a recording is compared block by block: it has more rows than LONG_ROWS, and its frame can be found from
-    a sample.
+    """Whether a recording has more rows than LONG_ROWS, so that it is compared block by block.
 
-    The places of fixed balls and pins, and how an instrument's target is turned on the platform, are found from all
-    rows in memory. False for a file that cannot be read: who reads it whole says everything that is wrong.
+    False for a file that cannot be read: who reads it whole says everything that is wrong.
     """
     try:
-        if row_count(path) <= LONG_ROWS:
-            return False
+        return row_count(path) > LONG_ROWS
     except RecordingError:
         return False
-    sidecar = read_sidecar(path.with_suffix(".yaml"), [])
-    if sidecar is None or sidecar.reference is None:
-        return False
-    reference = sidecar.reference
-    of_target = reference.frame == "instrument" and math.isfinite(reference.sigma_urad)
-    return not reference.of_fixed_places and not of_target
 
 
 def open_stream(path: Path, machine: Machine | None = None) -> RecordingStream:

@@ -140,21 +140,17 @@ def _diagnose(
     """In the process of its own."""
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
     from compd.api.diagnosis import diagnose
-    from compd.comparison.open import open_recording
+    from compd.api.long_recordings import open_whole_or_sample
     from compd.page.workbench.evidence import evidence
 
     try:
-        diagnosis = diagnose(
-            open_recording(path, machine),
-            model_path,
-            effects=effects,
-            progress=lambda text: messages.send(("step", text)),
-        )
+        aligned, recorded_rows = open_whole_or_sample(path, machine)
+        diagnosis = diagnose(aligned, model_path, effects=effects, progress=lambda text: messages.send(("step", text)))
     except CompdError as error:
         messages.send(("failed", (str(error), {}, {})))
         return
     messages.send(("done", (_text(diagnosis), diagnosis.as_json(), evidence(diagnosis))))
-    messages.send(("page", _page(diagnosis)))
+    messages.send(("page", _page(diagnosis, recorded_rows if aligned.recording.rows < recorded_rows else 0)))
 
 
 def _end_with_the_parent() -> None:
@@ -175,11 +171,11 @@ def _text(diagnosis: Diagnosis) -> str:
     return text.getvalue()
 
 
-def _page(diagnosis: Diagnosis) -> bytes:
+def _page(diagnosis: Diagnosis, recorded_rows: int) -> bytes:
     """The page, compressed: the script for its figures is some megabytes."""
     from compd.report.diagnosis_page import write_diagnosis_page
 
     with TemporaryDirectory() as directory:
         path = Path(directory) / "diagnosis.html"
-        write_diagnosis_page(path, diagnosis, [])
+        write_diagnosis_page(path, diagnosis, [], recorded_rows=recorded_rows)
         return gzip.compress(path.read_bytes())

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from compd.api.long_recordings import open_whole_or_sample
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.compare import compare
 from compd.comparison.comparison import Comparison
-from compd.comparison.open import open_recording
 from compd.configuration.shipped import Machine
 from compd.model_file.model_file import ModelFile, read_model_file
 from compd.page.packed import packed
@@ -31,11 +31,13 @@ class OpenedRecording:
     """One recording against one model; a change of either makes another.
 
     path, model_path : of the recording and of the model file, which need not be there yet.
+    aligned : its rows; of a recording that is too long for the memory a sample of its `recorded_rows`.
     """
 
     path: Path
     model_path: Path
     aligned: AlignedRecording
+    recorded_rows: int
     model: ModelFile
 
     @cached_property
@@ -67,6 +69,7 @@ class OpenedRecording:
             "labels": self.aligned.labels,
             "unit": self.aligned.unit,
             "rows": len(self.aligned.rows),
+            "recorded_rows": self.recorded_rows,
             "rms": comparison.rms_um,
             "floor": comparison.floor.um,
             "floor_known": comparison.floor.known,
@@ -123,9 +126,10 @@ class OpenedRecording:
 def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) -> OpenedRecording:
     """Open a recording and the model of its machine, which is begun where the file is not there.
 
+    Of a recording that is too long for the memory a sample is opened, spread evenly.
     Raises CompdError with every problem of either.
     """
-    aligned = open_recording(path, machine)
+    aligned, recorded_rows = open_whole_or_sample(path, machine)
     name, links = aligned.recording.machine, aligned.rows.links
     model = read_model_file(model_path, name, links) if model_path.exists() else ModelFile(name, links)
-    return OpenedRecording(path, model_path, aligned, model)
+    return OpenedRecording(path, model_path, aligned, recorded_rows, model)

@@ -26,6 +26,8 @@ from compd.recording.tables.table import FIRST_ROW, Table, id_codes, id_labels
 
 # A file of these alone can be parsed fast: nothing in it can be anything but numbers, commas and line ends.
 _PLAIN = b"0123456789eE+-.,\r\n"
+# Python alone parses fewer in a tenth of a second, which is as long as the import of pyarrow takes.
+_LEAST_BYTES_FOR_ARROW = 1 << 20
 
 
 def read_table(
@@ -69,7 +71,7 @@ def parse_table(
     if plain and not labels and _names_are_valid(names):
         lines = body.decode("ascii").splitlines()
         if all(line.count(",") == len(names) - 1 or not line for line in lines):
-            table = _read_plain(path, names, lines, first_row)
+            table = _read_plain(path, names, body, lines, first_row)
             if table is not None:
                 return table
     csv_cells = read_cells(content, problems, is_header, first_row)
@@ -103,21 +105,48 @@ def _names_are_valid(names: Sequence[str]) -> bool:
     return all(names) and len(set(names)) == len(names)
 
 
-def _read_plain(path: Path, names: list[str], lines: list[str], first_row: int) -> Table | None:
-    """The table of a file that is nothing but plain numbers, parsed at once.
+def _read_plain(path: Path, names: list[str], body: bytes, lines: list[str], first_row: int) -> Table | None:
+    """The table of a file that is nothing but plain numbers, parsed at once. lines : those of `body`.
 
     None where a cell is no number after all: then `_read_any` reports which.
     """
-    values = _numbers(",".join(filter(None, lines)).split(",")) if any(lines) else np.empty(0)
-    if values is None:
-        return None
-    rows = np.array([number for number, line in enumerate(lines, start=first_row) if line], dtype=np.int64)
-    table = values.reshape(len(rows), len(names))
-    filled = ~np.isnan(table).all(axis=1)
-    row = rows[filled]
-    columns = {name: np.ascontiguousarray(table[filled, i]) for i, name in enumerate(names)}
+    number = np.array([number for number, line in enumerate(lines, start=first_row) if line], dtype=np.int64)
+    values = _arrow_columns(body, names) if len(body) >= _LEAST_BYTES_FOR_ARROW else None
+    if values is None or len(values[0]) != len(number):
+        cells = _numbers(",".join(filter(None, lines)).split(",")) if len(number) else np.empty(0)
+        if cells is None:
+            return None
+        values = list(cells.reshape(len(number), len(names)).T)
+    filled = np.zeros(len(number), dtype=bool)
+    for column in values:
+        filled |= ~np.isnan(column)
+    columns = {name: np.ascontiguousarray(column[filled]) for name, column in zip(names, values, strict=True)}
     letters = {name: column_letters(i) for i, name in enumerate(names)}
-    return Table(path, letters, columns, row)
+    return Table(path, letters, columns, number[filled])
+
+
+def _arrow_columns(body: bytes, names: list[str]) -> list[FloatArray] | None:
+    """The columns of plain lines as Arrow parses them, to the same numbers as Python, in a fifth of its time.
+
+    None where it is not installed, and for a cell that it takes for no number, or an infinite one.
+    """
+    try:
+        import pyarrow
+        from pyarrow import csv
+    except ImportError:
+        return None
+    kinds = dict.fromkeys(names, pyarrow.float64())
+    try:
+        table = csv.read_csv(
+            pyarrow.py_buffer(body),
+            # blocks of a long recording are computed in threads of their own
+            read_options=csv.ReadOptions(use_threads=False, column_names=names),
+            convert_options=csv.ConvertOptions(column_types=kinds, null_values=[""]),
+        )
+    except pyarrow.ArrowException:
+        return None
+    columns = [column.to_numpy() for column in table.columns]
+    return None if any(np.isinf(column).any() for column in columns) else columns
 
 
 def _read_any(

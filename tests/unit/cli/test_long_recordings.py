@@ -53,17 +53,18 @@ def test_compare_says_what_rests_on_the_sample(recorded: Path, tmp_path: Path) -
     written = page.read_text(encoding="utf-8")
     assert "spread evenly" in written
     assert "Residual over time" in written
+    assert f"lines are means over all {ROWS} rows of the sample" in written
+    assert "means over all rows" not in written
 
 
 def test_diagnose_takes_a_sample_and_says_so(recorded: Path) -> None:
-    assert json.loads(run("diagnose", recorded, "--json"))["sample"] == {"rows": ROWS, "of": ROWS}
+    page = recorded.with_name("page.html")
+    assert json.loads(run("diagnose", recorded, "--json", "--html", page))["sample"] == {"rows": ROWS, "of": ROWS}
+    assert f"a sample of {ROWS} rows of {ROWS}, spread evenly" in page.read_text(encoding="utf-8")
 
 
-def test_a_recording_with_fixed_pins_is_read_whole(recorded: Path) -> None:
+def test_a_file_that_cannot_be_counted_is_left_to_who_reads_it_whole(recorded: Path) -> None:
     assert recording_stream.is_long(recorded)
-    sidecar = recorded.with_suffix(".yaml")
-    sidecar.write_text("machine: tripod-cmm\nreference: {quantity: fixed_point}\n", encoding="utf-8")
-    assert not recording_stream.is_long(recorded)
     assert not recording_stream.is_long(recorded.with_name("none.csv"))
 
 

@@ -16,8 +16,9 @@ export class Strip {
   begin(bench) {
     this.bench = bench;
     this.left_out_rms = null;
-    const { verdict, trends } = bench.summary;
-    this.verdict.replaceChildren(element("p", {}, verdict), ...(trends.length ? [element("p", { class: "note" }, `${trends.slice(0, MOST_TRENDS).join("; ")}.`)] : []));
+    const { verdict, trends, rows, recorded_rows } = bench.summary;
+    const sample = rows < recorded_rows ? [element("p", { class: "note", id: "sample" }, `Too long to be shown whole: everything here, also what is fitted, is of a sample of ${rows} of its ${recorded_rows} rows, spread evenly. The command lines go through all rows.`)] : [];
+    this.verdict.replaceChildren(element("p", {}, verdict), ...sample, ...(trends.length ? [element("p", { class: "note" }, `${trends.slice(0, MOST_TRENDS).join("; ")}.`)] : []));
     this.try();
   }
 

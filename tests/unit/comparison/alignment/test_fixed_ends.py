@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.comparison.alignment.align_recording import align_recording
-from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
+from compd.comparison.alignment.aligned_recording import effect_deltas
 from compd.comparison.alignment.fixed_ends import FixedEnds, place_balls, place_pins
 from compd.comparison.compare import compare
 from compd.comparison.fit import fit, initial_effect
@@ -19,7 +19,8 @@ from compd.errors import CompdError, RecordingError
 from compd.model.library import find_effect
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording
-from tests.support.measured import SIGMA_UM, Floats, aligned, gauges, hidden, tips_mm, tripod
+from tests.support.fixed_end_recordings import DISTANCE, PINS, recorded
+from tests.support.measured import SIGMA_UM, Floats, aligned, hidden
 
 BALL_MM = np.array([20.0, -30.0, 40.0])
 
@@ -92,7 +93,7 @@ def test_columns_are_the_derivatives_of_the_lengths(absolute: bool) -> None:
     tip_mm = around(20)
     of_row = np.arange(20) % 2
     places_mm = np.array([BALL_MM, BALL_MM + np.array([5.0, 6.0, 7.0])])
-    ends = FixedEnds(("a", "b"), places_mm, np.zeros(2), of_row, True, absolute)
+    ends = FixedEnds(("a", "b"), np.arange(2), places_mm, np.zeros(2), of_row, True, absolute)
     columns = ends.columns(tip_mm)
     assert columns.shape == (20, 1, ends.parameters)
     step_mm = 1e-4
@@ -101,51 +102,12 @@ def test_columns_are_the_derivatives_of_the_lengths(absolute: bool) -> None:
         for sign, place in zip((1, -1), moved, strict=True):
             place[k // 3, k % 3] += sign * step_mm
         further, nearer = (
-            FixedEnds(("a", "b"), place, np.zeros(2), of_row, True, absolute).lengths_mm(tip_mm) for place in moved
+            FixedEnds(("a", "b"), np.arange(2), place, np.zeros(2), of_row, True, absolute).lengths_mm(tip_mm)
+            for place in moved
         )
         assert columns[:, :, k] == pytest.approx((further - nearer) / (2 * step_mm), abs=1e-8)
     if not absolute:
         assert columns[:, 0, 6] == pytest.approx(1.0 - of_row)
-
-
-def recorded(directory: Path, reference: dict[str, Any], effects: tuple[Any, ...] = (), rows: int = 240) -> Path:
-    """A tripod's gauges in random order of places, beside a laser tracer's lengths from two balls, or beside pins."""
-    columns = gauges(rows, 21)
-    rng = np.random.default_rng(2)
-    if reference["quantity"] == "fixed_point":
-        for i in (1, 2, 3):
-            columns[f"scale_{i}_mm"] = 15.0 * (i - 2) + 10.0 * (np.arange(rows) // 3 % 4)
-        columns |= {name: np.zeros(rows) for name in columns if name.startswith(("joint_", "frame_"))}
-    truth_mm = tips_mm(directory, columns, effects, tripod(), "tripod-cmm")
-    if reference["quantity"] == "distance":
-        balls_mm = np.array([[150.0, 40.0, 20.0], [-120.0, 90.0, 260.0]])
-        ball = np.arange(rows) // 3 % 2
-        distance_mm = np.linalg.norm(truth_mm - balls_mm[ball], axis=1) - 0.25
-        measured = {"ball": 1.0 + ball, "reference_distance_mm": distance_mm + rng.normal(0, SIGMA_UM / 1e3, rows)}
-    else:
-        # the machine goes to the pin: its scales take what the effects do, and the seat's noise
-        nominal = _blank_columns(directory, columns)
-        off_mm = truth_mm - nominal.nominal_tip_mm + rng.normal(0, SIGMA_UM / 1e3, (rows, 3))
-        by_scale = nominal.sensitivity(["scale"])["scale"].tip
-        taken = np.linalg.solve(by_scale, off_mm[:, :, None])[:, :, 0]
-        for i in (1, 2, 3):
-            columns[f"scale_{i}_mm"] = columns[f"scale_{i}_mm"] - taken[:, i - 1]
-        measured = {"pin": 1.0 + np.arange(rows) // 3 % 4}
-    path = directory / "run.csv"
-    write_recording(path, {**columns, **measured}, {"machine": "tripod-cmm", "reference": reference}, overwrite=True)
-    return path
-
-
-def _blank_columns(directory: Path, columns: dict[str, Floats]) -> AlignedRecording:
-    path = directory / "nominal.csv"
-    nothing = {f"reference_{axis}_mm": np.arange(len(columns["time_s"])) * 1e-3 for axis in "xyz"}
-    sidecar = {"machine": "tripod-cmm", "reference": {"quantity": "tool_position", "frame": "machine"}}
-    write_recording(path, {**columns, **nothing}, sidecar, overwrite=True)
-    return aligned(path)
-
-
-DISTANCE = {"quantity": "distance", "sigma_um": SIGMA_UM}
-PINS = {"quantity": "fixed_point", "sigma_um": SIGMA_UM}
 
 
 def test_lengths_from_two_balls_reach_the_floor(tmp_path: Path) -> None:

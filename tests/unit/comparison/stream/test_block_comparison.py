@@ -13,11 +13,15 @@ from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.compare import compare
 from compd.comparison.stream.block_comparison import compare_blocks
 from compd.comparison.stream.sample import draw_sample
+from compd.errors import RecordingError
 from compd.model.effect import FittedEffect
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
 from tests.support.external_recordings import record_external
+from tests.support.fixed_end_recordings import DISTANCE, PINS
+from tests.support.fixed_end_recordings import recorded as recorded_from_places
 from tests.support.measured import gauges, hidden, record, tripod
+from tests.support.pose_recordings import hexapod, poses
 from tests.support.streams import in_blocks
 
 ROWS, BLOCK = 600, 70
@@ -70,6 +74,48 @@ def test_the_same_numbers_as_in_memory(
         np.testing.assert_allclose(streamed.contributions[source], part, rtol=1e-9)
     largest = whole.aligned.recording.row[whole.used][size.argmax(axis=0)]
     assert streamed.totals.largest_row.tolist() == largest.tolist()
+
+
+PLACES = {
+    "fixed balls": (DISTANCE, tripod),
+    "pins": (PINS, tripod),
+    "attitudes, in the machine's frame": (False, hexapod),
+    "attitudes, in the instrument's frame": (True, hexapod),
+}
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_what_is_placed_from_the_recording_itself_is_placed_by_the_sample(tmp_path: Path, name: str) -> None:
+    reference, machine = PLACES[name]
+    effects = [hidden("link_elasticity", 20.0)]
+    if isinstance(reference, dict):
+        path = recorded_from_places(tmp_path, reference, tuple(effects))
+    else:
+        path = poses(tmp_path, tuple(effects), moved=reference)
+    recording = read_recording(path, machine())
+    whole = compare(align_recording(recording, machine()), effects)
+    stream = in_blocks(recording, machine(), BLOCK)
+    streamed = compare_blocks(stream, draw_sample(stream), effects)
+    assert streamed.rows_used == whole.rows_used
+    for number in ("rms_by_axis_um", "mean_by_axis_um", "largest_by_axis_um", "constant_um"):
+        np.testing.assert_allclose(getattr(streamed, number), getattr(whole, number), rtol=1e-6, atol=1e-9)
+    for source, part in whole.contributions.items():
+        np.testing.assert_allclose(streamed.contributions[source], part, rtol=1e-6)
+    few = compare_blocks(stream, draw_sample(stream, 90), effects)
+    assert few.sample_rows < 0.8 * few.rows
+    np.testing.assert_allclose(few.rms_by_axis_um, whole.rms_by_axis_um, rtol=0.2)
+
+
+def test_a_pin_that_no_row_of_the_sample_shows_is_named(tmp_path: Path) -> None:
+    recording = read_recording(recorded_from_places(tmp_path, PINS), tripod())
+    assert recording.pin is not None
+    pin = recording.pin.copy()
+    pin[[3, 4]] = 7
+    stream = in_blocks(replace(recording, pin=pin, visit=None), tripod(), BLOCK)
+    sample = draw_sample(stream, 20)
+    assert 7 not in sample.aligned.recording.pin
+    with pytest.raises(RecordingError, match=r"too few rows have pin 7: none is among the rows that were drawn"):
+        compare_blocks(stream, sample)
 
 
 def test_what_a_sample_fixes_is_about_what_all_rows_say(tmp_path: Path) -> None:

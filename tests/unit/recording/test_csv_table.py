@@ -1,0 +1,46 @@
+"""Plain CSV is the same table whoever parses its numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from compd.recording.tables import csv_table
+from compd.recording.tables.csv_table import parse_table
+from compd.recording.tables.problem_list import ProblemList
+from compd.recording.tables.table import Table
+
+NAMES = ("time_s", "scale_1_mm", "humidity_pct")
+NUMBERS = st.one_of(
+    st.floats(allow_nan=False).map(repr).filter(lambda text: "inf" not in text),
+    st.from_regex(r"[+-]?[0-9]{0,20}\.?[0-9]{0,20}(?:[eE][+-]?[0-9]{1,3})?", fullmatch=True),
+    st.just(""),
+)
+LINES = st.lists(st.one_of(st.just(""), st.lists(NUMBERS, min_size=3, max_size=3).map(",".join)), max_size=8)
+
+
+def parse(body: str, least_bytes_for_arrow: int) -> tuple[Table | None, ProblemList]:
+    problems = ProblemList(Path("run.csv"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(csv_table, "_LEAST_BYTES_FOR_ARROW", least_bytes_for_arrow)
+        content = f"{','.join(NAMES)}\n{body}".encode()
+        return parse_table(Path("run.csv"), content, problems, lambda names: names[0] == NAMES[0]), problems
+
+
+@settings(deadline=None)
+@given(lines=LINES, line_end=st.sampled_from(["\n", "\r\n"]), last=st.booleans())
+def test_arrow_and_python_read_the_same(lines: list[str], line_end: str, last: bool) -> None:
+    body = line_end.join(lines) + line_end * last
+    by_python, complaints = parse(body, 1 << 40)
+    by_arrow, others = parse(body, 0)
+    assert complaints.problems == others.problems
+    assert by_python is not None
+    assert by_arrow is not None
+    np.testing.assert_array_equal(by_arrow.row, by_python.row)
+    assert by_arrow.columns.keys() == by_python.columns.keys()
+    for name, values in by_python.columns.items():
+        assert by_arrow.columns[name].tobytes() == values.tobytes()
