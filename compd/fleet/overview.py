@@ -13,10 +13,16 @@ from statistics import median
 from compd.comparison.display_unit import format_error
 from compd.fleet.drift import Drift, drifts, named_drifts
 from compd.fleet.outlying import ERROR, ERROR_LEFT, OutlyingMachine, outlying_machines
-from compd.fleet.recording_result import RecordingResult
+from compd.fleet.recording_result import AT_FLOOR, RecordingResult
+from compd.fleet.steady_effects import LoneEffect, lone_effects, steady_effects
 from compd.number_text import estimate_text, join_words, number_text
 from compd.report.page_table import PageTable
 
+# Verdicts of recordings that the model explains: of `diagnose`, and of `compare`.
+_NOTHING_MISSING = ("adequate", AT_FLOOR)
+_UNEXPLAINED = ("unexplained", "partial")
+# Beside the effects: an error without a known cause.
+NOT_EXPLAINED = "not explained"
 _NO_MACHINE = "(no machine named)"
 _DATE = "%Y-%m-%d"
 
@@ -58,9 +64,41 @@ class Overview:
         """Machines that differ from the others."""
         return outlying_machines(self.examined, self.drifts)
 
+    @cached_property
+    def lone(self) -> tuple[LoneEffect, ...]:
+        """Effects that one machine alone has."""
+        return lone_effects(self.examined)
+
+    @cached_property
+    def steady(self) -> dict[str, frozenset[str]]:
+        """Machine -> the effects that it has on most of its recordings."""
+        return steady_effects(self.examined)
+
+    @cached_property
+    def unexplained(self) -> Counter[str]:
+        """Machine -> recordings with an error of which no effect is the whole cause."""
+        return Counter(result.machine for result in self.examined if result.verdict in _UNEXPLAINED)
+
+    @cached_property
+    def quiet(self) -> list[str]:
+        """Machines of which nothing is to be said: no recording has an effect or an error that none explains."""
+        return [
+            machine
+            for machine in self.machines
+            if not any(outlying.machine == machine for outlying in self.outlying)
+            and all(result.verdict in _NOTHING_MISSING and not result.effects for result in self._by_machine[machine])
+        ]
+
+    @cached_property
+    def _by_machine(self) -> dict[str, list[RecordingResult]]:
+        by_machine: dict[str, list[RecordingResult]] = {}
+        for result in self.examined:
+            by_machine.setdefault(result.machine, []).append(result)
+        return by_machine
+
     def of(self, machine: str) -> list[RecordingResult]:
         """The recordings of a machine that were examined."""
-        return [result for result in self.examined if result.machine == machine]
+        return self._by_machine[machine]
 
     def counts(self, machine: str) -> Counter[str]:
         """Effect -> recordings of the machine on which it was found."""
@@ -73,16 +111,23 @@ class Overview:
         text = f"{recordings} of {_counted(len(self.machines), 'machine')} examined"
         text += f"; {_counted(len(self.failed), 'other')} could not be." if self.failed else "."
         named = named_drifts(self.drifts)
-        findings = [_counted(len(named), "parameter drifts", "parameters drift")] if named else []
-        outlying = {machine.machine for machine in self.outlying}
-        findings += [_counted(len(outlying), "machine differs", "machines differ")] if outlying else []
+        having = sum(map(bool, self.steady.values()))
+        differing = {machine.machine for machine in (*self.outlying, *self.lone)}
+        findings = [_counted(having, "machine has an effect", "machines have effects")] if having else []
+        findings += [_counted(len(named), "parameter drifts", "parameters drift")] if named else []
+        findings += [_counted(len(differing), "machine differs", "machines differ")] if differing else []
         return f"{text} {join_words(findings)}." if findings else text
 
-    def machine_table(self) -> PageTable:
-        """A row for each machine: how many recordings, their verdicts, error and noise, effects."""
-        head = ("machine", "recordings", "verdicts", "error", "left with its effects", "noise alone", "effects")
+    def machine_table(self, without: Sequence[str] = ()) -> PageTable:
+        """A row for each machine: how many recordings, their verdicts, error and noise, effects.
+
+        without : machines that are left out.
+        """
+        head = ("machine", "recordings", "verdicts", "error", "left", "noise", "effects")
         rows = []
         for machine in self.machines:
+            if machine in without:
+                continue
             results = self.of(machine)
             verdicts = Counter(result.verdict for result in results)
             effects = self.counts(machine)
@@ -104,8 +149,8 @@ class Overview:
         return [drift_sentence(drift) for drift in named_drifts(self.drifts)]
 
     def outlying_sentences(self) -> list[str]:
-        """Which machine differs and by how much, the farthest first."""
-        return [outlying_sentence(machine) for machine in self.outlying]
+        """Which machine differs, and by how much: the farthest first, then those that alone have an effect."""
+        return [*map(outlying_sentence, self.outlying), *map(lone_sentence, self.lone)]
 
     def problem_table(self) -> PageTable:
         """Recordings that could not be examined, each with the reason."""
@@ -139,6 +184,14 @@ def outlying_sentence(outlying: OutlyingMachine) -> str:
     return (
         f"{outlying.machine}: {outlying.quantity} is {value}, the median of {outlying.machines} machines is {middle} "
         f"({outlying.score:.0f} robust standard deviations)"
+    )
+
+
+def lone_sentence(lone: LoneEffect) -> str:
+    """ "tripod-03: alone of 12 machines has backlash (on 4 of its 4 recordings)"."""
+    return (
+        f"{lone.machine}: alone of {lone.machines} machines has {lone.effect} (on {lone.found_on} of its "
+        f"{_counted(lone.recordings, 'recording')})"
     )
 
 
