@@ -1,4 +1,4 @@
-"""The figure by which a fleet is seen at a glance: a line for each machine, a column for each effect, in it its value."""
+"""The figure that shows a fleet at a glance: a line for each machine, a column for each effect, in it its value."""
 
 from __future__ import annotations
 

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from compd.errors import CompdError, Problem
+from compd.files import file_stamp
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import Outcome, outcomes
 from compd.fleet.examination import Examination
 from compd.fleet.fleet_recording import FleetRecording
-from compd.fleet.recording_result import Command, RecordingResult
+from compd.fleet.recording_result import NOT_DONE, Command, RecordingResult
 
 # Recordings in one task: to compare 600 rows takes 0.1 s, to diagnose them seconds.
 BATCH: Mapping[Command, int] = {"compare": 8, "diagnose": 1}
@@ -67,7 +68,8 @@ def examine_fleet(
     known = {result.basis: result for result in earlier if result.basis and not result.problem}
     results = {recording: known[basis[recording]] for recording in recordings if basis[recording] in known}
     kept = len(results)
-    todo = [recording for recording in recordings if recording not in results]
+    # long ones first: none is left at the end for which all other workers wait
+    todo = sorted((recording for recording in recordings if recording not in results), key=_size, reverse=True)
     for result in results.values():
         progress(result)
     interrupted = False
@@ -83,9 +85,15 @@ def examine_fleet(
         interrupted = True
         for recording in todo:
             if recording not in results:
-                not_done = CompdError(Problem(where=str(recording), what="was not done: Ctrl-C ended the work before"))
+                not_done = CompdError(Problem(where=str(recording), what=NOT_DONE))
                 results[recording] = _result(Outcome(recording, None, not_done), examination, "")
     return FleetRun(tuple(results[recording] for recording in recordings), kept, interrupted)
+
+
+def _size(recording: FleetRecording) -> int:
+    """Bytes of a recording; 0 where it cannot be looked at."""
+    stamp = file_stamp(recording.path)
+    return 0 if stamp is None else stamp[1]
 
 
 def _result(outcome: Outcome[FleetRecording, RecordingResult], examination: Examination, basis: str) -> RecordingResult:

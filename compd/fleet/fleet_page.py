@@ -58,8 +58,8 @@ def _matrix_caption(overview: Overview) -> str:
     """How to read the colours, and which machines are left out."""
     text = (
         "Blue: found, the value is the median of its recordings; pale: on few of them. Orange: it drifts. Red: its "
-        "value differs from the other machines'. Grey: something is missing that no effect explains. A question mark: on a "
-        "recording another effect would do as well."
+        "value differs from the other machines'. Grey: something is missing that no effect explains. A question mark: "
+        "on a recording another effect would do as well."
     )
     if not overview.quiet:
         return text

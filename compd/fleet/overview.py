@@ -41,7 +41,12 @@ class Overview:
     @cached_property
     def failed(self) -> list[RecordingResult]:
         """Recordings that could not be examined."""
-        return [result for result in self.results if result.problem]
+        return [result for result in self.results if result.problem and not result.not_done]
+
+    @cached_property
+    def not_done(self) -> int:
+        """Number of recordings for which there was no time."""
+        return sum(result.not_done for result in self.results)
 
     @cached_property
     def machines(self) -> list[str]:
@@ -109,7 +114,8 @@ class Overview:
         """How much was examined, and how many things are to be looked at, in a sentence or two."""
         recordings = _counted(len(self.examined), "recording")
         text = f"{recordings} of {_counted(len(self.machines), 'machine')} examined"
-        text += f"; {_counted(len(self.failed), 'other')} could not be." if self.failed else "."
+        text += f"; {_counted(len(self.failed), 'other')} could not be" if self.failed else ""
+        text += f"; {_counted(self.not_done, 'is', 'are')} not done yet." if self.not_done else "."
         named = named_drifts(self.drifts)
         having = sum(map(bool, self.steady.values()))
         differing = {machine.machine for machine in (*self.outlying, *self.lone)}

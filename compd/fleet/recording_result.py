@@ -11,6 +11,9 @@ Command = Literal["compare", "diagnose"]
 # Verdicts of `compare`; those of `diagnose` are `compd.diagnosis.verdict.Verdict`.
 AT_FLOOR, ABOVE_FLOOR, NOISE_NOT_KNOWN = "at_floor", "above_floor", "noise_not_known"
 
+# The problem of a recording for which there was no time.
+NOT_DONE = "was not done: Ctrl-C ended the work before"
+
 
 @dataclass(frozen=True)
 class FleetEstimate:
@@ -76,6 +79,11 @@ class RecordingResult:
     estimates: tuple[FleetEstimate, ...] = ()
     problem: str = ""
     basis: str = ""
+
+    @property
+    def not_done(self) -> bool:
+        """Whether nobody has looked at it yet, so that nothing is known to be wrong with it."""
+        return NOT_DONE in self.problem
 
     @property
     def effects(self) -> tuple[str, ...]:

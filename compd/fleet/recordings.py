@@ -72,7 +72,7 @@ def find_recordings(places: Sequence[str | Path], by: MachinesBy = MachinesBy.au
         for match in matches:
             machine = machine_in(match, place)
             for file in _candidates(match):
-                table = _table(file, named=str(match) == place)
+                table = _table(file, named=match.is_file() and match == Path(place))
                 if table is not None:
                     tables.setdefault(table.with_suffix(".yaml"), (machine, table))
                 elif file.suffix == ".yaml" and _looks_like_sidecar(file):

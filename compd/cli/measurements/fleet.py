@@ -219,6 +219,7 @@ def _examine(
         write_fleet_page(html, run.results)
         typer.echo(f"The page: {html}")
     if run.interrupted:
+        typer.echo("Interrupted; the same command goes on where it stopped.")
         raise typer.Exit(_INTERRUPTED)
     raise typer.Exit(any(result.problem for result in run.results))
 
