@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
 from plotly.graph_objects import Figure, Heatmap
 
 from compd.fleet.drift import Drift
 from compd.fleet.overview import NOT_EXPLAINED, Overview
-from compd.number_text import number_text
 from compd.report.page import COLOURS, style_figure
 from compd.report.page_table import PageTable
 
@@ -17,8 +17,10 @@ NO_EFFECTS = PageTable(("",), [("no effect was found, and the models have none",
 ROW_PX = 26
 # What colours a cell beyond the share of recordings, 0 to 1: a number of its own for each.
 _DRIFTS, _DIFFERS, _UNEXPLAINED, _MOST = 2.0, 3.0, 4.0, 4.0
-# What a value is, of a parameter of which there is one for each link or axis.
-_SEVERAL = "{count} parameters"
+# The column of effects that no machine has on most of its recordings.
+SELDOM = "seldom found"
+# Of a share that is on its way to be an effect: paler than any that is one.
+_PALE = 0.4
 
 
 class _Cell(NamedTuple):
@@ -35,7 +37,7 @@ def plot_effect_matrix(overview: Overview) -> Figure | PageTable:
     Machines with the same effects stand together, those of one kinematics too. NO_EFFECTS where there is no such
     machine.
     """
-    columns = [*overview.effects, *([NOT_EXPLAINED] if overview.unexplained else [])]
+    columns = _columns(overview)
     machines = [machine for machine in overview.machines if machine not in overview.quiet]
     if not columns or not machines:
         return NO_EFFECTS
@@ -49,7 +51,7 @@ def plot_effect_matrix(overview: Overview) -> Figure | PageTable:
     ]
     figure = Figure(
         Heatmap(
-            x=columns,
+            x=[_head(column, overview) for column in columns],
             y=machines,
             z=[[cell.colour / _MOST for cell in row] for row in cells],
             text=[[cell.text for cell in row] for row in cells],
@@ -65,7 +67,7 @@ def plot_effect_matrix(overview: Overview) -> Figure | PageTable:
             showscale=False,
         )
     )
-    style_figure(figure, "", "", 120 + ROW_PX * len(machines))
+    style_figure(figure, "", "", 140 + ROW_PX * len(machines))
     return figure.update_yaxes(autorange="reversed", automargin=True, type="category", dtick=1).update_xaxes(
         side="top", automargin=True, type="category", dtick=1
     )
@@ -81,41 +83,63 @@ def _place(overview: Overview, machine: str) -> tuple[str, tuple[bool, ...], str
     )
 
 
+def _columns(overview: Overview) -> list[str]:
+    seldom = any(
+        set(result.effects) - set(overview.steady[result.machine]) - set(overview.effects)
+        for result in overview.examined
+    )
+    return [*overview.effects, *([SELDOM] if seldom else []), *([NOT_EXPLAINED] if overview.unexplained else [])]
+
+
+def _head(column: str, overview: Overview) -> str:
+    """The column's name with the unit of its numbers, where they have one."""
+    units = {drift.unit for drift in overview.drifts if drift.effect == column} - {"1"}
+    return f"{column}<br>{units.pop()}" if len(units) == 1 else column
+
+
 def _cell(overview: Overview, machine: str, column: str, series: Sequence[Drift]) -> _Cell:
-    results = overview.of(machine)
+    results, counts = overview.of(machine), overview.counts(machine)
     if column == NOT_EXPLAINED:
-        count = overview.unexplained.get(machine, 0)
+        count = overview.unexplained[machine]
         text = f"{count} of {len(results)}" if count else ""
-        return _Cell(_UNEXPLAINED if 2 * count > len(results) else 0.0, text, text)
-    count = overview.counts(machine)[column]
-    if not count:
-        return _Cell(0.0, "", "not found")
+        return _Cell(_UNEXPLAINED if machine in overview.unexplained_machines else 0.0, text, text)
+    if column == SELDOM:
+        effects = [effect for effect in counts if effect not in overview.effects]
+        hover = "<br>".join(f"{effect}: {counts[effect]} of {len(results)}" for effect in effects)
+        most = max((counts[effect] for effect in effects), default=0)
+        return _Cell(_PALE * most / len(results), f"{most} of {len(results)}" if most else "", hover)
+    count = counts[column]
     rivalled = any(estimate.rivals for result in results for estimate in result.estimates if estimate.effect == column)
-    share = f"{count} of {len(results)}{' ?' if rivalled else ''}"
-    values = [_value_text(drift) for drift in series]
-    value = values[0] if len(values) == 1 else _SEVERAL.format(count=len(values))
-    text = value if count == len(results) and not rivalled else f"{value}, {share}"
-    hover = "<br>".join([share, *(f"{drift.parameter}: {text}" for drift, text in zip(series, values, strict=True))])
+    share = f"{count} of {len(results)}{' ?' if rivalled else ''}" if count else ""
     if column not in overview.steady[machine]:
-        return _Cell(0.5 * count / len(results), share, hover)
+        return _Cell(_PALE * count / len(results), share, share)
+    values = _values_text(series)
+    text = values + (" ?" if rivalled else "") if count == len(results) else f"{values}, {share}"
+    hover = "<br>".join([share, *(f"{drift.parameter}: {_middle(drift):.3g} {drift.unit}" for drift in series)])
+    names = {drift.name for drift in series}
     colour = count / len(results)
-    if any(
-        outlying.machine == machine and outlying.quantity in {drift.name for drift in series}
-        for outlying in overview.outlying
-    ):
+    if any(outlying.machine == machine and outlying.quantity in names for outlying in overview.outlying):
         colour = _DIFFERS
     if any(drift.named for drift in series):
         colour = _DRIFTS
     return _Cell(colour, text, hover)
 
 
-def _value_text(drift: Drift) -> str:
-    """ "1.50 ppm/K" by the median; of one that drifts its line's ends, "0.50 to 2.31 ppm/K"."""
-    if drift.named:
-        first, last = (drift.intercept + drift.slope * float(drift.time[k]) for k in (0, -1))
-        return f"{number_text(first, '', digits=3).strip()} to {number_text(last, drift.unit, digits=3)}"
-    ordered = sorted(drift.value.tolist())
-    return number_text(ordered[len(ordered) // 2], drift.unit, digits=3)
+def _values_text(series: Sequence[Drift]) -> str:
+    """ "1.5" by the median; of one that drifts its line's ends, "0.5 to 2.3"; "0.7 ... 1.5" of several parameters."""
+    named = [drift for drift in series if drift.named]
+    if named:
+        first, last = (named[0].intercept + named[0].slope * float(named[0].time[k]) for k in (0, -1))
+        return f"{first:.2g} to {last:.2g}"
+    middles = [_middle(drift) for drift in series]
+    if len(middles) == 1:
+        return f"{middles[0]:.3g}"
+    return f"{min(middles):.2g} ... {max(middles):.2g}"
+
+
+def _middle(drift: Drift) -> float:
+    """The median of its values."""
+    return float(np.median(drift.value))
 
 
 def _scale() -> list[tuple[float, str]]:

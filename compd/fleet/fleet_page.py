@@ -19,10 +19,13 @@ _CRITERIA = FleetCriteria()
 def write_fleet_page(path: Path, results: Sequence[RecordingResult]) -> None:
     """Write the page; it works offline. results : at least one."""
     overview = Overview(results)
-    sentences = [*overview.drift_sentences(), *overview.outlying_sentences()]
     verdict = overview.headline
     panels = [
-        Panel("What to look at", "Drifts and machines that differ; the reasons are below.", _list(sentences)),
+        Panel(
+            "What to look at",
+            "What drifts, which machine differs, and errors without a known cause; the evidence is below.",
+            _list(overview.sentences()),
+        ),
         Panel("Which machine has which effect", _matrix_caption(overview), plot_effect_matrix(overview)),
         Panel(
             "How parameters change from campaign to campaign",
@@ -57,9 +60,10 @@ def write_fleet_page(path: Path, results: Sequence[RecordingResult]) -> None:
 def _matrix_caption(overview: Overview) -> str:
     """How to read the colours, and which machines are left out."""
     text = (
-        "Blue: found, the value is the median of its recordings; pale: on few of them. Orange: it drifts. Red: its "
-        "value differs from the other machines'. Grey: something is missing that no effect explains. A question mark: "
-        "on a recording another effect would do as well."
+        "Blue: found on most recordings; the number is the median over these, from the smallest to the largest where "
+        "the effect has a number for each link or axis. Orange: it drifts, from the first to the last value of its line. "
+        "Red: it differs from the other machines'. Grey: an error of which no effect is the whole cause. A question "
+        "mark: on a recording another effect would do as well."
     )
     if not overview.quiet:
         return text

@@ -11,6 +11,7 @@ from pathlib import Path
 from statistics import median
 
 from compd.comparison.display_unit import format_error
+from compd.fleet.criteria import FleetCriteria
 from compd.fleet.drift import Drift, drifts, named_drifts
 from compd.fleet.outlying import ERROR, ERROR_LEFT, OutlyingMachine, outlying_machines
 from compd.fleet.recording_result import AT_FLOOR, RecordingResult
@@ -55,8 +56,8 @@ class Overview:
 
     @cached_property
     def effects(self) -> list[str]:
-        """Effects by the number of machines that have them, the most common first."""
-        having = Counter(effect for machine in self.machines for effect in self.counts(machine))
+        """Effects that a machine has on most of its recordings: those of the most machines first."""
+        having = Counter(effect for effects in self.steady.values() for effect in effects)
         return sorted(having, key=lambda effect: (-having[effect], effect))
 
     @cached_property
@@ -83,6 +84,12 @@ class Overview:
     def unexplained(self) -> Counter[str]:
         """Machine -> recordings with an error of which no effect is the whole cause."""
         return Counter(result.machine for result in self.examined if result.verdict in _UNEXPLAINED)
+
+    @property
+    def unexplained_machines(self) -> list[str]:
+        """Machines with such an error on most of their recordings."""
+        share = FleetCriteria().steady_share
+        return [machine for machine in self.machines if self.unexplained[machine] > share * len(self.of(machine))]
 
     @cached_property
     def quiet(self) -> list[str]:
@@ -118,8 +125,11 @@ class Overview:
         text += f"; {_counted(self.not_done, 'is', 'are')} not done yet." if self.not_done else "."
         named = named_drifts(self.drifts)
         having = sum(map(bool, self.steady.values()))
-        differing = {machine.machine for machine in (*self.outlying, *self.lone)}
+        differing = {outlying.machine for outlying in self.outlying} | {lone.machine for lone in self.lone}
         findings = [_counted(having, "machine has an effect", "machines have effects")] if having else []
+        unexplained = len(self.unexplained_machines)
+        if unexplained:
+            findings.append(_counted(unexplained, "has an error not explained", "have an error not explained"))
         findings += [_counted(len(named), "parameter drifts", "parameters drift")] if named else []
         findings += [_counted(len(differing), "machine differs", "machines differ")] if differing else []
         return f"{text} {join_words(findings)}." if findings else text
@@ -157,6 +167,25 @@ class Overview:
     def outlying_sentences(self) -> list[str]:
         """Which machine differs, and by how much: the farthest first, then those that alone have an effect."""
         return [*map(outlying_sentence, self.outlying), *map(lone_sentence, self.lone)]
+
+    def unexplained_sentences(self) -> list[str]:
+        """Which machine has an error of which no effect is the whole cause, and how large it is."""
+        sentences = []
+        for machine in self.unexplained_machines:
+            results = self.of(machine)
+            unit = results[0].error_unit
+            error = median(result.rms_before_um for result in results)
+            left = median(result.rms_after_um if result.estimates else result.rms_before_um for result in results)
+            text = f"an error of {format_error(error, unit)}"
+            if left < error:
+                text = f"{format_error(left, unit)} of {text}"
+            counted = f"on {self.unexplained[machine]} of its {_counted(len(results), 'recording')}"
+            sentences.append(f"{machine}: {text} has a cause that is not known ({counted})")
+        return sentences
+
+    def sentences(self) -> list[str]:
+        """What to look at: what drifts, which machine differs, and what no effect explains."""
+        return [*self.drift_sentences(), *self.outlying_sentences(), *self.unexplained_sentences()]
 
     def problem_table(self) -> PageTable:
         """Recordings that could not be examined, each with the reason."""

@@ -116,7 +116,8 @@ def test_a_run_goes_on_where_it_was_interrupted(fleet: Path, cluster: DaskCluste
     (directory / "run8.csv").write_bytes((directory / "run0.csv").read_bytes())
     (directory / "run8.yaml").write_bytes((directory / "run0.yaml").read_bytes())
     Path(kept[0]).unlink()
-    Path(kept[1]).with_suffix(".yaml").open("a").write("notes: seen again\n")
+    changed = Path(kept[1]).with_suffix(".yaml")
+    changed.write_text(changed.read_text() + "notes: seen again\n")
     second = examine_fleet(
         wanted,
         find_recordings([directory]).recordings,

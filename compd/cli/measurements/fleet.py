@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from compd.fleet.recording_result import RecordingResult
 
 # More of each a terminal does not show; the page and the table have all.
-MOST_SENTENCES = 12
+MOST_SENTENCES = 20
 # Of more machines those of which nothing is to be said share a line.
 MOST_MACHINES = 12
 # Of shells: ended by SIGINT.
@@ -244,7 +244,7 @@ def _print_overview(results: list[RecordingResult] | tuple[RecordingResult, ...]
         console.print(keep_words_whole(table, console.width))
     if quiet:
         console.print(f"Nothing is missing on {len(quiet)} others: {', '.join(quiet)}")
-    sentences = [*overview.drift_sentences(), *overview.outlying_sentences()]
+    sentences = overview.sentences()
     for sentence in sentences[:MOST_SENTENCES]:
         console.print(f"  - {sentence}")
     if len(sentences) > MOST_SENTENCES:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from plotly.graph_objects import Figure
 
-from compd.fleet.effect_matrix import plot_effect_matrix
+from compd.fleet.effect_matrix import SELDOM, plot_effect_matrix
 from compd.fleet.fleet_figures import plot_drifts
 from compd.fleet.fleet_page import write_fleet_page
 from compd.fleet.overview import Overview
-from compd.fleet.recording_result import FleetEstimate
+from compd.fleet.recording_result import NOT_DONE, FleetEstimate
 from tests.support.fleets import expansion, machine, result
 
 ALIKE = [1.10, 1.12, 1.09, 1.11, 1.08, 1.13, 1.10]
@@ -53,13 +53,16 @@ def test_machines_that_want_no_look_share_a_line(tmp_path: Path) -> None:
     overview = Overview(results)
     assert overview.quiet == [f"m{k}" for k in range(6)]
     assert overview.unexplained == {"m8": 1}
+    assert overview.unexplained_sentences() == [
+        "m8: an error of 0.50 um has a cause that is not known (on 1 of its 1 recording)"
+    ]
     assert overview.outlying_sentences() == ["m7: alone of 8 machines has link_expansion (on 2 of its 2 recordings)"]
     figure = plot_effect_matrix(overview)
     assert isinstance(figure, Figure)
     (matrix,) = figure.data
-    assert list(matrix.x) == ["link_expansion", "not explained"]
+    assert list(matrix.x) == ["link_expansion<br>ppm/K", "not explained"]
     assert list(matrix.y) == ["m7", "m8"]
-    assert [list(row) for row in matrix.text] == [["1.10 ppm/K", ""], ["", "1 of 1"]]
+    assert [list(row) for row in matrix.text] == [["1.1", ""], ["", "1 of 1"]]
     write_fleet_page(tmp_path / "fleet.html", results)
     assert "6 without any of these: m0, m1, m2" in (tmp_path / "fleet.html").read_text(encoding="utf-8")
 
@@ -70,10 +73,25 @@ def test_the_matrix_says_what_drifts_and_what_differs() -> None:
     (matrix,) = figure.data
     texts = dict(zip(matrix.y, [row[0] for row in matrix.text], strict=True))
     colours = dict(zip(matrix.y, [row[0] for row in matrix.z], strict=True))
-    assert texts["tripod-08"] == "1.00 to 1.40 ppm/K"
-    assert texts["tripod-09"] == "4.00 ppm/K"
+    assert texts["tripod-08"] == "1 to 1.4"
+    assert texts["tripod-09"] == "4"
     assert texts["tripod-10"] == "1 of 2 ?"
     assert len({colours[f"tripod-{k:02d}"] for k in (0, 8, 9, 10)}) == 4
+
+
+def test_effects_that_are_seldom_found_share_a_column() -> None:
+    rare = FleetEstimate("backlash", "b", 1.0, 0.01, "um", 0.001, True)
+    results = [
+        *machine("m1", [1.0, 1.0]),
+        result("m1", 2, [expansion(1.0), rare]),
+        result("m2"),
+        result("m2", 1, [rare]),
+    ]
+    figure = plot_effect_matrix(Overview(results))
+    assert isinstance(figure, Figure)
+    (matrix,) = figure.data
+    assert list(matrix.x) == ["link_expansion<br>ppm/K", SELDOM]
+    assert [list(row) for row in matrix.text] == [["1", "1 of 3"], ["", "1 of 2"]]
 
 
 def test_a_parameter_that_drifts_has_the_first_figure() -> None:
@@ -96,3 +114,9 @@ def test_the_page_has_it_all(tmp_path: Path) -> None:
 def test_a_fleet_of_problems_is_a_page_too(tmp_path: Path) -> None:
     write_fleet_page(tmp_path / "fleet.html", [result("", 0, problem="cannot be read")])
     assert "no effect was found" in (tmp_path / "fleet.html").read_text(encoding="utf-8")
+
+
+def test_what_nobody_has_looked_at_is_no_failure() -> None:
+    overview = Overview([result("m1"), result("m1", 1, problem=f"a.csv: {NOT_DONE}"), result("m1", 2, problem="lost")])
+    assert overview.headline == "1 recording of 1 machine examined; 1 other could not be; 1 is not done yet."
+    assert len(overview.failed) == 1
