@@ -61,9 +61,9 @@ def _matrix_caption(overview: Overview) -> str:
     """How to read the colours, and which machines are left out."""
     text = (
         "Blue: found on most recordings; the number is the median over these, from the smallest to the largest where "
-        "the effect has a number for each link or axis. Orange: it drifts, from the first to the last value of its line. "
-        "Red: it differs from the other machines'. Grey: an error of which no effect is the whole cause. A question "
-        "mark: on a recording another effect would do as well."
+        "the effect has a number for each link or axis. Orange: it drifts, from the first to the last value of its "
+        "line. Red: it differs from the other machines'. Grey: an error of which no effect is the whole cause. A "
+        "question mark: on a recording another effect would do as well."
     )
     if not overview.quiet:
         return text
