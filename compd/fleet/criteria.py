@@ -37,6 +37,13 @@ class FleetCriteria:
         "which grow with the scatter of all machines, its own scatter counts",
         reason="the customary level; the ratio is Birge's, Phys. Rev. 40 (1932) 207",
     )
+    steady_share: float = threshold(
+        0.5,
+        unit="share of a machine's recordings",
+        meaning="an effect found on more of them is one that the machine has; errors are compared among machines that "
+        "have the same ones",
+        reason="most recordings outvote a diagnosis that errs now and then, as in one campaign of one weather",
+    )
     fewest_machines: int = threshold(
         6,
         unit="machines",

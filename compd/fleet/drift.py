@@ -33,7 +33,7 @@ class Drift:
 
     Attributes
     ----------
-    machine, effect, parameter, unit : whose values they are.
+    machine, kinematics, effect, parameter, unit : whose values they are.
     started_at : when each campaign began; empty where one of them does not say.
     time : (C,) days since the machine's first campaign; without `started_at` their number, from 1.
     value, standard_error : (C,) in `unit`.
@@ -43,6 +43,7 @@ class Drift:
     """
 
     machine: str
+    kinematics: str
     effect: str
     parameter: str
     unit: str
@@ -120,7 +121,9 @@ def _series(results: Iterable[RecordingResult]) -> list[Drift]:
         for (effect, parameter, unit), values in sorted(points.items()):
             time, value, standard_error = np.array([(at, v, s) for at, _, v, s in values], dtype=np.float64).T
             began_at = tuple(began for _, began, _, _ in values if began is not None)
-            series.append(Drift(machine, effect, parameter, unit, began_at, time, value, standard_error))
+            series.append(
+                Drift(machine, campaigns[0].kinematics, effect, parameter, unit, began_at, time, value, standard_error)
+            )
     return series
 
 

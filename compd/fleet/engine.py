@@ -12,6 +12,7 @@ Example::
 
 from __future__ import annotations
 
+import math
 import pickle
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
@@ -70,7 +71,9 @@ def outcomes(
     workers = max(1, len(client.nthreads()))
     size = max(1, min(batch, len(items) // (workers * _FEWEST_BATCHES)))
     lost: list[Item] = []
-    for outcome in _run(client, work, [items[k : k + size] for k in range(0, len(items), size)]):
+    # every nth: neighbours, which may all be long, are in different tasks
+    batches = math.ceil(len(items) / size)
+    for outcome in _run(client, work, [items[k::batches] for k in range(batches)]):
         if isinstance(outcome.error, _WorkerDied):
             lost.append(outcome.item)
         else:

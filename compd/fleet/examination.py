@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
 from compd.api.diagnosis import compare, diagnose
+from compd.api.long_recordings import LongRecording, open_long
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import Comparison
 from compd.comparison.open import open_recording
+from compd.comparison.stream.block_comparison import compare_blocks
+from compd.comparison.stream.recording_stream import is_long
 from compd.configuration import Configuration, load
+from compd.configuration.geometry import LINKS
 from compd.diagnosis.model_changes import refit
 from compd.errors import CompdError, Problem
 from compd.files.atomic_files import file_stamp
+from compd.fleet.fleet_recording import FleetRecording, content_hash
+from compd.fleet.machine_files import MachineFiles, machine_files
 from compd.fleet.recording_result import (
     ABOVE_FLOOR,
     AT_FLOOR,
@@ -28,69 +33,115 @@ from compd.fleet.recording_result import (
 )
 from compd.model_file.model_document import read_stored
 from compd.model_file.model_file import ModelFile, read_model_file
-from compd.recording.recording import Recording
-from compd.recording.sidecar import read_sidecar
+from compd.recording.sidecar import EXTERNAL
+from compd.release import __version__
 
 # Configurations, and models, that a process keeps: a fleet has hundreds of recordings of a few machines.
 MOST_KEPT = 64
+# Number of links -> the kinematics that have so many.
+KINEMATICS = {links: kinematics for kinematics, links in LINKS.items()}
 
 
 @dataclass(frozen=True)
 class Examination:
-    """What is done with each recording of a fleet; called with its path, in any process.
+    """What is done with each recording of a fleet; called with it, in any process.
 
     Attributes
     ----------
     command : "compare" or "diagnose".
-    machines : name of a machine -> the path of its configuration, for those that do not come with compd.
-    models : name of a machine -> the path of its model file. Without one, no effect acts.
+    machines : configurations of machines that do not come with compd.
+    models : model files. A machine without one has no effects.
     effects : effects of one's own that a diagnosis tries, as `compd.load_effects` takes them.
     """
 
     command: Command
-    machines: Mapping[str, Path]
-    models: Mapping[str, Path]
+    machines: MachineFiles = field(default_factory=MachineFiles)
+    models: MachineFiles = field(default_factory=MachineFiles)
     effects: tuple[str, ...] = ()
 
     @property
     def files(self) -> tuple[Path, ...]:
         """Every file that it needs beside the recordings."""
-        return (*self.machines.values(), *self.models.values(), *map(Path, filter(os.path.isabs, self.effects)))
+        return (*self.machines.paths, *self.models.paths, *filter(Path.is_absolute, map(Path, self.effects)))
 
-    def __call__(self, path: Path) -> RecordingResult:
+    def model_path(self, recording: FleetRecording) -> str:
+        """The model file of a recording's machine; "" where it has none."""
+        return str(self.models.of(recording) or "")
+
+    def basis(self, recording: FleetRecording) -> str:
+        """Hash of everything that its result follows from beside the code: two results with one hash are the same.
+
+        The recording's files and its machine's name, the configuration, the model, effects of one's own, the command
+        and the release. "" where a file cannot be read.
+        """
+        content = content_hash(recording.path)
+        files = [self.machines.of(recording), self.models.of(recording), *self._effect_files]
+        try:
+            parts = [hashlib.sha256(path.read_bytes()).hexdigest() if path else "" for path in files]
+        except OSError:
+            return ""
+        named = [effect for effect in self.effects if not Path(effect).is_absolute()]
+        whole = [self.command, __version__, str(recording.path), recording.machine, str(recording.started_at), *named]
+        return content and hashlib.sha256("\0".join([content, *parts, *whole]).encode()).hexdigest()
+
+    def __call__(self, recording: FleetRecording) -> RecordingResult:
         """Examine one recording. Raises CompdError where it cannot be."""
-        machine = machine_name(path)
-        file = self.machines.get(machine)
-        aligned = open_recording(path, None if file is None else _configuration(file, file_stamp(file)))
-        model = self._model(aligned)
+        file = self.machines.of(recording)
+        configuration = None if file is None else _configuration(file, file_stamp(file))
+        path = recording.path
+        if is_long(path):
+            long = open_long(path, configuration)
+            aligned = long.sample.aligned
+        else:
+            long, aligned = None, open_recording(path, configuration)
+        model = self._model(recording, aligned)
         if self.command == "diagnose":
-            return self._diagnosed(aligned, model)
-        return self._compared(aligned, model)
+            return self._diagnosed(recording, aligned, model)
+        return self._compared(recording, aligned, model, long)
 
-    def _model(self, aligned: AlignedRecording) -> ModelFile | None:
+    @property
+    def _effect_files(self) -> list[Path]:
+        """The files of effects of one's own, those of directories one by one."""
+        places = [Path(effect) for effect in self.effects if Path(effect).is_absolute()]
+        return [
+            file
+            for place in places
+            for file in (sorted(place.iterdir()) if place.is_dir() else [place])
+            if file.is_file()
+        ]
+
+    def _model(self, recording: FleetRecording, aligned: AlignedRecording) -> ModelFile | None:
+        path = self.models.of(recording)
         machine = aligned.recording.machine
-        path = self.models.get(machine)
         return None if path is None else _model(path, file_stamp(path), machine, aligned.rows.links)
 
-    def _compared(self, aligned: AlignedRecording, model: ModelFile | None) -> RecordingResult:
+    def _compared(
+        self,
+        recording: FleetRecording,
+        aligned: AlignedRecording,
+        model: ModelFile | None,
+        long: LongRecording | None,
+    ) -> RecordingResult:
         """The recording beside the model, and the numbers that the model's effects would have on it."""
-        comparison = compare(aligned, model)
+        comparison = compare(aligned, model) if long is None else _compared_by_blocks(long, model)
         verdict = ABOVE_FLOOR if comparison.floor.known else NOISE_NOT_KNOWN
         estimates: list[FleetEstimate] = []
         after_um = math.nan
         if model is not None and model.fitted:
-            refitted = refit(model, aligned)
+            refitted = refit(model, aligned) if long is None else refit(model, aligned, long.refine)
             after_um = refitted.steps[-1].rms_after_um
             estimates = [
                 FleetEstimate(number.effect, number.parameter, number.value, number.standard_error, number.unit)
                 for number in refitted.numbers()
                 if not number.searched
             ]
-        return self._result(
-            comparison, after_um, AT_FLOOR if comparison.at_floor else verdict, comparison.verdict, estimates
-        )
+        if comparison.at_floor:
+            verdict = AT_FLOOR
+        return self._result(recording, comparison, after_um, verdict, comparison.verdict, estimates)
 
-    def _diagnosed(self, aligned: AlignedRecording, model: ModelFile | None) -> RecordingResult:
+    def _diagnosed(
+        self, recording: FleetRecording, aligned: AlignedRecording, model: ModelFile | None
+    ) -> RecordingResult:
         diagnosis = diagnose(aligned, model, effects=self.effects)
         estimates = [
             FleetEstimate(
@@ -107,19 +158,25 @@ class Examination:
             for number in step.parameters
         ]
         after_um = diagnosis.after.rms_um if estimates else math.nan
-        return self._result(diagnosis.before, after_um, diagnosis.verdict, diagnosis.summary, estimates)
+        return self._result(recording, diagnosis.before, after_um, diagnosis.verdict, diagnosis.summary, estimates)
 
     def _result(
-        self, before: Comparison, after_um: float, verdict: str, summary: str, estimates: Sequence[FleetEstimate]
+        self,
+        recording: FleetRecording,
+        before: Comparison,
+        after_um: float,
+        verdict: str,
+        summary: str,
+        estimates: Sequence[FleetEstimate],
     ) -> RecordingResult:
-        recording = before.aligned.recording
         return RecordingResult(
             recording=str(recording.path),
             machine=recording.machine,
+            kinematics=_kinematics(before.aligned),
             command=self.command,
-            model=str(self.models.get(recording.machine, "")),
-            started_at=_started_at(recording),
-            rows=int(before.used.sum()),
+            model=self.model_path(recording),
+            started_at=recording.started_at,
+            rows=before.rows_used,
             error_unit=before.aligned.unit,
             rms_before_um=before.rms_um,
             rms_after_um=after_um,
@@ -143,9 +200,10 @@ def examination(
     command : str
         ``"compare"`` or ``"diagnose"``.
     machines : sequence of path
-        Configurations of machines that do not come with compd; each is for the recordings that name it.
+        Configurations of machines that do not come with compd, for the recordings that name them; or patterns, as
+        `machine_files` takes them.
     models : sequence of path
-        Model files; each is for the recordings of its machine.
+        Model files, for the recordings of their machines; or patterns.
     effects : sequence of str or path
         Effects of one's own for `diagnose`, as `compd.load_effects` takes them.
 
@@ -155,45 +213,11 @@ def examination(
         With every problem of these files, and where two are for one machine.
     """
     problems: list[Problem] = []
-    configurations = _by_machine(machines, lambda path: load(path).machine, "a configuration", problems)
-    model_files = _by_machine(models, lambda path: read_stored(path).machine, "a model file", problems)
+    configurations = machine_files(machines, lambda path: load(path).machine, "a configuration", problems)
+    model_files = machine_files(models, lambda path: read_stored(path).machine, "a model file", problems)
     if problems:
         raise CompdError(problems)
     return Examination(command, configurations, model_files, tuple(_wherever(effect) for effect in effects))
-
-
-def machine_name(path: Path) -> str:
-    """The machine that a recording's sidecar names; "" where it names none, or cannot be read."""
-    try:
-        sidecar = read_sidecar(path.with_suffix(".yaml"), [])
-    except CompdError:
-        return ""
-    return "" if sidecar is None else sidecar.machine
-
-
-def _by_machine(
-    files: Sequence[str | Path], machine_of: Callable[[Path], str], kind: str, problems: list[Problem]
-) -> dict[str, Path]:
-    """Files by the machine that they are for; what cannot be read, or is the second for one machine, is a problem."""
-    by_machine: dict[str, Path] = {}
-    for path in dict.fromkeys(Path(file).absolute() for file in files):
-        try:
-            machine = machine_of(path)
-        except CompdError as error:
-            problems += error.problems
-            continue
-        if machine in by_machine:
-            problems.append(
-                Problem(
-                    where=str(path),
-                    what=f"is the second of its kind for machine {machine}",
-                    value=f"the first is {by_machine[machine]}",
-                    allowed=f"{kind} for each machine",
-                    next_step="leave one of them out, or give each machine a name of its own (`machine:`)",
-                )
-            )
-        by_machine.setdefault(machine, path)
-    return by_machine
 
 
 def _wherever(effects: str | Path) -> str:
@@ -213,10 +237,11 @@ def _model(path: Path, stamp: tuple[int, int] | None, machine: str, links: int) 
     return read_model_file(path, machine, links)
 
 
-def _started_at(recording: Recording) -> datetime | None:
-    """When it began, UTC, as `compd record` writes it; None where the sidecar does not say."""
-    try:
-        began = datetime.fromisoformat(str(recording.sidecar.provenance.get("started_at")))
-    except ValueError:
-        return None
-    return began.astimezone(UTC) if began.tzinfo else began.replace(tzinfo=UTC)
+def _compared_by_blocks(long: LongRecording, model: ModelFile | None) -> Comparison:
+    effects, covariance = ((), None) if model is None else (model.fitted, model.covariance)
+    return compare_blocks(long.stream, long.sample, effects, covariance)
+
+
+def _kinematics(aligned: AlignedRecording) -> str:
+    """How the machine is built, as its configuration says; EXTERNAL for a model of one's own."""
+    return EXTERNAL if aligned.model is None else KINEMATICS[aligned.rows.links]

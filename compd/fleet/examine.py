@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from compd.errors import CompdError, Problem
+from compd.files.atomic_files import file_stamp
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import Outcome, outcomes
-from compd.fleet.examination import Examination, machine_name
-from compd.fleet.recording_result import Command, RecordingResult
+from compd.fleet.examination import Examination
+from compd.fleet.fleet_recording import FleetRecording
+from compd.fleet.recording_result import NOT_DONE, Command, RecordingResult
 
 # Recordings in one task: to compare 600 rows takes 0.1 s, to diagnose them seconds.
 BATCH: Mapping[Command, int] = {"compare": 8, "diagnose": 1}
@@ -23,18 +24,21 @@ class FleetRun:
     Attributes
     ----------
     results : one for each recording, in the order in which they were given.
+    kept : how many of them are those of an earlier run.
     interrupted : whether Ctrl-C ended the work; recordings that were not done have a problem that says so.
     """
 
     results: tuple[RecordingResult, ...]
+    kept: int = 0
     interrupted: bool = False
 
 
 def examine_fleet(
     examination: Examination,
-    paths: Sequence[Path],
+    recordings: Sequence[FleetRecording],
     scheduler: str | None = None,
     progress: Callable[[RecordingResult], None] = lambda result: None,
+    earlier: Iterable[RecordingResult] = (),
 ) -> FleetRun:
     """Examine every recording; what is wrong with one stops none of the others.
 
@@ -42,12 +46,14 @@ def examine_fleet(
     ----------
     examination : Examination
         What is done with each.
-    paths : sequence of Path
-        The recordings, as `find_recordings` has them.
+    recordings : sequence of FleetRecording
+        As `find_recordings` has them.
     scheduler : str, optional
         Address of a Dask scheduler; left out, all cores of this computer do the work.
     progress : callable
-        Called with each result as it comes.
+        Called with each result as it comes, first with those that are kept.
+    earlier : iterable of RecordingResult
+        Results of an earlier run. One whose `basis` is that of a recording is kept; all others are of no use.
 
     Returns
     -------
@@ -58,32 +64,49 @@ def examine_fleet(
     CompdError
         Where the cluster cannot be used: `open_cluster`.
     """
-    results: dict[Path, RecordingResult] = {}
+    basis = {recording: examination.basis(recording) for recording in recordings}
+    known = {result.basis: result for result in earlier if result.basis and not result.problem}
+    results = {recording: known[basis[recording]] for recording in recordings if basis[recording] in known}
+    kept = len(results)
+    # long ones first: none is left at the end for which all other workers wait
+    todo = sorted((recording for recording in recordings if recording not in results), key=_size, reverse=True)
+    for result in results.values():
+        progress(result)
     interrupted = False
     try:
-        # the other recordings lie where the first one does
-        with open_cluster(scheduler, [*paths[:1], *examination.files]) as client:
-            for outcome in outcomes(client, examination, paths, BATCH[examination.command]):
-                result = outcome.result if outcome.result is not None else _failed(outcome, examination)
-                results[outcome.item] = result
-                progress(result)
+        if todo:
+            # the other recordings lie where the first one does
+            with open_cluster(scheduler, [todo[0].path, *examination.files]) as client:
+                for outcome in outcomes(client, examination, todo, BATCH[examination.command]):
+                    result = _result(outcome, examination, basis[outcome.item])
+                    results[outcome.item] = result
+                    progress(result)
     except KeyboardInterrupt:
         interrupted = True
-        for path in paths:
-            if path not in results:
-                not_done = CompdError(Problem(where=str(path), what="was not done: Ctrl-C ended the work before"))
-                results[path] = _failed(Outcome(path, None, not_done), examination)
-    return FleetRun(tuple(results[path] for path in paths), interrupted)
+        for recording in todo:
+            if recording not in results:
+                not_done = CompdError(Problem(where=str(recording), what=NOT_DONE))
+                results[recording] = _result(Outcome(recording, None, not_done), examination, "")
+    return FleetRun(tuple(results[recording] for recording in recordings), kept, interrupted)
 
 
-def _failed(outcome: Outcome[Path, RecordingResult], examination: Examination) -> RecordingResult:
-    """The result of a recording that could not be examined."""
-    error, machine = outcome.error, machine_name(outcome.item)
+def _size(recording: FleetRecording) -> int:
+    """Bytes of a recording; 0 where it cannot be looked at."""
+    stamp = file_stamp(recording.path)
+    return 0 if stamp is None else stamp[1]
+
+
+def _result(outcome: Outcome[FleetRecording, RecordingResult], examination: Examination, basis: str) -> RecordingResult:
+    """The result of a recording, with what it follows from; or of one that could not be examined."""
+    if outcome.result is not None:
+        return replace(outcome.result, basis=basis)
+    error, recording = outcome.error, outcome.item
     problem = str(error) if isinstance(error, CompdError) else f"unexpected: {type(error).__name__}: {error}"
     return RecordingResult(
-        recording=str(outcome.item),
-        machine=machine,
+        recording=str(recording),
+        machine=recording.machine,
         command=examination.command,
-        model=str(examination.models.get(machine, "")),
+        model=examination.model_path(recording),
+        started_at=recording.started_at,
         problem=problem,
     )

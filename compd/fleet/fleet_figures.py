@@ -1,11 +1,12 @@
-"""Figures of a fleet: effects by machine, parameters over campaigns, errors beside the noise."""
+"""Figures of a fleet: parameters over campaigns, and errors beside the noise."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
-from plotly.graph_objects import Figure, Heatmap, Scatter
+from plotly.graph_objects import Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.fleet.drift import Drift
@@ -14,56 +15,23 @@ from compd.report.page import COLOURS, style_figure
 from compd.report.page_table import PageTable
 from compd.report.small_multiples import COLUMNS, SERIES_COLOURS
 
-NO_EFFECTS = PageTable(("",), [("no effect was found, and the models have none",)])
-# A machine's line in the matrix.
-ROW_PX = 26
+NO_DRIFTS = PageTable(("",), [("no parameter has been determined on enough campaigns of one machine",)])
+# More small figures nobody looks through; the table has all numbers.
+MOST_PANELS = 9
 PANEL_PX = 260
 # Beyond so many machines in one small figure colours cannot be told apart: those that drift have one, others none.
 MOST_COLOURED = len(SERIES_COLOURS)
 
 
-def plot_effect_matrix(overview: Overview) -> Figure | PageTable:
-    """A line for each machine, a column for each effect: on which share of the recordings, and "3 of 4" in words."""
-    if not overview.effects:
-        return NO_EFFECTS
-    share, text = [], []
-    for machine in overview.machines:
-        results, counts = overview.of(machine), overview.counts(machine)
-        rivalled = {estimate.effect for result in results for estimate in result.estimates if estimate.rivals}
-        share.append([counts[effect] / len(results) for effect in overview.effects])
-        text.append(
-            [
-                f"{counts[effect]} of {len(results)}{' ?' if effect in rivalled else ''}" if counts[effect] else ""
-                for effect in overview.effects
-            ]
-        )
-    figure = Figure(
-        Heatmap(
-            x=overview.effects,
-            y=overview.machines,
-            z=share,
-            text=text,
-            texttemplate="%{text}",
-            hovertemplate="%{y}, %{x}: %{text}<extra></extra>",
-            colorscale=[[0, "#ffffff"], [1, COLOURS["plain"]]],
-            zmin=0,
-            zmax=1,
-            xgap=2,
-            ygap=2,
-            showscale=False,
-        )
-    )
-    style_figure(figure, "", "", 120 + ROW_PX * len(overview.machines))
-    return figure.update_yaxes(autorange="reversed", automargin=True).update_xaxes(side="top", automargin=True)
-
-
 def plot_drifts(overview: Overview) -> Figure | PageTable:
-    """A small figure for each parameter: its value on each campaign of each machine, and the lines of drifts."""
-    by_name: dict[tuple[str, str], list[Drift]] = {}
-    for drift in overview.drifts:
-        by_name.setdefault((drift.name, drift.unit), []).append(drift)
+    """A small figure for each parameter: its value on each campaign of each machine, and the lines of drifts.
+
+    Those that drift come first, then those that most machines have; at most MOST_PANELS, and only parameters with
+    enough campaigns to show a drift. NO_DRIFTS where there is none.
+    """
+    by_name = _panels(overview)
     if not by_name:
-        return NO_EFFECTS
+        return NO_DRIFTS
     lines, across = -(-len(by_name) // COLUMNS), min(COLUMNS, len(by_name))
     figure = make_subplots(
         lines,
@@ -87,9 +55,24 @@ def plot_drifts(overview: Overview) -> Figure | PageTable:
             for trace in _traces(drift, colour, legend):
                 figure.add_trace(trace, row=row, col=col)
         dated = all(drift.started_at for drift in series)
-        figure.update_xaxes(title_text="" if dated else "campaign", title_standoff=4, row=row, col=col)
+        figure.update_xaxes(
+            title_text="" if dated else "campaign", title_standoff=4, nticks=4, tickangle=0, row=row, col=col
+        )
         figure.update_yaxes(title_text=unit if unit != "1" else "", row=row, col=col)
     return figure
+
+
+def _panels(overview: Overview) -> dict[tuple[str, str], list[Drift]]:
+    """(Parameter, unit) -> its values on every machine, of the parameters that have a figure, in their order."""
+    by_name: dict[tuple[str, str], list[Drift]] = {}
+    for drift in overview.drifts:
+        by_name.setdefault((drift.name, drift.unit), []).append(drift)
+    shown = [
+        (min(drift.p_value for drift in tried) if any(drift.named for drift in tried) else 1.0, -len(tried), key)
+        for key, series in by_name.items()
+        if (tried := [drift for drift in series if not math.isnan(drift.p_value)])
+    ]
+    return {key: by_name[key] for _, _, key in sorted(shown)[:MOST_PANELS]}
 
 
 def plot_errors(overview: Overview) -> Figure | PageTable:

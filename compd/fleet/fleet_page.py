@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from compd.fleet.criteria import FleetCriteria
-from compd.fleet.fleet_figures import plot_drifts, plot_effect_matrix, plot_errors
+from compd.fleet.effect_matrix import plot_effect_matrix
+from compd.fleet.fleet_figures import plot_drifts, plot_errors
 from compd.fleet.overview import Overview
 from compd.fleet.recording_result import RecordingResult
 from compd.report.page import Panel, write_page
@@ -18,17 +19,14 @@ _CRITERIA = FleetCriteria()
 def write_fleet_page(path: Path, results: Sequence[RecordingResult]) -> None:
     """Write the page; it works offline. results : at least one."""
     overview = Overview(results)
-    sentences = [*overview.drift_sentences(), *overview.outlying_sentences()]
     verdict = overview.headline
     panels = [
-        Panel("What to look at", "Drifts and machines that differ; the reasons are below.", _list(sentences)),
-        Panel("Every machine", "Errors are medians over the machine's recordings.", overview.machine_table()),
         Panel(
-            "Which machine has which effect",
-            "On how many of its recordings an effect was found, or was in the model. A question mark: on one of them "
-            "another effect would do as well.",
-            plot_effect_matrix(overview),
+            "What to look at",
+            "What drifts, which machine differs, and errors without a known cause; the evidence is below.",
+            _list(overview.sentences()),
         ),
+        Panel("Which machine has which effect", _matrix_caption(overview), plot_effect_matrix(overview)),
         Panel(
             "How parameters change from campaign to campaign",
             f"Bars are standard errors. A line is drawn where chance makes so steep a one less than once in "
@@ -38,19 +36,38 @@ def write_fleet_page(path: Path, results: Sequence[RecordingResult]) -> None:
         Panel(
             "The error of each machine",
             f"Dots are recordings. A machine differs where its median, or one of its parameters, is more than "
-            f"{_CRITERIA.outlying_score:g} robust standard deviations from the median of all machines; it takes "
-            f"{_CRITERIA.fewest_machines} machines.",
+            f"{_CRITERIA.outlying_score:g} robust standard deviations from the median of all machines that are built "
+            f"alike, errors of those with the same effects; it takes {_CRITERIA.fewest_machines} machines.",
             plot_errors(overview),
+        ),
+        Panel(
+            "Every machine",
+            "Medians over the machine's recordings: the error, what is left of it with its effects, and noise alone.",
+            overview.machine_table(),
         ),
     ]
     if overview.failed:
-        panels.append(
-            Panel("Recordings that could not be examined", "They count in nothing above.", overview.problem_table())
+        problems = Panel(
+            "Recordings that could not be examined", "They count in nothing here.", overview.problem_table()
         )
+        panels.insert(1, problems)
     commands = ", ".join(sorted({f"compd fleet {result.command}" for result in results}))
     models = sorted({result.model for result in results if result.model})
     footer = f"By {commands}; models: {', '.join(models) or 'none'}."
     write_page(path, f"A fleet of {len(overview.machines)} machines", verdict, panels, footer)
+
+
+def _matrix_caption(overview: Overview) -> str:
+    """How to read the colours, and which machines are left out."""
+    text = (
+        "Blue: found on most recordings; the number is the median over these, from the smallest to the largest where "
+        "the effect has a number for each link or axis. Orange: it drifts, from the first to the last value of its "
+        "line. Red: it differs from the other machines'. Grey: an error of which no effect is the whole cause. A "
+        "question mark: on a recording another effect would do as well."
+    )
+    if not overview.quiet:
+        return text
+    return f"{text} {len(overview.quiet)} without any of these: {', '.join(overview.quiet)}."
 
 
 def _list(sentences: Sequence[str]) -> PageTable:

@@ -1,8 +1,10 @@
 """Which machine differs from the others: in a parameter of an effect, or in its error.
 
-A machine's value is compared with the median of all machines; the scale is their median absolute deviation, made
-comparable with a standard deviation, together with the standard error of the machine's own value. A machine that
-differs moves neither. Errors are compared as ratios, by their logarithm.
+Like is compared with like: the parameter with that of machines of one kinematics, the error with that of machines which
+have the same effects, too. A machine's value is compared with the median of all; the scale is their median absolute
+deviation, made comparable with a standard deviation, together with the standard error of the machine's own value, in
+which the scatter from campaign to campaign counts. A machine that differs moves neither. Errors are compared as ratios,
+by their logarithm.
 """
 
 from __future__ import annotations
@@ -17,9 +19,12 @@ import numpy as np
 from compd.fleet.criteria import FleetCriteria
 from compd.fleet.drift import Drift
 from compd.fleet.recording_result import RecordingResult
+from compd.fleet.steady_effects import steady_effects
 
 # Of a normal distribution: standard deviation over median absolute deviation.
 _SIGMA_OF_MAD = 1.4826
+# Of a normal distribution: standard error of the median over that of the mean.
+_OF_MEDIAN = math.sqrt(math.pi / 2)
 ERROR, ERROR_LEFT = "error", "error with its effects"
 
 
@@ -33,8 +38,9 @@ class OutlyingMachine:
     quantity : ERROR, ERROR_LEFT, or a parameter such as "link_expansion.a".
     value, standard_error : of this machine, in `unit`; the standard error of an error is 0.
     unit : of value, median and scatter.
-    median : of all machines.
-    machines : number of machines that have the quantity.
+    kinematics : how it and those that it is compared with are built.
+    median : of these machines.
+    machines : number of these machines that have the quantity.
     score : how far from the median, in robust standard deviations.
     """
 
@@ -43,6 +49,7 @@ class OutlyingMachine:
     value: float
     standard_error: float
     unit: str
+    kinematics: str
     median: float
     machines: int
     score: float
@@ -56,40 +63,69 @@ def outlying_machines(
     series : what `drifts` returns of the same results.
     """
     found: list[OutlyingMachine] = []
+    steady = steady_effects(results, criteria)
     for quantity in (ERROR, ERROR_LEFT):
-        for unit, errors in _errors(results, quantity).items():
-            logarithms = {machine: (math.log(value), 0.0) for machine, value in errors.items()}
-            for machine, score, middle in _far_off(logarithms, criteria):
+        for (unit, kind, _), errors in _errors(results, quantity, steady).items():
+            for machine, score, middle in _far_off(_logarithms(errors), criteria):
+                value = median(errors[machine])
                 found.append(
-                    OutlyingMachine(machine, quantity, errors[machine], 0.0, unit, math.exp(middle), len(errors), score)
+                    OutlyingMachine(machine, quantity, value, 0.0, unit, kind, math.exp(middle), len(errors), score)
                 )
-    parameters: dict[tuple[str, str], dict[str, tuple[float, float]]] = {}
+    parameters: dict[tuple[str, str, str], dict[str, tuple[float, float]]] = {}
     for drift in series:
         if mean := _weighted_mean(drift):
-            parameters.setdefault((drift.name, drift.unit), {})[drift.machine] = mean
-    for (name, unit), values in parameters.items():
-        for machine, score, middle in _far_off(values, criteria):
-            found.append(OutlyingMachine(machine, name, *values[machine], unit, middle, len(values), score))
+            parameters.setdefault((drift.name, drift.unit, drift.kinematics), {})[drift.machine] = mean
+    for (name, unit, kind), values in parameters.items():
+        found += [
+            OutlyingMachine(machine, name, *values[machine], unit, kind, middle, len(values), score)
+            for machine, score, middle in _far_off(values, criteria)
+        ]
     return tuple(sorted(found, key=lambda outlying: -outlying.score))
 
 
-def _errors(results: Sequence[RecordingResult], quantity: str) -> dict[str, dict[str, float]]:
-    """Unit -> machine -> the median of its recordings' errors."""
-    errors: dict[str, dict[str, list[float]]] = {}
+def _errors(
+    results: Sequence[RecordingResult], quantity: str, steady: Mapping[str, frozenset[str]]
+) -> dict[tuple[str, str, frozenset[str]], dict[str, list[float]]]:
+    """(Unit, kinematics, effects) -> machine -> its recordings' errors.
+
+    An error that is left where nothing was found is the error itself.
+    """
+    errors: dict[tuple[str, str, frozenset[str]], dict[str, list[float]]] = {}
     for result in results:
-        value = result.rms_before_um if quantity == ERROR else result.rms_after_um
+        value = result.rms_after_um if quantity == ERROR_LEFT and result.estimates else result.rms_before_um
         if value > 0:
-            errors.setdefault(result.error_unit, {}).setdefault(result.machine, []).append(value)
-    return {unit: {machine: median(values) for machine, values in of.items()} for unit, of in errors.items()}
+            kind = (result.error_unit, result.kinematics, steady[result.machine])
+            errors.setdefault(kind, {}).setdefault(result.machine, []).append(value)
+    # where no machine has an effect, this would be the error once more
+    return {kind: of for kind, of in errors.items() if quantity == ERROR or kind[2]}
+
+
+def _logarithms(errors: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, float]]:
+    """Machine -> median of the logarithms of its errors, and its standard error from the scatter of its recordings.
+
+    The scatter is the machine's own, and not less than that of all machines: of a few recordings it is not known well.
+    """
+    middle = {machine: median(map(math.log, values)) for machine, values in errors.items()}
+    apart = {machine: [abs(math.log(value) - middle[machine]) for value in of] for machine, of in errors.items()}
+    usual = median(distance for distances in apart.values() for distance in distances)
+    return {
+        machine: (
+            middle[machine],
+            _OF_MEDIAN * _SIGMA_OF_MAD * max(usual, median(distances)) / math.sqrt(len(distances)),
+        )
+        for machine, distances in apart.items()
+    }
 
 
 def _weighted_mean(drift: Drift) -> tuple[float, float] | None:
-    """Mean over the campaigns, weighted with the standard errors, and its own; None where none is known."""
+    """Mean over the campaigns, weighted with the standard errors, and its own, by Birge's ratio; None without any."""
     known = np.isfinite(drift.value) & np.isfinite(drift.standard_error) & (drift.standard_error > 0)
     if not known.any():
         return None
-    weight = drift.standard_error[known] ** -2
-    return float(np.average(drift.value[known], weights=weight)), float(weight.sum() ** -0.5)
+    value, weight = drift.value[known], drift.standard_error[known] ** -2
+    mean = float(np.average(value, weights=weight))
+    ratio = float(np.sum(weight * (value - mean) ** 2)) / max(1, len(value) - 1)
+    return mean, float(math.sqrt(max(1.0, ratio) / weight.sum()))
 
 
 def _far_off(values: Mapping[str, tuple[float, float]], criteria: FleetCriteria) -> list[tuple[str, float, float]]:

@@ -11,12 +11,19 @@ from pathlib import Path
 from statistics import median
 
 from compd.comparison.display_unit import format_error
+from compd.fleet.criteria import FleetCriteria
 from compd.fleet.drift import Drift, drifts, named_drifts
 from compd.fleet.outlying import ERROR, ERROR_LEFT, OutlyingMachine, outlying_machines
-from compd.fleet.recording_result import RecordingResult
+from compd.fleet.recording_result import AT_FLOOR, RecordingResult
+from compd.fleet.steady_effects import LoneEffect, lone_effects, steady_effects
 from compd.report.page_table import PageTable
 from compd.text.number_text import estimate_text, join_words, number_text
 
+# Verdicts of recordings that the model explains: of `diagnose`, and of `compare`.
+_NOTHING_MISSING = ("adequate", AT_FLOOR)
+_UNEXPLAINED = ("unexplained", "partial")
+# Beside the effects: an error without a known cause.
+NOT_EXPLAINED = "not explained"
 _NO_MACHINE = "(no machine named)"
 _DATE = "%Y-%m-%d"
 
@@ -35,7 +42,12 @@ class Overview:
     @cached_property
     def failed(self) -> list[RecordingResult]:
         """Recordings that could not be examined."""
-        return [result for result in self.results if result.problem]
+        return [result for result in self.results if result.problem and not result.not_done]
+
+    @cached_property
+    def not_done(self) -> int:
+        """Number of recordings for which there was no time."""
+        return sum(result.not_done for result in self.results)
 
     @cached_property
     def machines(self) -> list[str]:
@@ -44,8 +56,8 @@ class Overview:
 
     @cached_property
     def effects(self) -> list[str]:
-        """Effects by the number of machines that have them, the most common first."""
-        having = Counter(effect for machine in self.machines for effect in self.counts(machine))
+        """Effects that a machine has on most of its recordings: those of the most machines first."""
+        having = Counter(effect for effects in self.steady.values() for effect in effects)
         return sorted(having, key=lambda effect: (-having[effect], effect))
 
     @cached_property
@@ -58,9 +70,47 @@ class Overview:
         """Machines that differ from the others."""
         return outlying_machines(self.examined, self.drifts)
 
+    @cached_property
+    def lone(self) -> tuple[LoneEffect, ...]:
+        """Effects that one machine alone has."""
+        return lone_effects(self.examined)
+
+    @cached_property
+    def steady(self) -> dict[str, frozenset[str]]:
+        """Machine -> the effects that it has on most of its recordings."""
+        return steady_effects(self.examined)
+
+    @cached_property
+    def unexplained(self) -> Counter[str]:
+        """Machine -> recordings with an error of which no effect is the whole cause."""
+        return Counter(result.machine for result in self.examined if result.verdict in _UNEXPLAINED)
+
+    @property
+    def unexplained_machines(self) -> list[str]:
+        """Machines with such an error on most of their recordings."""
+        share = FleetCriteria().steady_share
+        return [machine for machine in self.machines if self.unexplained[machine] > share * len(self.of(machine))]
+
+    @cached_property
+    def quiet(self) -> list[str]:
+        """Machines of which nothing is to be said: no recording has an effect or an error that none explains."""
+        return [
+            machine
+            for machine in self.machines
+            if not any(outlying.machine == machine for outlying in self.outlying)
+            and all(result.verdict in _NOTHING_MISSING and not result.effects for result in self._by_machine[machine])
+        ]
+
+    @cached_property
+    def _by_machine(self) -> dict[str, list[RecordingResult]]:
+        by_machine: dict[str, list[RecordingResult]] = {}
+        for result in self.examined:
+            by_machine.setdefault(result.machine, []).append(result)
+        return by_machine
+
     def of(self, machine: str) -> list[RecordingResult]:
         """The recordings of a machine that were examined."""
-        return [result for result in self.examined if result.machine == machine]
+        return self._by_machine[machine]
 
     def counts(self, machine: str) -> Counter[str]:
         """Effect -> recordings of the machine on which it was found."""
@@ -71,18 +121,29 @@ class Overview:
         """How much was examined, and how many things are to be looked at, in a sentence or two."""
         recordings = _counted(len(self.examined), "recording")
         text = f"{recordings} of {_counted(len(self.machines), 'machine')} examined"
-        text += f"; {_counted(len(self.failed), 'other')} could not be." if self.failed else "."
+        text += f"; {_counted(len(self.failed), 'other')} could not be" if self.failed else ""
+        text += f"; {_counted(self.not_done, 'is', 'are')} not done yet." if self.not_done else "."
         named = named_drifts(self.drifts)
-        findings = [_counted(len(named), "parameter drifts", "parameters drift")] if named else []
-        outlying = {machine.machine for machine in self.outlying}
-        findings += [_counted(len(outlying), "machine differs", "machines differ")] if outlying else []
+        having = sum(map(bool, self.steady.values()))
+        differing = {outlying.machine for outlying in self.outlying} | {lone.machine for lone in self.lone}
+        findings = [_counted(having, "machine has an effect", "machines have effects")] if having else []
+        unexplained = len(self.unexplained_machines)
+        if unexplained:
+            findings.append(_counted(unexplained, "has an error not explained", "have an error not explained"))
+        findings += [_counted(len(named), "parameter drifts", "parameters drift")] if named else []
+        findings += [_counted(len(differing), "machine differs", "machines differ")] if differing else []
         return f"{text} {join_words(findings)}." if findings else text
 
-    def machine_table(self) -> PageTable:
-        """A row for each machine: how many recordings, their verdicts, error and noise, effects."""
-        head = ("machine", "recordings", "verdicts", "error", "left with its effects", "noise alone", "effects")
+    def machine_table(self, without: Sequence[str] = ()) -> PageTable:
+        """A row for each machine: how many recordings, their verdicts, error and noise, effects.
+
+        without : machines that are left out.
+        """
+        head = ("machine", "recordings", "verdicts", "error", "left", "noise", "effects")
         rows = []
         for machine in self.machines:
+            if machine in without:
+                continue
             results = self.of(machine)
             verdicts = Counter(result.verdict for result in results)
             effects = self.counts(machine)
@@ -104,8 +165,27 @@ class Overview:
         return [drift_sentence(drift) for drift in named_drifts(self.drifts)]
 
     def outlying_sentences(self) -> list[str]:
-        """Which machine differs and by how much, the farthest first."""
-        return [outlying_sentence(machine) for machine in self.outlying]
+        """Which machine differs, and by how much: the farthest first, then those that alone have an effect."""
+        return [*map(outlying_sentence, self.outlying), *map(lone_sentence, self.lone)]
+
+    def unexplained_sentences(self) -> list[str]:
+        """Which machine has an error of which no effect is the whole cause, and how large it is."""
+        sentences = []
+        for machine in self.unexplained_machines:
+            results = self.of(machine)
+            unit = results[0].error_unit
+            error = median(result.rms_before_um for result in results)
+            left = median(result.rms_after_um if result.estimates else result.rms_before_um for result in results)
+            text = f"an error of {format_error(error, unit)}"
+            if left < error:
+                text = f"{format_error(left, unit)} of {text}"
+            counted = f"on {self.unexplained[machine]} of its {_counted(len(results), 'recording')}"
+            sentences.append(f"{machine}: {text} has a cause that is not known ({counted})")
+        return sentences
+
+    def sentences(self) -> list[str]:
+        """What to look at: what drifts, which machine differs, and what no effect explains."""
+        return [*self.drift_sentences(), *self.outlying_sentences(), *self.unexplained_sentences()]
 
     def problem_table(self) -> PageTable:
         """Recordings that could not be examined, each with the reason."""
@@ -139,6 +219,14 @@ def outlying_sentence(outlying: OutlyingMachine) -> str:
     return (
         f"{outlying.machine}: {outlying.quantity} is {value}, the median of {outlying.machines} machines is {middle} "
         f"({outlying.score:.0f} robust standard deviations)"
+    )
+
+
+def lone_sentence(lone: LoneEffect) -> str:
+    """ "tripod-03: alone of 12 machines has backlash (on 4 of its 4 recordings)"."""
+    return (
+        f"{lone.machine}: alone of {lone.machines} machines has {lone.effect} (on {lone.found_on} of its "
+        f"{_counted(lone.recordings, 'recording')})"
     )
 
 

@@ -11,6 +11,9 @@ Command = Literal["compare", "diagnose"]
 # Verdicts of `compare`; those of `diagnose` are `compd.diagnosis.verdict.Verdict`.
 AT_FLOOR, ABOVE_FLOOR, NOISE_NOT_KNOWN = "at_floor", "above_floor", "noise_not_known"
 
+# The problem of a recording for which there was no time.
+NOT_DONE = "was not done: Ctrl-C ended the work before"
+
 
 @dataclass(frozen=True)
 class FleetEstimate:
@@ -43,10 +46,11 @@ class RecordingResult:
     Attributes
     ----------
     recording : its table's path.
-    machine : name of its machine; "" where its sidecar does not say.
+    machine : name of its machine in the fleet; "" where nothing says which it is.
+    kinematics : how that is built: "tripod_3spr", "hexapod_6ups", or "external"; "" with a problem.
     command : what was done.
     model : the model file that was applied; "" for none.
-    started_at : when the campaign began, by the sidecar's `provenance`; None where that does not say.
+    started_at : when the campaign began, by the sidecar or by the name; None where neither says it.
     rows : rows that counted.
     error_unit : unit of the three numbers that follow; "um" but for recordings in another unit.
     rms_before_um : error per coordinate with the model as it is.
@@ -56,11 +60,13 @@ class RecordingResult:
     summary : the verdict in words.
     estimates : of the effects that were found, or that the model has.
     problem : why it could not be examined; "" where it was.
+    basis : `Examination.basis`, the hash of what the result follows from; "" with a problem.
     """
 
     recording: str
     machine: str
     command: Command
+    kinematics: str = ""
     model: str = ""
     started_at: datetime | None = None
     rows: int = 0
@@ -72,6 +78,12 @@ class RecordingResult:
     summary: str = ""
     estimates: tuple[FleetEstimate, ...] = ()
     problem: str = ""
+    basis: str = ""
+
+    @property
+    def not_done(self) -> bool:
+        """Whether nobody has looked at it yet, so that nothing is known to be wrong with it."""
+        return NOT_DONE in self.problem
 
     @property
     def effects(self) -> tuple[str, ...]:

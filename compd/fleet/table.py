@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 # In the schema's metadata; another number where a column changes its meaning.
-FORMAT_KEY, FORMAT = b"compd.fleet.format", b"1"
+FORMAT_KEY, FORMAT = b"compd.fleet.format", b"2"
 
 
 class TableColumn(NamedTuple):
@@ -39,10 +39,13 @@ class TableColumn(NamedTuple):
 
 OF_RECORDING = (
     TableColumn("recording", "string", "path of the recording's table"),
-    TableColumn("machine", "string", "name of its machine; empty where its sidecar does not say"),
+    TableColumn("machine", "string", "name of its machine in the fleet; empty where nothing says which it is"),
+    TableColumn("kinematics", "string", "tripod_3spr, hexapod_6ups, or external"),
     TableColumn("command", "string", "compare or diagnose"),
     TableColumn("model", "string", "the model file that was applied; empty for none"),
-    TableColumn("started_at", "timestamp", "when the campaign began, UTC; empty where the sidecar does not say"),
+    TableColumn(
+        "started_at", "timestamp", "when the campaign began, UTC; empty where neither sidecar nor name says it"
+    ),
     TableColumn("rows", "int64", "rows of the recording that counted"),
     TableColumn("error_unit", "string", "unit of the columns that end in _um, um but for recordings in another unit"),
     TableColumn("rms_before_um", "double", "error per coordinate with the model as it is"),
@@ -62,7 +65,8 @@ OF_EFFECT = (
     TableColumn("rivals", "string", "effects that would do as well in its place, separated by spaces"),
 )
 PROBLEM = TableColumn("problem", "string", "why the recording could not be examined; empty where it was")
-COLUMNS = (*OF_RECORDING, *OF_EFFECT, PROBLEM)
+BASIS = TableColumn("basis", "string", "hash of what the result follows from: files, model, options, release")
+COLUMNS = (*OF_RECORDING, *OF_EFFECT, PROBLEM, BASIS)
 
 
 def check_table_path(path: Path, overwrite: bool = False) -> None:
@@ -127,10 +131,19 @@ def read_table(path: Path) -> tuple[RecordingResult, ...]:
     return tuple(_result(list(rows)) for _, rows in by_recording)
 
 
+def earlier_results(path: Path) -> tuple[RecordingResult, ...]:
+    """The results of a table that may be there; none where it is not, or has another release's format."""
+    try:
+        return read_table(path)
+    except CompdError:
+        return ()
+
+
 def rows_of(result: RecordingResult) -> Iterator[dict[str, Any]]:
     """The rows of one recording: column -> value, None where there is none."""
     whole = _cells(result, OF_RECORDING)
     whole |= {"rows": None if result.problem else result.rows, PROBLEM.name: result.problem or None}
+    whole[BASIS.name] = result.basis or None
     for estimate in result.estimates:
         yield {**whole, **_cells(estimate, OF_EFFECT), "rivals": " ".join(estimate.rivals) or None}
     if not result.estimates:
@@ -170,7 +183,8 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> RecordingResult:
         "started_at": None if began is None else began.astimezone(UTC),
         "rows": rows[0]["rows"] or 0,
     }
-    return RecordingResult(**whole, estimates=tuple(estimates), problem=rows[0][PROBLEM.name] or "")
+    problem, basis = (rows[0][column.name] or "" for column in (PROBLEM, BASIS))
+    return RecordingResult(**whole, estimates=tuple(estimates), problem=problem, basis=basis)
 
 
 def _known(row: Mapping[str, Any], columns: Iterable[TableColumn]) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import outcomes
 from compd.fleet.examination import Examination, examination
 from compd.fleet.examine import BATCH
+from compd.fleet.fleet_recording import FleetRecording
 from compd.fleet.recordings import find_recordings
 from compd.simulation.campaign.simulate_campaign import simulate_campaign
 from tests.benchmarks.figures import show
@@ -54,7 +55,7 @@ def main() -> None:
     show(title, head, rows)
 
 
-def recordings(directory: Path, count: int) -> tuple[Path, ...]:
+def recordings(directory: Path, count: int) -> tuple[FleetRecording, ...]:
     """So many recordings of about 600 rows, written there."""
     for number in range(count):
         path = directory / f"{number:04d}.csv"
@@ -63,7 +64,7 @@ def recordings(directory: Path, count: int) -> tuple[Path, ...]:
         else:
             for ending in (".csv", ".yaml"):
                 shutil.copy(directory / f"{number % DIFFERENT:04d}{ending}", path.with_suffix(ending))
-    return find_recordings([directory]).paths
+    return find_recordings([directory]).recordings
 
 
 class Cost(NamedTuple):
@@ -75,7 +76,7 @@ class Cost(NamedTuple):
     scheduler_processor_s: float
 
 
-def measure(work: Examination, paths: Sequence[Path], workers: int) -> Cost:
+def measure(work: Examination, paths: Sequence[FleetRecording], workers: int) -> Cost:
     """What this work on all recordings takes with so many worker processes."""
     begun_s = time.perf_counter()
     with open_cluster(processes=workers) as client:

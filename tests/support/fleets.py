@@ -16,6 +16,7 @@ def result(machine: str, campaign: int = 0, estimates: Sequence[FleetEstimate] =
     attributes = {
         "recording": f"/data/{machine}/{campaign:02d}.csv",
         "machine": machine,
+        "kinematics": "tripod_3spr",
         "command": "diagnose",
         "started_at": BEGAN + timedelta(weeks=campaign),
         "rows": 600,

@@ -20,7 +20,7 @@ from compd.fleet.examination import examination
 from compd.fleet.examine import examine_fleet
 from compd.fleet.recording_result import RecordingResult
 from compd.fleet.recordings import find_recordings
-from compd.fleet.table import read_table
+from compd.fleet.table import read_table, write_table
 from tests.support.dask_cluster import PATIENCE_S, DaskCluster, dask_cluster
 from tests.support.measured import gauges, hidden, record
 from tests.support.paths import ROOT
@@ -81,7 +81,7 @@ def test_a_worker_that_is_killed_in_the_middle_costs_no_recording(fleet: Path, c
             cluster.kill_worker()
         done.append(result)
 
-    run = examine_fleet(examination("compare"), find_recordings([fleet]).paths, cluster.address, progress)
+    run = examine_fleet(examination("compare"), find_recordings([fleet]).recordings, cluster.address, progress)
     assert len(done) == RECORDINGS
     assert [Path(result.recording).name for result in run.results if result.problem] == ["run3.csv"]
 
@@ -90,11 +90,48 @@ def test_ctrl_c_leaves_a_result_for_every_recording(fleet: Path, cluster: DaskCl
     def interrupt(result: RecordingResult) -> None:
         raise KeyboardInterrupt
 
-    run = examine_fleet(examination("compare"), find_recordings([fleet]).paths, cluster.address, interrupt)
+    run = examine_fleet(examination("compare"), find_recordings([fleet]).recordings, cluster.address, interrupt)
     assert run.interrupted
     problems = [result.problem for result in run.results]
     assert len(problems) == RECORDINGS
     assert sum("Ctrl-C ended the work" in problem for problem in problems) == RECORDINGS - 1
+
+
+def test_a_run_goes_on_where_it_was_interrupted(fleet: Path, cluster: DaskCluster, tmp_path: Path) -> None:
+    directory = tmp_path / "data"
+    shutil.copytree(fleet, directory)
+    done: list[RecordingResult] = []
+
+    def interrupt(result: RecordingResult) -> None:
+        done.append(result)
+        if len(done) == 3:
+            raise KeyboardInterrupt
+
+    wanted = examination("compare")
+    first = examine_fleet(wanted, find_recordings([directory]).recordings, cluster.address, interrupt)
+    write_table(tmp_path / "fleet.parquet", first.results)
+    kept = [result.recording for result in first.results if not result.problem]
+    assert 2 <= len(kept) <= 3
+
+    (directory / "run8.csv").write_bytes((directory / "run0.csv").read_bytes())
+    (directory / "run8.yaml").write_bytes((directory / "run0.yaml").read_bytes())
+    Path(kept[0]).unlink()
+    changed = Path(kept[1]).with_suffix(".yaml")
+    changed.write_text(changed.read_text() + "notes: seen again\n")
+    second = examine_fleet(
+        wanted,
+        find_recordings([directory]).recordings,
+        cluster.address,
+        earlier=read_table(tmp_path / "fleet.parquet"),
+    )
+    assert second.kept == len(kept) - 2
+    examined = [Path(result.recording).name for result in second.results if not result.problem]
+    assert examined == [f"run{k}.csv" for k in range(9) if f"run{k}.csv" not in ("run3.csv", Path(kept[0]).name)]
+
+    # nothing is left to be done, so that no cluster is needed
+    (directory / "run3.csv").unlink()
+    third = examine_fleet(wanted, find_recordings([directory]).recordings, "tcp://127.0.0.1:1", earlier=second.results)
+    assert third.kept == len(third.results) == len(examined)
 
 
 def test_recordings_that_a_worker_does_not_see(cluster: DaskCluster, tmp_path: Path) -> None:

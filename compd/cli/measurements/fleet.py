@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from compd.cli.options import EffectsOption, OverwriteOption
+from compd.fleet.machine_names import MachinesBy
 
 if TYPE_CHECKING:
     from compd.fleet.examination import Examination
     from compd.fleet.recording_result import RecordingResult
 
 # More of each a terminal does not show; the page and the table have all.
-MOST_SENTENCES = 12
+MOST_SENTENCES = 20
+# Of more machines those of which nothing is to be said share a line.
+MOST_MACHINES = 12
 # Of shells: ended by SIGINT.
 _INTERRUPTED = 130
 
@@ -27,21 +29,38 @@ PlacesArgument = Annotated[
     list[str],
     typer.Argument(
         metavar="DIRECTORY|PATTERN...",
-        help="Where the recordings are: directories, with all below them, or patterns in quotes ('2026-*/*.csv').",
+        help="Where the recordings are: directories, with all below them, or patterns in quotes: 'data/2026-*/*.csv'; "
+        "'data/{machine}_*.csv' where the file's name says which machine it is.",
     ),
 ]
 MachinesOption = Annotated[
-    list[Path] | None,
+    list[str] | None,
     typer.Option(
         "--machine",
         metavar="FILE",
-        help="The configuration of a machine that does not come with compd, for the recordings that name it. May be "
-        "repeated.",
+        help="The configuration of a machine that does not come with compd, for the recordings that name it; or a "
+        "pattern of several ('machines/*.yaml'). May be repeated.",
     ),
 ]
 ModelsOption = Annotated[
-    list[Path] | None,
-    typer.Option("--model", metavar="FILE", help="A model file, for the recordings of its machine. May be repeated."),
+    list[str] | None,
+    typer.Option(
+        "--model",
+        metavar="FILE",
+        help="A model file, for the recordings of its machine; or a pattern: 'models/{machine}.yaml' where machines "
+        "that are built alike have a model each. May be repeated.",
+    ),
+]
+MachinesByOption = Annotated[
+    MachinesBy,
+    typer.Option(
+        "--machines-by",
+        help="What tells machines apart that have one configuration: the directory, or nothing (sidecar); auto says "
+        "what it has taken.",
+    ),
+]
+FreshOption = Annotated[
+    bool, typer.Option("--fresh", help="Examine every recording anew, also those whose result the table has already.")
 ]
 SchedulerOption = Annotated[
     str | None,
@@ -51,7 +70,13 @@ SchedulerOption = Annotated[
         help="A Dask scheduler that runs already; left out, all cores of this computer do the work.",
     ),
 ]
-OutOption = Annotated[Path, typer.Option("--out", help="The table to write (Parquet); an earlier one is replaced.")]
+OutOption = Annotated[
+    Path,
+    typer.Option(
+        "--out",
+        help="The table to write (Parquet). What an earlier one has of the same files, model and options is kept.",
+    ),
+]
 HtmlOption = Annotated[Path | None, typer.Option("--html", help="Write the page too; works offline.")]
 
 
@@ -66,19 +91,23 @@ def compare(
     out: OutOption = Path("fleet.parquet"),
     machine: MachinesOption = None,
     model: ModelsOption = None,
+    machines_by: MachinesByOption = MachinesBy.auto,
     scheduler: SchedulerOption = None,
+    fresh: FreshOption = False,
     html: HtmlOption = None,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Compare every recording with the model of its machine; the effects of the model are fitted anew on each.
 
-    A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1.
+    A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1. A run
+    that was interrupted goes on where it stopped.
     """
     from compd.fleet.cluster import check_installed
     from compd.fleet.examination import examination
 
     check_installed()
-    _examine(examination("compare", machine or (), model or ()), places, out, scheduler, html, overwrite)
+    wanted = examination("compare", machine or (), model or ())
+    _examine(wanted, places, machines_by, out, scheduler, html, fresh, overwrite)
 
 
 @fleet.command()
@@ -88,20 +117,23 @@ def diagnose(
     machine: MachinesOption = None,
     model: ModelsOption = None,
     effects: EffectsOption = None,
+    machines_by: MachinesByOption = MachinesBy.auto,
     scheduler: SchedulerOption = None,
+    fresh: FreshOption = False,
     html: HtmlOption = None,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Diagnose every recording: which effect the model of its machine lacks, with its numbers.
 
-    A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1.
+    A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1. A run
+    that was interrupted goes on where it stopped.
     """
     from compd.fleet.cluster import check_installed
     from compd.fleet.examination import examination
 
     check_installed()
     wanted = examination("diagnose", machine or (), model or (), effects or ())
-    _examine(wanted, places, out, scheduler, html, overwrite)
+    _examine(wanted, places, machines_by, out, scheduler, html, fresh, overwrite)
 
 
 @fleet.command()
@@ -119,7 +151,9 @@ def report(
     machine: MachinesOption = None,
     model: ModelsOption = None,
     effects: EffectsOption = None,
+    machines_by: MachinesByOption = MachinesBy.auto,
     scheduler: SchedulerOption = None,
+    fresh: FreshOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Write the page: which machine has which effect, what drifts, which machine differs, what could not be read."""
@@ -132,7 +166,7 @@ def report(
     check_installed()
     if not all(is_table(Path(place)) for place in places):
         wanted = examination("diagnose", machine or (), model or (), effects or ())
-        _examine(wanted, places, out, scheduler, html, overwrite)
+        _examine(wanted, places, machines_by, out, scheduler, html, fresh, overwrite)
         return
     check_page_path(html, overwrite)
     results = [result for place in places for result in read_table(Path(place))]
@@ -142,33 +176,50 @@ def report(
 
 
 def _examine(
-    wanted: Examination, places: list[str], out: Path, scheduler: str | None, html: Path | None, overwrite: bool
+    wanted: Examination,
+    places: list[str],
+    by: MachinesBy,
+    out: Path,
+    scheduler: str | None,
+    html: Path | None,
+    fresh: bool,
+    overwrite: bool,
 ) -> None:
     """Examine what lies in these places, write the table and where it is wanted the page, print an overview."""
     from compd.cli.problems import print_problems
     from compd.cli.progress import count_shown
+    from compd.fleet.checkpoint import Checkpoint
     from compd.fleet.examine import examine_fleet
     from compd.fleet.fleet_page import write_fleet_page
     from compd.fleet.recordings import find_recordings
-    from compd.fleet.table import check_table_path, write_table
+    from compd.fleet.table import check_table_path, earlier_results, write_table
 
     check_table_path(out, overwrite)
     if html is not None:
         from compd.report.page import check_page_path
 
         check_page_path(html, overwrite)
-    found = find_recordings(places)
+    found = find_recordings(places, by)
     print_problems(found.remarks, "remark: ")
-    numbers = count(1)
-    with count_shown(len(found.paths), "recordings") as done:
-        run = examine_fleet(wanted, found.paths, scheduler, lambda result: done(next(numbers)))
+    earlier = () if fresh else earlier_results(out)
+    checkpoint = Checkpoint(out)
+    with count_shown(len(found.recordings), "recordings") as done:
+
+        def progress(result: RecordingResult) -> None:
+            checkpoint.add(result)
+            done(checkpoint.count)
+
+        run = examine_fleet(wanted, found.recordings, scheduler, progress, earlier)
     write_table(out, run.results)
+    if run.kept:
+        typer.echo(f"{run.kept} of {len(run.results)} were in {out} already, of the same files, models and options.")
     _print_overview(run.results)
     typer.echo(f"The table: {out}")
     if html is not None:
         write_fleet_page(html, run.results)
         typer.echo(f"The page: {html}")
     if run.interrupted:
+        typer.echo("Interrupted; the same command goes on where it stopped.")
         raise typer.Exit(_INTERRUPTED)
     raise typer.Exit(any(result.problem for result in run.results))
 
@@ -184,13 +235,16 @@ def _print_overview(results: list[RecordingResult] | tuple[RecordingResult, ...]
     console = Console(highlight=False, markup=False, soft_wrap=True)
     overview = Overview(results)
     console.print(overview.headline)
-    if overview.machines:
-        summary = overview.machine_table()
+    quiet = overview.quiet if len(overview.machines) > MOST_MACHINES else []
+    if len(overview.machines) > len(quiet):
+        summary = overview.machine_table(without=quiet)
         table = Table(*summary.head)
         for row in summary.rows:
             table.add_row(*row)
         console.print(keep_words_whole(table, console.width))
-    sentences = [*overview.drift_sentences(), *overview.outlying_sentences()]
+    if quiet:
+        console.print(f"Nothing is missing on {len(quiet)} others: {', '.join(quiet)}")
+    sentences = overview.sentences()
     for sentence in sentences[:MOST_SENTENCES]:
         console.print(f"  - {sentence}")
     if len(sentences) > MOST_SENTENCES:

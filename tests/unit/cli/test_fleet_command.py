@@ -31,7 +31,9 @@ def table(tmp_path: Path) -> Path:
 
 def test_a_report_of_a_table(table: Path, tmp_path: Path) -> None:
     output = run("report", table, "--html", tmp_path / "fleet.html")
-    assert "3 recordings of 1 machine examined; 1 other could not be. 1 parameter drifts." in output
+    assert (
+        "3 recordings of 1 machine examined; 1 other could not be. 1 machine has an effect and 1 parameter drifts."
+    ) in output
     assert "tripod-01: link_expansion.a changes by 0.400" in output
     assert "not examined: lost.csv: cannot be read\n" in output
     assert "copy it again" in (tmp_path / "fleet.html").read_text(encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -11,10 +12,19 @@ import yaml
 
 import compd
 from compd.errors import CompdError
+from compd.fleet import examination as module
 from compd.fleet.examination import examination
+from compd.fleet.fleet_recording import FleetRecording
 from compd.fleet.recording_result import ABOVE_FLOOR
+from compd.fleet.recordings import find_recordings
 from tests.support.measured import gauges, hidden, record
 from tests.support.paths import CONFIG
+
+
+def of(path: Path, name: str = "tripod-07") -> FleetRecording:
+    """The recording among those of a fleet, where its machine has this name."""
+    (recording,) = find_recordings([path]).recordings
+    return replace(recording, machine=name)
 
 
 @pytest.fixture
@@ -43,7 +53,7 @@ def test_compare_with_a_model_fits_its_effects_on_the_recording(recording: Path,
     model = compd.add_effect(None, "link_expansion", aligned)
     model.write(tmp_path / "model.yaml")
     wanted = examination("compare", [machine], [tmp_path / "model.yaml"])
-    result = pickle.loads(pickle.dumps(wanted))(recording)
+    result = pickle.loads(pickle.dumps(wanted))(of(recording))
     comparison = compd.compare(aligned, model)
     assert result.rms_before_um == pytest.approx(comparison.rms_um)
     assert result.rms_after_um == pytest.approx(comparison.rms_um, rel=1e-3)
@@ -57,7 +67,7 @@ def test_compare_with_a_model_fits_its_effects_on_the_recording(recording: Path,
 
 
 def test_diagnose_finds_the_effect(recording: Path, tmp_path: Path) -> None:
-    result = examination("diagnose", [tmp_path / "tripod-07.yaml"])(recording)
+    result = examination("diagnose", [tmp_path / "tripod-07.yaml"])(of(recording))
     assert result.machine == "tripod-07"
     assert result.verdict == "identified"
     assert result.effects == ("link_expansion",)
@@ -67,11 +77,11 @@ def test_diagnose_finds_the_effect(recording: Path, tmp_path: Path) -> None:
 
 def test_a_machine_that_nobody_knows_is_a_problem(recording: Path) -> None:
     with pytest.raises(CompdError, match="no configuration of this machine comes with compd"):
-        examination("compare")(recording)
+        examination("compare")(of(recording))
 
 
 def test_a_machine_without_a_model_has_no_effects(recording: Path, tmp_path: Path) -> None:
-    result = examination("compare", [tmp_path / "tripod-07.yaml"])(recording)
+    result = examination("compare", [tmp_path / "tripod-07.yaml"])(of(recording))
     assert (result.model, result.estimates, result.verdict) == ("", (), ABOVE_FLOOR)
 
 
@@ -80,3 +90,49 @@ def test_two_files_for_one_machine_are_refused(recording: Path, tmp_path: Path) 
     again.write_bytes((tmp_path / "tripod-07.yaml").read_bytes())
     with pytest.raises(CompdError, match="is the second of its kind for machine tripod-07"):
         examination("compare", [tmp_path / "tripod-07.yaml", again])
+
+
+def test_machines_that_are_built_alike_have_a_model_each(recording: Path, tmp_path: Path) -> None:
+    machine = tmp_path / "tripod-07.yaml"
+    (tmp_path / "models").mkdir()
+    for name in ("m1", "m2"):
+        compd.add_effect(None, "link_expansion", compd.open_recording(recording, machine)).write(
+            tmp_path / "models" / f"{name}.yaml"
+        )
+    wanted = examination("compare", [machine], [f"{tmp_path}/models/{{machine}}.yaml"])
+    results = [wanted(of(recording, name)) for name in ("m1", "m2", "m3")]
+    assert [Path(result.model).name for result in results] == ["m1.yaml", "m2.yaml", ""]
+    with pytest.raises(CompdError, match="is the second of its kind for machine tripod-07"):
+        examination("compare", [machine], [f"{tmp_path}/models/*.yaml"])
+
+
+def test_what_a_result_follows_from_changes_its_basis(recording: Path, tmp_path: Path) -> None:
+    machine, effects = tmp_path / "tripod-07.yaml", tmp_path / "effects.yaml"
+    effects.write_text("[]")
+
+    def basis(**changes: object) -> str:
+        return examination(**{"command": "diagnose", "machines": [machine], "effects": [effects], **changes}).basis(
+            of(recording)
+        )  # type: ignore[arg-type]
+
+    seen = {basis(), basis(), basis(command="compare"), basis(effects=[])}
+    assert len(seen) == 3
+    for file in (machine, effects, recording, recording.with_suffix(".yaml")):
+        with file.open("a") as opened:
+            opened.write("\n")
+        seen.add(basis())
+    assert len(seen) == 7
+    recording.unlink()
+    assert examination("diagnose").basis(FleetRecording(recording, "tripod-07")) == ""
+
+
+def test_a_long_recording_is_examined_block_by_block(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = examination("compare", [tmp_path / "tripod-07.yaml"])
+    in_memory = wanted(of(recording))
+    monkeypatch.setattr(module, "is_long", lambda path: True)
+    by_blocks = wanted(of(recording))
+    assert by_blocks.rms_before_um == pytest.approx(in_memory.rms_before_um, rel=1e-6)
+    assert by_blocks.rows == in_memory.rows
+    assert examination("diagnose", [tmp_path / "tripod-07.yaml"])(of(recording)).effects == ("link_expansion",)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from compd.errors import CompdError
@@ -20,7 +22,7 @@ def add(directory: Path, name: str, tables: tuple[str, ...] = (".csv",), sidecar
 
 
 def names(*places: Path | str) -> list[str]:
-    return [path.name for path in find_recordings(places).paths]
+    return [recording.path.name for recording in find_recordings(places).recordings]
 
 
 def test_a_directory_has_the_recordings_at_any_depth(tmp_path: Path) -> None:
@@ -29,14 +31,23 @@ def test_a_directory_has_the_recordings_at_any_depth(tmp_path: Path) -> None:
     assert names(tmp_path) == ["a.parquet", "b.csv"]
 
 
-def test_what_has_no_sidecar_and_what_is_no_sidecar_are_no_recordings(tmp_path: Path) -> None:
+def test_files_beside_recordings_are_none(tmp_path: Path) -> None:
     add(tmp_path, "run")
     (tmp_path / "run.plate.csv").touch()
     (tmp_path / "notes.yaml").write_text("machine: tripod-cmm\ngeometry: {}\n")
     (tmp_path / "broken.yaml").write_text("a: [")
     found = find_recordings([tmp_path])
-    assert [path.name for path in found.paths] == ["run.csv"]
+    assert [recording.path.name for recording in found.recordings] == ["run.csv"]
     assert found.remarks == ()
+
+
+def test_a_table_without_its_sidecar_is_a_recording(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("time_s,scale_1_mm\n0,0\n")
+    pd.DataFrame({"time_s": [0.0]}).to_parquet(tmp_path / "other.parquet")
+    pd.DataFrame({"ball": [1]}).to_parquet(tmp_path / "plate.parquet")
+    assert names(tmp_path) == ["other.parquet", "run.csv"]
+    (tmp_path / "named.csv").touch()
+    assert names(tmp_path / "named.csv") == ["named.csv"]
 
 
 def test_a_sidecar_without_a_table_is_said(tmp_path: Path) -> None:
@@ -57,14 +68,28 @@ def test_a_pattern(tmp_path: Path) -> None:
         add(tmp_path / name, "run")
         add(tmp_path / name, "other")
     found = find_recordings([f"{tmp_path}/may-*/run.*"])
-    assert [path.parent.name for path in found.paths] == ["may-1", "may-2"]
+    assert [recording.path.parent.name for recording in found.recordings] == ["may-1", "may-2"]
     assert len(names(f"{tmp_path}/may-*")) == 4
 
 
 def test_paths_are_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     add(tmp_path / "data", "run")
     monkeypatch.chdir(tmp_path)
-    assert find_recordings(["data"]).paths == (tmp_path / "data" / "run.csv",)
+    assert [recording.path for recording in find_recordings(["data"]).recordings] == [tmp_path / "data" / "run.csv"]
+
+
+def test_when_it_began_is_in_the_sidecar_or_in_the_name(tmp_path: Path) -> None:
+    add(tmp_path / "m1" / "2026-03-01", "run", sidecar=f"{SIDECAR}provenance: {{started_at: 2026-05-04T10:00+02:00}}\n")
+    add(tmp_path / "m1" / "2026-03-02", "run")
+    add(tmp_path / "m1", "run_20260405T0815")
+    add(tmp_path / "m1", "run_1234567890")
+    found = find_recordings([tmp_path]).recordings
+    assert [recording.started_at for recording in found] == [
+        datetime(2026, 5, 4, 8, tzinfo=UTC),
+        datetime(2026, 3, 2, tzinfo=UTC),
+        None,
+        datetime(2026, 4, 5, 8, 15, tzinfo=UTC),
+    ]
 
 
 @pytest.mark.parametrize(("place", "what"), [("nowhere", "nothing of this name"), (".", "has no recording")])
