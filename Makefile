@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
+# Where it is set, as in many containers, every start of Python takes twice as long.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help docs demo demo-linuxcnc live test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
@@ -35,6 +37,8 @@ $(STAMP): pyproject.toml
 	  { echo "Python cannot make a virtual environment; on Debian and Ubuntu: apt-get install python3-venv"; exit 1; }
 	@echo "Installing compd and what it needs into $(VENV) (a minute or two, once) ..."
 	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@echo "Compiling the kernels for this processor (a minute, once) ..."
+	@$(BIN)/python -c 'import compd.live.run'
 	@touch $@
 
 demo: $(STAMP)
@@ -62,7 +66,7 @@ DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py
 
 # System tests have both processors for themselves: they run the daemon in real time.
 test: $(STAMP)
-	$(BIN)/pytest -n 2 --ignore=tests/system
+	$(BIN)/pytest -n 2 --dist worksteal --ignore=tests/system
 	$(BIN)/pytest -rs tests/system
 
 long: $(STAMP)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -57,7 +58,8 @@ def demo(
         f"[bold]{configuration.machine}[/]: {len(configuration.gauges)} gauges on {len(configuration.lines)} lines, "
         f"each speaking its own protocol on a real pty or TCP port; weather {SPEEDUP:g} times faster than real."
     )
-    console.print("Starting the simulated machine and the daemon (the very first start compiles the kernels) ...")
+    _load_daemon()
+    console.print("Starting the simulated machine and the daemon ...")
     with LiveText(console=console, refresh_per_second=8) as text:
 
         def show(session: DemoSession, elapsed_s: float, setpoint: dict[str, Any]) -> None:
@@ -68,6 +70,11 @@ def demo(
     console.print(verdict(session))
     write_demo_page(page, session)
     console.print(f"The same as pictures: {page}")
+
+
+def _load_daemon() -> None:
+    """The first start on a machine compiles the kernels: here it is said, and the daemon's own start does not wait."""
+    import_module("compd.live.run")
 
 
 def _show_live(config: Path | None, seed: int, port: int) -> None:
@@ -81,8 +88,9 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
     token = new_token()
     typer.echo(
         f"{configuration.machine}, simulated; its weather {SPEEDUP:g} times faster than real. "
-        "Starting it and the daemon (the very first start compiles the kernels) ..."
+        "Starting it and the daemon ..."
     )
+    _load_daemon()
     tokens = [Token("this computer", "operate", hashed(token))]
 
     def serve(unix_socket: str) -> None:
@@ -117,6 +125,7 @@ def _show_linuxcnc(seed: int, program: Path | None, effect: str) -> None:
         f"LinuxCNC, headless, on a simulated hexapod with gauges on real ptys; weather {SPEEDUP:g} times faster than "
         f"real. {effect.partition('=')[0]} is hidden in the machine. About ten minutes."
     )
+    _load_daemon()
     demo = run_linuxcnc_demo(
         load(shipped_configuration("hexapod.yaml")),
         page.parent,

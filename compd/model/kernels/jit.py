@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -85,9 +86,34 @@ def _kept() -> Iterator[None]:
             _config.CACHE_DIR = before
 
 
+@contextmanager
+def _said(function: Callable[..., Any]) -> Iterator[None]:
+    """Within, a line on the terminal that waits says that a kernel is compiled; none where the kernel is kept."""
+    if not sys.stderr.isatty() or _is_kept(function):
+        yield
+        return
+    how_often = "once" if CACHE_DIRECTORY else "at every start, since no directory can be written (NUMBA_CACHE_DIR)"
+    text = f"compd compiles its kernels for this processor, {how_often}; a minute or two: {function.__name__}"
+    # overwritten by the next, and gone at the end
+    print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
+    try:
+        yield
+    finally:
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
+
+
+def _is_kept(function: Callable[..., Any]) -> bool:
+    """Whether numba has an index of the compiled code, which it names by module, function and line."""
+    name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-{function.__code__.co_firstlineno}"
+    return bool(CACHE_DIRECTORY) and any(Path(CACHE_DIRECTORY).glob(f"*/{name}.*.nbi"))
+
+
 def helper(function: FunctionT) -> FunctionT:
-    """Compile `function` for use inside kernels. Division by zero gives inf or nan, as in C."""
-    return cast(FunctionT, njit(error_model="numpy")(function))  # kept inside the kernels that use it
+    """Compile `function` for use inside kernels, which keep it. Division by zero gives inf or nan, as in C.
+
+    It cannot be called from Python: that would take a wrapper for each, and as long to compile as a small kernel.
+    """
+    return cast(FunctionT, njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function))
 
 
 def kernel(arguments: list[Any], layout: str) -> Callable[[Callable[..., None]], Kernel]:
@@ -99,7 +125,7 @@ def kernel(arguments: list[Any], layout: str) -> Callable[[Callable[..., None]],
 
     def compile_(function: Callable[..., None]) -> Kernel:
         function = getattr(function, "py_func", function)
-        with _kept():
+        with _said(function), _kept():
             compiled = _guvectorize([tuple(arguments)], layout, nopython=True, cache=bool(CACHE_DIRECTORY))(function)
         return cast(Kernel, compiled.ufunc)  # the plain NumPy ufunc: numba's wrapper costs 0.4 us a call
 
@@ -114,7 +140,7 @@ def loop(arguments: list[Any]) -> Callable[[FunctionT], FunctionT]:
     """
 
     def compile_(function: FunctionT) -> FunctionT:
-        with _kept():
+        with _said(function), _kept():
             compiled = njit([tuple(arguments)], error_model="numpy", cache=bool(CACHE_DIRECTORY))(function)
         return cast(FunctionT, compiled)
 

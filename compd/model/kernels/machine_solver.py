@@ -1,4 +1,8 @@
-"""Frame, pose and contact of a machine whose parts are C structures; see `solver_structures`."""
+"""Frame, pose and contact of a machine whose parts are C structures; see `solver_structures`.
+
+numba compiles a solver anew for each combination of its arguments' types. An array of a structure is of another type
+than one outside; a slice of either, `[:]`, is of the same.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +24,8 @@ def solve_frame(
     n = model.links
     solve_octahedron(
         distances_mm,
-        plate_points_M_mm,
-        guess_M_mm,
+        plate_points_M_mm[:],
+        guess_M_mm[:],
         model.joint_offsets_B_mm[:n],
         model.support_of_joint[:n],
         model.zero_origin_M_mm,
@@ -55,8 +59,8 @@ def forward_pose(
         machine.platform_joints_P_mm[:n],
         machine.revolute_axes_P[:k],
         length_mm[:n],
-        guess_origin_M_mm,
-        guess_rotation_M_P,
+        guess_origin_M_mm[:],
+        guess_rotation_M_P[:],
         pose.origin_M_mm,
         pose.rotation_M_P,
         pose.link_length_mm[:n],
@@ -81,9 +85,9 @@ def inverse_pose(
         base_joints_M_mm[:n],
         machine.platform_joints_P_mm[:n],
         machine.revolute_axes_P[:k],
-        tip_M_mm,
-        tip_P_mm,
-        attitude_M_P,
+        tip_M_mm[:],
+        tip_P_mm[:],
+        attitude_M_P[:],
         pose.origin_M_mm,
         pose.rotation_M_P,
         pose.link_length_mm[:n],

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import pty
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -86,3 +88,32 @@ def test_processes_that_start_together_do_not_spoil_each_others_kernels(tmp_path
     afterwards = [process.communicate()[0].strip() for process in together]
     afterwards += [start(code).communicate()[0].strip() for code in (ours, other)]
     assert afterwards == ["3.0"] * 6
+
+
+def _on_a_terminal(cache: Path) -> str:
+    """What a process that uses a kernel prints on the terminal of its standard error."""
+    ours, theirs = pty.openpty()
+    code = "import numpy as np; from compd.model.kernels.rotation import compose; compose(np.eye(3), np.eye(3))"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    subprocess.run([sys.executable, "-c", code], env=environment, stderr=theirs, check=True)
+    os.close(theirs)
+    said = b""
+    with suppress(OSError):  # the terminal's end
+        while part := os.read(ours, 4096):
+            said += part
+    os.close(ours)
+    return said.decode()
+
+
+def test_a_terminal_that_waits_is_told_once(tmp_path: Path) -> None:
+    said = _on_a_terminal(tmp_path)
+    assert "compd compiles its kernels for this processor, once; a minute or two: compose\r\033[K" in said
+    assert said.endswith("\r\033[K")
+    assert "\n" not in said
+    assert _on_a_terminal(tmp_path) == ""
+
+
+def test_a_terminal_is_told_that_nothing_can_be_kept(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    assert "at every start, since no directory can be written (NUMBA_CACHE_DIR)" in _on_a_terminal(blocked)

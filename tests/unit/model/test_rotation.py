@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import njit
 from scipy.spatial.transform import Rotation
 
-from compd.model.kernels.linear import inverse_norm, is_finite, lu_factor, lu_solve, max_abs
-from compd.model.kernels.rotation import (
-    compose,
-    orthonormalise,
-    rotate_in_place,
-    rotation_matrix,
-    rotation_vector,
-    to_inner,
-    to_outer,
-)
+from compd.model.kernels import linear, rotation
+from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector, to_inner, to_outer
+
+
+def _from_python(helper: Any) -> Any:
+    """A helper compiled once more, so that Python can call it."""
+    return njit(error_model="numpy")(helper.py_func)
+
+
+inverse_norm, is_finite, max_abs = map(_from_python, (linear.inverse_norm, linear.is_finite, linear.max_abs))
+lu_factor, lu_solve = map(_from_python, (linear.lu_factor, linear.lu_solve))
+orthonormalise, rotate_in_place = map(_from_python, (rotation.orthonormalise, rotation.rotate_in_place))
 
 ANGLES = st.tuples(*[st.floats(-6.0, 6.0)] * 3)
 
