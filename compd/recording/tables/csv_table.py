@@ -66,8 +66,8 @@ def parse_table(
     if not _is_text(content, problems):
         return None
     header, _, body = content.removeprefix(b"\xef\xbb\xbf").partition(b"\n")
-    names = [name.strip() for name in header.decode("ascii", "replace").split(",")]
-    plain = is_plain(body) and b'"' not in header and header.isascii() and is_header(names)
+    names = [_without_quotes(name.strip()) for name in header.decode("ascii", "replace").split(",")]
+    plain = is_plain(body) and header.isascii() and not any('"' in name for name in names) and is_header(names)
     if plain and not labels and _names_are_valid(names):
         lines = body.decode("ascii").splitlines()
         if all(line.count(",") == len(names) - 1 or not line for line in lines):
@@ -76,6 +76,11 @@ def parse_table(
                 return table
     csv_cells = read_cells(content, problems, is_header, first_row)
     return None if csv_cells is None else _read_any(path, csv_cells, problems, id_columns, labels)
+
+
+def _without_quotes(name: str) -> str:
+    """A name as it is in quotes, as many programs write the header; others as they are."""
+    return name[1:-1].strip() if len(name) > 1 and name[0] == name[-1] == '"' else name
 
 
 def is_plain(body: bytes) -> bool:

@@ -44,3 +44,13 @@ def test_arrow_and_python_read_the_same(lines: list[str], line_end: str, last: b
     assert by_arrow.columns.keys() == by_python.columns.keys()
     for name, values in by_python.columns.items():
         assert by_arrow.columns[name].tobytes() == values.tobytes()
+
+
+def test_names_in_quotes_make_no_table_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(csv_table, "read_cells", None)  # the way of all that is not plain
+    header = ", ".join(f'"{name}"' for name in NAMES)
+    table = parse_table(Path("run.csv"), f"{header}\n1,2,3\n".encode(), ProblemList(Path("run.csv")), lambda _: True)
+    assert table is not None
+    assert {name: values.tolist() for name, values in table.columns.items()} == dict(
+        zip(NAMES, [[1], [2], [3]], strict=True)
+    )
