@@ -112,7 +112,7 @@ def _is_kept(function: Callable[..., Any]) -> bool:
 def helper(function: FunctionT) -> FunctionT:
     """Compile `function` for use inside kernels, which keep it. Division by zero gives inf or nan, as in C.
 
-    It cannot be called from Python: that would take a wrapper for each, and as long to compile as a small kernel.
+    It cannot be called from Python: a wrapper for each would be compiled, too.
     """
     return cast(FunctionT, _njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function))
 
