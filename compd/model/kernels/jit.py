@@ -19,8 +19,9 @@ from compd import travel_direction
 Kernel: TypeAlias = Callable[..., Any]
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
-# numba has no types
+# numba's types are not complete
 _guvectorize: Any = guvectorize
+_njit: Any = njit
 _config: Any = numba_config
 
 # The types of a kernel's arguments: () and (n) are both one-dimensional inside, as gufuncs want outputs.
@@ -92,9 +93,9 @@ def _said(function: Callable[..., Any]) -> Iterator[None]:
     if not sys.stderr.isatty() or _is_kept(function):
         yield
         return
-    how_often = "once" if CACHE_DIRECTORY else "at every start, since no directory can be written (NUMBA_CACHE_DIR)"
-    text = f"compd compiles its kernels for this processor, {how_often}; a minute or two: {function.__name__}"
-    # overwritten by the next, and gone at the end
+    how_often = "once, 1 to 2 min" if CACHE_DIRECTORY else "at every start, as NUMBA_CACHE_DIR cannot be written"
+    text = f"compd compiles kernels ({how_often}): {function.__name__}"
+    # overwritten by the next, and gone at the end; a line of 80 characters, since one that wraps would stay
     print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
     try:
         yield
@@ -111,9 +112,9 @@ def _is_kept(function: Callable[..., Any]) -> bool:
 def helper(function: FunctionT) -> FunctionT:
     """Compile `function` for use inside kernels, which keep it. Division by zero gives inf or nan, as in C.
 
-    It cannot be called from Python: that would take a wrapper for each, and as long to compile as a small kernel.
+    It cannot be called from Python: a wrapper for each would be compiled, too.
     """
-    return cast(FunctionT, njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function))
+    return cast(FunctionT, _njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function))
 
 
 def kernel(arguments: list[Any], layout: str) -> Callable[[Callable[..., None]], Kernel]:
