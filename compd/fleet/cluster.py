@@ -111,6 +111,7 @@ def _local(processes: int) -> Iterator[Client]:
 @contextmanager
 def _connected(scheduler: str) -> Iterator[Client]:
     from distributed import Client
+    from distributed.utils import silence_logging_cmgr
 
     try:
         client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
@@ -124,7 +125,8 @@ def _connected(scheduler: str) -> Iterator[Client]:
                 next_step="start one with `dask scheduler`, or leave it out: then this computer does the work",
             )
         ) from error
-    with client:
+    # that a scheduler is lost is told as the outcome of an item, too
+    with silence_logging_cmgr(logging.CRITICAL), client:
         yield client
 
 

@@ -20,9 +20,17 @@ PATIENCE_S = 60.0
 class DaskCluster:
     """A running scheduler, at `address`, with its workers."""
 
-    def __init__(self, address: str, workers: list[subprocess.Popen[bytes]]) -> None:
+    def __init__(
+        self, address: str, scheduler: subprocess.Popen[bytes], workers: list[subprocess.Popen[bytes]]
+    ) -> None:
         self.address = address
+        self.scheduler = scheduler
         self.workers = workers
+
+    def kill_scheduler(self) -> None:
+        """End the scheduler at once; workers end by themselves."""
+        self.scheduler.kill()
+        self.scheduler.wait()
 
     def kill_worker(self) -> None:
         """End the first worker as a lack of memory would; nothing starts it again."""
@@ -49,7 +57,7 @@ def dask_cluster(directory: Path, workers: int) -> Iterator[DaskCluster]:
             running.callback(process.send_signal, signal.SIGTERM)
             return process
 
-        start("scheduler", "--host", "127.0.0.1", "--port", "0")
+        scheduler = start("scheduler", "--host", "127.0.0.1", "--port", "0")
         until("a scheduler", lambda: file.exists() and file.read_text().endswith("}"), PATIENCE_S)
         started = [start("worker", "--nthreads", "1", "--no-nanny") for _ in range(workers)]
-        yield DaskCluster(json.loads(file.read_text())["address"], started)
+        yield DaskCluster(json.loads(file.read_text())["address"], scheduler, started)

@@ -86,6 +86,19 @@ def test_a_worker_that_is_killed_in_the_middle_costs_no_recording(fleet: Path, c
     assert [Path(result.recording).name for result in run.results if result.problem] == ["run3.csv"]
 
 
+def test_a_scheduler_that_ends_leaves_a_result_for_every_recording(
+    fleet: Path, cluster: DaskCluster, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def progress(result: RecordingResult) -> None:
+        cluster.kill_scheduler()
+
+    run = examine_fleet(examination("compare"), find_recordings([fleet]).recordings, cluster.address, progress)
+    lost = [result for result in run.results if "the scheduler has ended" in result.problem]
+    assert len(run.results) == RECORDINGS
+    assert lost
+    assert "Traceback" not in capfd.readouterr().err
+
+
 def test_ctrl_c_leaves_a_result_for_every_recording(fleet: Path, cluster: DaskCluster) -> None:
     def interrupt(result: RecordingResult) -> None:
         raise KeyboardInterrupt
