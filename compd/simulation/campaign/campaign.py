@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -149,9 +150,10 @@ class Campaign:
         self._visit += 1
         self._add_row(item, None)
         for end in (start + out, start + out / 2):
-            move = Move(self._world.scale_mm, end, item.speed_mm_per_s)
+            speed_mm_per_s = steady_speed_mm_per_s(self._world.scale_mm, end, item.speed_mm_per_s)
+            move = Move(self._world.scale_mm, end, speed_mm_per_s)
             self._direction = np.sign(end - self._world.scale_mm)
-            steady_s = move.duration_s - 2 * item.speed_mm_per_s / ACCELERATION_MM_PER_S2
+            steady_s = move.duration_s - 2 * speed_mm_per_s / ACCELERATION_MM_PER_S2
             every_s = min(PASS_ROW_EVERY_S, steady_s / PASS_ROWS)
             times = move.duration_s / 2 + every_s * (np.arange(PASS_ROWS) - (PASS_ROWS - 1) / 2)
             before_s = 0.0
@@ -164,3 +166,11 @@ class Campaign:
 
     def _add_row(self, item: CampaignItem, point: int | None) -> None:
         self._log.add(item.session, self._visit, point, self._direction)
+
+
+def steady_speed_mm_per_s(start_mm: FloatArray, end_mm: FloatArray, speed_mm_per_s: float) -> float:
+    """This speed; where the way is too short to get up to it, one that is held for half of the way."""
+    way_mm = float(np.abs(end_mm - start_mm).max())
+    if speed_mm_per_s**2 < ACCELERATION_MM_PER_S2 * way_mm:
+        return speed_mm_per_s
+    return math.sqrt(ACCELERATION_MM_PER_S2 * way_mm / 2)

@@ -69,9 +69,11 @@ class CauseSizer:
         others = [name for name in possible_causes(self.mechanism) if name not in besides]
         causes = []
         for name in shuffle_causes(others, self._seed, "weak")[:WEAK_CAUSES]:
-            strength = FIRST_SHARE * CAUSES[name].max_strength
+            largest = CAUSES[name].max_strength
+            strength = FIRST_SHARE * largest
             floors = self.error_in_floors(self._build(name, strength))
-            causes.append(self._build(name, strength * WEAK_FLOORS / floors if floors > 0 else strength))
+            # one that does next to nothing here is not made stronger than it can be anywhere
+            causes.append(self._build(name, min(strength * WEAK_FLOORS / floors, largest) if floors > 0 else strength))
         return causes
 
     def _build(self, name: str, strength: float) -> Cause:

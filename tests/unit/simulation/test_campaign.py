@@ -17,7 +17,7 @@ from compd.configuration import load
 from compd.errors import CompdError
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
-from compd.simulation.campaign.campaign import Campaign
+from compd.simulation.campaign.campaign import Campaign, steady_speed_mm_per_s
 from compd.simulation.campaign.campaign_plan import GAP_S, SESSIONS, draw_campaign_plan
 from compd.simulation.campaign.row_log import LoggedRows
 from compd.simulation.campaign.simulated_recording import SimulatedRecording, simulate_recording
@@ -26,6 +26,7 @@ from compd.simulation.causes.catalogue import CAUSES, build_cause
 from compd.simulation.causes.hidden_cause import LEAST_FLOORS, MOST_FLOORS, HiddenCause, draw_hidden, parse_hidden
 from compd.simulation.truth.instruments import BALLS, TRACKER, TRACKER_SIGMA_UM, ball_plate_mm
 from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, Move
 from compd.simulation.truth.strengths import FULLY_MEASURED, FULLY_MEASURED_WITHOUT_NOISE, NOTHING
 from tests.support.paths import SHARED
 from tests.support.simulated import HEXAPOD, TRIPOD, hexapod, tripod, wiring
@@ -131,6 +132,29 @@ def test_weak_disturbances_are_two_and_weak(recorded: SimulatedRecording) -> Non
     for cause in recorded.weak:
         again = build_cause(cause.id, cause.strength, sizer.mechanism, 3)
         assert sizer.error_in_floors(again) == pytest.approx(0.2, rel=0.1)
+
+
+def test_a_weak_disturbance_is_not_stronger_than_it_can_be() -> None:
+    """The joints' run-out across the links does next to nothing to a hexapod: no strength would be enough."""
+    weak = CauseSizer(hexapod(), wiring(HEXAPOD), 6).weak_disturbances(["scale_expansion"])
+    assert "joint_runout" in [cause.id for cause in weak]
+    assert all(abs(cause.strength) <= CAUSES[cause.id].max_strength for cause in weak)
+
+
+def test_a_way_too_short_for_the_speed_is_passed_slowly() -> None:
+    start_mm, end_mm = np.zeros(3), np.array([1.0, -4.0, 0.5])
+    assert steady_speed_mm_per_s(start_mm, end_mm, 20.0) == 20.0
+    speed_mm_per_s = steady_speed_mm_per_s(start_mm, end_mm, 50.0)
+    move = Move(start_mm, end_mm, speed_mm_per_s)
+    steady_s = move.duration_s - 2 * speed_mm_per_s / ACCELERATION_MM_PER_S2
+    assert steady_s * speed_mm_per_s == pytest.approx(2.0), "half of the way"
+
+
+def test_every_campaign_of_a_machine_has_rows_in_the_order_of_time(machine: Mechanism) -> None:
+    """On the third day of machine 15 a pass goes to a place that is near."""
+    plan = draw_campaign_plan(machine, 15, 2)
+    rows = Campaign(tripod(), wiring(), plan, 15, NOTHING, []).run()
+    assert (np.diff(rows.columns["time_s"]) > 0).all()
 
 
 def test_what_is_hidden_follows_from_its_number(machine: Mechanism) -> None:
