@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from compd.errors import CompdError, Problem
 from compd.files.atomic_files import write_files
 from compd.files.output_file import check_replaceable
-from compd.fleet.recording_result import FleetEstimate, RecordingResult
+from compd.fleet.recording_result import Command, FleetEstimate, RecordingResult
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -69,14 +69,28 @@ BASIS = TableColumn("basis", "string", "hash of what the result follows from: fi
 COLUMNS = (*OF_RECORDING, *OF_EFFECT, PROBLEM, BASIS)
 
 
-def check_table_path(path: Path, overwrite: bool = False) -> None:
-    """Raise CompdError where the table cannot be written, before the long work; an earlier table is replaced."""
+def check_table_path(path: Path, command: Command, overwrite: bool = False) -> None:
+    """Raise CompdError where the table cannot be written, before the long work.
+
+    An earlier table of this command is continued; one of the other command, which may have taken hours, is not replaced
+    unless `overwrite`.
+    """
     if not path.parent.is_dir():
         raise CompdError(
             Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
         )
     if not is_table(path):
         check_replaceable(path, (), "", overwrite)
+        return
+    if overwrite or not (other := {result.command for result in earlier_results(path)} - {command}):
+        return
+    raise CompdError(
+        Problem(
+            where=str(path),
+            what=f"has results of `compd fleet {other.pop()}`, which would be lost",
+            next_step="give this table a name of its own (--out), or replace that one (--overwrite)",
+        )
+    )
 
 
 def is_table(path: Path) -> bool:

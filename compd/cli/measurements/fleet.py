@@ -194,7 +194,7 @@ def _examine(
     from compd.fleet.recordings import find_recordings
     from compd.fleet.table import check_table_path, earlier_results, write_table
 
-    check_table_path(out, overwrite)
+    check_table_path(out, wanted.command, overwrite)
     if html is not None:
         from compd.report.page import check_page_path
 

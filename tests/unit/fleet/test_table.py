@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from compd.errors import CompdError
+from compd.fleet.recording_result import Command
 from compd.fleet.table import COLUMNS, check_table_path, is_table, read_table, write_table
 from tests.support.fleets import expansion, machine, result
 from tests.support.paths import ROOT
@@ -55,15 +56,20 @@ def test_duckdb_reads_it(path: Path) -> None:
     assert empty == [(1,)]
 
 
-def test_an_earlier_table_is_replaced_and_nothing_else(path: Path, tmp_path: Path) -> None:
-    check_table_path(path)
+def test_an_earlier_table_of_the_same_command_is_replaced_and_nothing_else(path: Path, tmp_path: Path) -> None:
+    (command,) = {result.command for result in read_table(path)}
+    check_table_path(path, command)
+    other_command: Command = "diagnose" if command == "compare" else "compare"
+    with pytest.raises(CompdError, match=f"has results of `compd fleet {command}`, which would be lost"):
+        check_table_path(path, other_command)
+    check_table_path(path, other_command, overwrite=True)
     other = tmp_path / "run.parquet"
     pd.DataFrame({"time_s": [0.0]}).to_parquet(other)
     assert not is_table(other)
     with pytest.raises(CompdError, match="is there already"):
-        check_table_path(other)
+        check_table_path(other, command)
     with pytest.raises(CompdError, match="does not exist"):
-        check_table_path(tmp_path / "nowhere" / "fleet.parquet")
+        check_table_path(tmp_path / "nowhere" / "fleet.parquet", command)
 
 
 def test_the_guide_has_every_column() -> None:
