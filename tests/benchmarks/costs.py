@@ -69,15 +69,15 @@ def long_recording_costs(rows: int) -> list[Cost]:
     return [
         Cost(
             f"`compd compare` of {rows:,} rows with {len(bench_stream.EFFECTS)} effects, processor time",
-            f"{whole.processor_s / rows * 1e6:.1f} us a row",
-            f"pandas reads the file: {by_pandas.processor_s / rows * 1e6:.2f} us",
-            f"{whole.processor_s / by_pandas.processor_s:.0f}",
+            f"{whole.row_us:.1f} us a row",
+            f"pandas reads the file: {by_pandas.row_us:.2f} us",
+            f"{whole.row_us / by_pandas.row_us:.1f}",
         ),
         Cost(
             "memory for that",
-            f"{whole.largest_MB:.0f} MB",
-            f"pandas: {by_pandas.largest_MB:.0f} MB",
-            f"{whole.largest_MB / by_pandas.largest_MB:.2f}",
+            f"{whole.cost.largest_MB:.0f} MB",
+            f"pandas, {by_pandas.rows:,} rows: {by_pandas.cost.largest_MB:.0f} MB",
+            f"{whole.cost.largest_MB / by_pandas.cost.largest_MB:.2f}",
         ),
     ]
 
