@@ -7,6 +7,7 @@ row of values is row 2 here, too.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ from compd.recording.tables.problem_list import ProblemList, rows_text, values_t
 from compd.recording.tables.table import FIRST_ROW, Table, TableBlock, id_codes, id_labels
 
 SUFFIX = ".parquet"
+# What pandas writes of the labels of rows that were selected or sorted; the order of the rows says as much.
+_ROW_LABELS = re.compile(r"__index_level_\d+__")
 # Of a row group as large as the file, so much is read ahead of each column.
 _READ_AHEAD_BYTES = 1 << 18
 
@@ -60,7 +63,9 @@ class ParquetTable:
             self._file = parquet.ParquetFile(
                 path, pre_buffer=False, buffer_size=_READ_AHEAD_BYTES, page_checksum_verification=True
             )
-            self._names: list[str] = self._file.schema_arrow.names
+            fields = [field for field in self._file.schema_arrow if not _ROW_LABELS.fullmatch(field.name)]
+            self._schema = arrow.schema(fields)
+            self._names: list[str] = self._schema.names
         except OSError as error:
             raise RecordingError(_unreadable(path, error)) from error
         except (ValueError, arrow.ArrowException) as error:  # of a name that is no text, too
@@ -77,7 +82,7 @@ class ParquetTable:
     def whole(self, problems: ProblemList) -> Table:
         """All rows; what is wrong goes to `problems`. Raises RecordingError for a damaged file."""
         rows = max(self.row_count, 1)
-        empty = self._file.schema_arrow.empty_table()
+        empty = self._schema.empty_table()
         labels = self._labels()
         return self._block(next(self._batches(rows), empty), FIRST_ROW, labels, problems)
 
@@ -98,7 +103,7 @@ class ParquetTable:
 
     def _batches(self, rows: int, names: Sequence[str] | None = None) -> Iterator[Any]:
         try:
-            yield from self._file.iter_batches(rows, columns=names, use_threads=False)
+            yield from self._file.iter_batches(rows, columns=names or self._names, use_threads=False)
         except MemoryError as error:
             raise RecordingError(_too_large(self._path)) from error
         except self._faults as error:
@@ -108,7 +113,7 @@ class ParquetTable:
         """Names that come twice, and columns of another kind than numbers."""
         problems = []
         for name in self._names:
-            kind = self._file.schema_arrow.types[self._names.index(name)]
+            kind = self._schema.types[self._names.index(name)]
             where = f"{self._path}: column {name}"
             if self._names.count(name) > 1:
                 problems.append(
@@ -137,7 +142,7 @@ class ParquetTable:
 
     def _labels(self) -> Mapping[str, tuple[str, ...]]:
         """Column of ids -> its different texts in the whole file; only of columns that hold more than numbers."""
-        kinds = zip(self._names, self._file.schema_arrow.types, strict=True)
+        kinds = zip(self._names, self._schema.types, strict=True)
         names = [name for name, kind in kinds if self._is_text(kind)]
         texts: dict[str, set[str]] = {name: set() for name in names}
         for batch in self._batches(1 << 16, names) if names else ():

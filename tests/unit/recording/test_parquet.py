@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -15,6 +16,7 @@ from compd.errors import RecordingError
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
 from compd.recording.sidecar import sidecar_contents
+from compd.recording.tables.parquet_table import ParquetTable
 from compd.recording.writer import write_recording
 from tests.support.recordings import csv_text, write_recording_files
 
@@ -66,6 +68,19 @@ def test_null_nan_other_numbers_and_empty_rows_are_what_they_are_in_a_csv_file(t
     assert recording.row.tolist() == [2, 3, 4, *range(6, 23)]
     assert recording.visit is not None
     assert recording.visit.tolist() == list(range(1, 21))
+
+
+def test_rows_that_pandas_selected_are_read_without_their_labels(tmp_path: Path) -> None:
+    csv = write_recording_files(tmp_path, csv_text())
+    path = as_parquet(csv)
+    rows = pd.read_parquet(path)
+    rows[rows["visit"] != 2].to_parquet(path)
+    assert "__index_level_0__" in pq.read_schema(path).names
+    selected = read_recording(path)
+    assert list(selected.columns) == list(read_recording(csv).columns)
+    assert 2 not in selected.columns["visit"]
+    blocks = pd.concat([pd.DataFrame(block.table.columns) for block in ParquetTable(path).blocks(3)])
+    assert blocks["time_s"].tolist() == selected.columns["time_s"].tolist()
 
 
 @pytest.mark.parametrize("kind", [pa.string(), pa.large_string(), pa.dictionary(pa.int32(), pa.string())])
