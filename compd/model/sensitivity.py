@@ -19,14 +19,13 @@ of link i, its entries for link i and axis i are
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.deltas import split_by_port
-from compd.model.effect import Effect, Port
+from compd.model.effect import Port
 from compd.model.effect_basis import port_size
 from compd.model.frame import solve_frame
 from compd.model.kinematics import Mechanism, Pose, closure_at
@@ -81,20 +80,6 @@ def sensitivities(model: MachineModel, rows: Observations, ports: Collection[Por
             link_length[:] = -model.joint_weights
         by_port[port] = Sensitivity(tip, rotation, link_length)
     return by_port
-
-
-def effect_sensitivity(
-    effect: Effect, rows: Observations, basis: FloatArray, by_port: Mapping[Port, Sensitivity]
-) -> Sensitivity:
-    """The prediction's derivatives by an effect's P fitted numbers: (N, 3, P), (N, 3, P), (N, n, P).
-
-    basis : (N, sum of port sizes, P), from `effect.basis`.  by_port : from `sensitivities`, for the effect's ports.
-    """
-    parts = [(by_port[port], values) for port, values in split_by_port(effect, rows, basis).items()]
-    tip, rotation, link_length = (
-        sum((sensitivity[i] @ values for sensitivity, values in parts), start=np.zeros(())) for i in range(3)
-    )
-    return Sensitivity(tip, rotation, link_length)
 
 
 def tip_by_links(model: MachineModel, base_joints_M_mm: FloatArray, pose: Pose, tip_M_mm: FloatArray) -> FloatArray:

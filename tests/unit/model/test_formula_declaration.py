@@ -16,7 +16,8 @@ from compd.model.effect_needs import unmet_needs
 from compd.model.formula.declaration import formula_effect
 from compd.model.library import find_effect
 from compd.model.prediction import predict
-from compd.model.sensitivity import effect_sensitivity, sensitivities
+from compd.model.sensitivity import sensitivities
+from tests.support.effect_derivatives import effect_sensitivity
 from tests.support.effect_rows import HEXAPOD, TRIPOD, observe_rows, random_inputs, row_at_zero
 from tests.support.formulas import written
 

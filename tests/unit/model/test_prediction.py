@@ -23,9 +23,10 @@ from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import Observations
 from compd.model.prediction import perturb_machine, predict
-from compd.model.sensitivity import effect_sensitivity, link_residuals, sensitivities
+from compd.model.sensitivity import link_residuals, sensitivities
 from compd.model.solve_status import Reason
 from compd.model.tool import ToolOnPlate
+from tests.support.effect_derivatives import effect_sensitivity
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, observe_rows, random_inputs
 from tests.support.model_machines import Floats
 from tests.support.paths import SHARED

@@ -18,9 +18,10 @@ from compd.model.machine import MachineModel
 from compd.model.motion import Movement
 from compd.model.observations import Observations
 from compd.model.observe import observe
-from compd.model.sensitivity import effect_sensitivity, sensitivities
+from compd.model.sensitivity import sensitivities
 from compd.model.tip_derivatives import TipDerivatives, tip_derivatives
 from compd.model.uncertainty import GAUGE_PORTS
+from tests.support.effect_derivatives import effect_sensitivity
 from tests.support.live_machine import machine
 
 LIVE = [effect for effect in load_library().values() if effect.live]
