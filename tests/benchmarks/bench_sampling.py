@@ -26,7 +26,7 @@ from compd.commissioning.line_budget import Pace, serial_pace
 from compd.configuration import Configuration, load
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import estimated_motion
-from compd.live.acquisition.possible_motion import WINDOW_S, MotionSample
+from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
 from compd.live.acquisition.reading_trust import tolerance_mm
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
@@ -135,7 +135,7 @@ def measured(configuration: Configuration, nine: Sequence[str], baud: int, trigg
         for carried in (False, True, False)
     ]
     readings: list[Reading] = [bad(ZERO_AT_S, Quality.NEVER_READ)] * len(pipeline.latest.channels)
-    histories = {name: deque[MotionSample](maxlen=32) for name in channels}
+    histories = {name: deque[GaugeSample](maxlen=32) for name in channels}
     limit_mm = tolerance_mm(NOISE_UM)
     order, events = count(), []
 
@@ -160,7 +160,7 @@ def measured(configuration: Configuration, nine: Sequence[str], baud: int, trigg
 
         def publish() -> None:
             for name, value in values.items():
-                histories[name].append(MotionSample(value, sampling.stamp_s, WINDOW_S))
+                histories[name].append(GaugeSample(value, sampling.stamp_s, WINDOW_S))
                 motion = estimated_motion(histories[name], limit_mm)
                 readings[slots[name]] = good(value, sampling.stamp_s)._replace(motion=motion)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from compd.clock import Clock
 from compd.gauge import Quality, Reading
-from compd.live.acquisition.possible_motion import WINDOW_S, MotionSample
+from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
 from compd.live.acquisition.reading_trust import ReadingTrust
 
 
@@ -75,7 +75,7 @@ class GaugeTrust:
             return reading
         window_s += WINDOW_S
         first = self._surprising.pop(place, None)
-        if first is None and channel.surprises(MotionSample(reading.value, reading.time_s, window_s)):
+        if first is None and channel.surprises(GaugeSample(reading.value, reading.time_s, window_s)):
             self._surprising[place] = reading
         return channel.judge(reading, window_s, first)
 
@@ -89,4 +89,4 @@ class GaugeTrust:
     def _surprises(self, channel: ReadingTrust | None, reading: Reading) -> bool:
         if channel is None or not reading.ok:
             return False
-        return channel.surprises(MotionSample(reading.value, reading.time_s, self._window_s))
+        return channel.surprises(GaugeSample(reading.value, reading.time_s, self._window_s))

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from compd.gauge import ReadingMotion
-from compd.live.acquisition.possible_motion import MotionSample
+from compd.live.acquisition.possible_motion import GaugeSample
 
 # Over longer, s, no speed is measured: a drift that is older says little of now.
 LONGEST_WINDOW_S = 1.0
@@ -42,7 +42,7 @@ _DECIMALS_MM, _DECIMALS_S = 9, 6
 UNKNOWN = ReadingMotion(0.0, 0.0, math.nan, 0.0)
 
 
-def estimated_motion(history: Sequence[MotionSample], tolerance_mm: float) -> ReadingMotion:
+def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> ReadingMotion:
     """The motion at the last of these readings, which are in the order of time.
 
     tolerance_mm : by which two readings of the same value may differ, mm.
@@ -73,7 +73,7 @@ def estimated_motion(history: Sequence[MotionSample], tolerance_mm: float) -> Re
     return _rounded(math.copysign(speed, now), braking, u, min(horizon_s, speed / braking))
 
 
-def _window_start(history: Sequence[MotionSample], last: int, tolerance_mm: float) -> int:
+def _window_start(history: Sequence[GaugeSample], last: int, tolerance_mm: float) -> int:
     """Where the shortest window begins in which the length has changed; the longest window where it has not."""
     newest = history[last]
     start = last - 1
@@ -86,14 +86,14 @@ def _window_start(history: Sequence[MotionSample], last: int, tolerance_mm: floa
     return start
 
 
-def _has_stopped(history: Sequence[MotionSample], speed: float, tolerance_mm: float) -> bool:
+def _has_stopped(history: Sequence[GaugeSample], speed: float, tolerance_mm: float) -> bool:
     """Whether the last interval shows no motion, though `speed` (mm/s), that of its window, would show in it."""
     newest, before = history[-1], history[-2]
     shown_mm = abs(newest.value - before.value)
     return shown_mm <= tolerance_mm < abs(speed) * (newest.time_s - before.time_s) - shown_mm
 
 
-def _slopes(history: Sequence[MotionSample], start: int, duration_s: float) -> list[float]:
+def _slopes(history: Sequence[GaugeSample], start: int, duration_s: float) -> list[float]:
     """Mean speeds (mm/s): from `start` to the last reading, then of whole windows as long before it, the latest first.
 
     Windows that ended more than LONGEST_WINDOW_S ago do not count.

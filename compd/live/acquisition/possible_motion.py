@@ -16,7 +16,7 @@ BASE_S = 0.02
 WINDOW_S = 1e-3
 
 
-class MotionSample(NamedTuple):
+class GaugeSample(NamedTuple):
     """A reading as a sample of motion: value (mm), time (s), and by how much it may have been later (s)."""
 
     value: float
@@ -50,7 +50,7 @@ class Interval(NamedTuple):
         return self.low > self.high
 
 
-def mean_speed(start: MotionSample, end: MotionSample, tolerance_mm: float) -> Interval:
+def mean_speed(start: GaugeSample, end: GaugeSample, tolerance_mm: float) -> Interval:
     """The mean speeds, mm/s, that two readings allow, each of them uncertain by half of `tolerance_mm`."""
     shortest_s = max(0.0, end.time_s - start.time_s - start.window_s)
     longest_s = end.time_s - start.time_s + end.window_s
@@ -68,9 +68,9 @@ def _speed(change_mm: float, positive_in_s: float, negative_in_s: float) -> floa
 def is_possible(
     before: Interval,
     base_s: float,
-    last: MotionSample,
-    first: MotionSample,
-    second: MotionSample,
+    last: GaugeSample,
+    first: GaugeSample,
+    second: GaugeSample,
     tolerance_mm: float,
     limits: MotionLimits,
 ) -> bool:

@@ -22,9 +22,9 @@ from compd.gauge import Quality, Reading, bad
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import (
     BASE_S,
+    GaugeSample,
     Interval,
     MotionLimits,
-    MotionSample,
     is_possible,
     mean_speed,
     rest_to_rest_mm,
@@ -78,13 +78,13 @@ class ReadingTrust:
         self._i = memory.index[channel]
         self._tolerance_mm = float(memory.tolerance_mm[self._i])
         self._settings = settings
-        self._history: deque[MotionSample] = deque(maxlen=_HISTORY)
-        self._candidate: MotionSample | None = None  # the last answer, where nothing is believed yet
+        self._history: deque[GaugeSample] = deque(maxlen=_HISTORY)
+        self._candidate: GaugeSample | None = None  # the last answer, where nothing is believed yet
         self._back_s = math.nan  # since when a gauge that was away answers again
         self._before_silence: NDArray[np.float64] | None = None  # what all showed when it first did not answer
         self._heard_s = math.nan  # since when it answers again after that
 
-    def surprises(self, sample: MotionSample) -> bool:
+    def surprises(self, sample: GaugeSample) -> bool:
         """Whether a second answer is needed: a good reading is not where the last ones lead, or follows none."""
         memory, i = self._memory, self._i
         if memory.accepted[i] != memory.obeyed[i]:
@@ -111,7 +111,7 @@ class ReadingTrust:
         first : the first answer of a poll that was asked twice, where that is good too.
         """
         memory, i = self._memory, self._i
-        sample = MotionSample(reading.value, reading.time_s, window_s)
+        sample = GaugeSample(reading.value, reading.time_s, window_s)
         self._count(sample)
         memory.shown[i], memory.shown_s[i] = sample.value, sample.time_s
         # one that was accepted while it was asked is asked twice at the next poll
@@ -137,14 +137,14 @@ class ReadingTrust:
         """Whether there is a reading that the next one follows; that of another process counts, too."""
         memory, i = self._memory, self._i
         if not self._history and not math.isnan(memory.value[i]):
-            self._history.append(MotionSample(float(memory.value[i]), float(memory.time_s[i]), 0.0))
+            self._history.append(GaugeSample(float(memory.value[i]), float(memory.time_s[i]), 0.0))
         return bool(self._history)
 
-    def _begin(self, reading: Reading, sample: MotionSample, first: Reading | None) -> Reading:
+    def _begin(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
         """Believe a reading whatever was before it, where two answers agree."""
         if first is None:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
-        earlier = MotionSample(first.value, first.time_s, sample.window_s)
+        earlier = GaugeSample(first.value, first.time_s, sample.window_s)
         before, self._candidate = self._candidate, None
         if abs(sample.value - earlier.value) > self._tolerance_mm and not (
             before is not None and self._goes_on(before, earlier, sample)
@@ -156,7 +156,7 @@ class ReadingTrust:
         self._history.clear()
         return self._believed(reading, sample)
 
-    def _believed(self, reading: Reading, sample: MotionSample) -> Reading:
+    def _believed(self, reading: Reading, sample: GaugeSample) -> Reading:
         self._before_silence = None
         self._history.append(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
@@ -168,7 +168,7 @@ class ReadingTrust:
         limits = self._limits_text() if self._memory.doubt[self._i] == Doubt.JUMPED else ""
         return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i) + limits)
 
-    def _returned(self, reading: Reading, sample: MotionSample, first: Reading | None) -> Reading:
+    def _returned(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
         """The first readings of a gauge that was away."""
         memory, i = self._memory, self._i
         if not self._back_s > memory.lost_s[i]:
@@ -193,13 +193,13 @@ class ReadingTrust:
             return self._refused(reading)
         return self._begin(reading, sample, first)
 
-    def _continued(self, reading: Reading, sample: MotionSample, first: Reading | None) -> Reading:
+    def _continued(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
         """A reading that follows others, of a gauge that was never away.
 
         The second answer of a gauge that was latched is the same sample once more: it says whether the first one was
         damaged, and nothing of motion.
         """
-        earlier = None if first is None else MotionSample(first.value, first.time_s, sample.window_s)
+        earlier = None if first is None else GaugeSample(first.value, first.time_s, sample.window_s)
         if self._is_expected(sample):
             return self._believed(reading, sample)
         if first is None or earlier is None:
@@ -235,7 +235,7 @@ class ReadingTrust:
         keys = ", ".join(f"`{key}: {limit:g}`" for key, limit in set_to.items() if math.isfinite(limit))
         return f"; its motion is limited by {keys}" if keys else ""
 
-    def _has_moved_alone(self, sample: MotionSample, before: NDArray[np.float64]) -> bool:
+    def _has_moved_alone(self, sample: GaugeSample, before: NDArray[np.float64]) -> bool:
         """Whether a gauge that may count anew shows another value after a silence, and no other gauge does."""
         away_mm = abs(sample.value - self._history[-1].value)
         return (
@@ -244,7 +244,7 @@ class ReadingTrust:
             and stood_still(self._memory, self._i, before)
         )
 
-    def _moved_alone(self, reading: Reading, sample: MotionSample) -> Reading:
+    def _moved_alone(self, reading: Reading, sample: GaugeSample) -> Reading:
         """No value yet where the others may still show the same motion; after that the gauge counts anew."""
         if math.isnan(self._heard_s):
             self._heard_s = sample.time_s
@@ -253,12 +253,12 @@ class ReadingTrust:
         self._memory.distrust(self._i, Doubt.RETURNED, sample.value - self._history[-1].value)
         return self._refused(reading)
 
-    def _is_from_rest_to_rest(self, before: Interval, first: MotionSample, second: MotionSample) -> bool:
+    def _is_from_rest_to_rest(self, before: Interval, first: GaugeSample, second: GaugeSample) -> bool:
         """Whether the part was at rest before, and two answers show it at rest again."""
         rested = math.isfinite(before.low) and before.low <= 0.0 <= before.high
         return rested and abs(second.value - first.value) <= self._tolerance_mm
 
-    def _goes_on(self, last: MotionSample, first: MotionSample, second: MotionSample) -> bool:
+    def _goes_on(self, last: GaugeSample, first: GaugeSample, second: GaugeSample) -> bool:
         """Whether the second answer continues the motion that the first one shows; without a limit of acceleration."""
         then = mean_speed(first, second, self._tolerance_mm)
         now = mean_speed(last, first, self._tolerance_mm)
@@ -267,7 +267,7 @@ class ReadingTrust:
         low, high = sorted((sign * then.low, sign * then.high))
         return max(low, slowest) <= min(high, fastest)
 
-    def _is_expected(self, sample: MotionSample) -> bool:
+    def _is_expected(self, sample: GaugeSample) -> bool:
         """Whether the reading is where the last ones lead, as far as noise and the acceleration that is there allow."""
         last = self._history[-1]
         before, base_s = self._speed_before()
@@ -313,7 +313,7 @@ class ReadingTrust:
                 return abs(speed - earlier) / ((middle.time_s - start.time_s + base_s) / 2)
         return 0.0
 
-    def _count(self, sample: MotionSample) -> None:
+    def _count(self, sample: GaugeSample) -> None:
         """Count how often the very same value comes, for the vote on gauges that are stuck."""
         memory, i = self._memory, self._i
         change_mm = abs(sample.value - float(memory.shown[i]))

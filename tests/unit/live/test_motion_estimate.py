@@ -9,7 +9,7 @@ import pytest
 
 from compd.gauge import Quality, Reading, ReadingMotion, bad, good
 from compd.live.acquisition.motion_estimate import estimated_motion
-from compd.live.acquisition.possible_motion import MotionSample
+from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.loop.wiring import Wire, Wires
 from compd.live.memory.latest import Snapshot
 from compd.live.memory.readings import Readings
@@ -20,7 +20,7 @@ TOLERANCE_MM = 0.001
 
 def motion(values, times_s=None):
     times_s = [ROUND_S * k for k in range(len(values))] if times_s is None else times_s
-    samples = [MotionSample(value, time_s, 1e-3) for value, time_s in zip(values, times_s, strict=True)]
+    samples = [GaugeSample(value, time_s, 1e-3) for value, time_s in zip(values, times_s, strict=True)]
     return estimated_motion(samples, TOLERANCE_MM)
 
 
