@@ -64,41 +64,52 @@ SIDE_BY_SIDE ?= 4
 # Likewise the commands of the documentation's pages and the examples of CONTRIBUTING.md.
 DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py
 
-# System tests have both processors for themselves: they run the daemon in real time.
+# What runs a daemon or a browser in real time. It waits more than it computes: some side by side are still in time, but
+# not beside tests that compute.
+REAL_TIME := $(addprefix tests/system/,page processes linuxcnc test_chain.py test_fault_matrix.py \
+  test_half_open_connections.py test_pushed_lines.py test_reference_examples.py test_simultaneous_sampling.py)
+COMPUTED := $(REAL_TIME:%=--ignore=%) $(HIDDEN:%=--ignore=%)
+# Files are shared out whole: what the tests of one share is made once.
+IN_REAL_TIME := -n 3 --dist loadfile
+
+# Tests run side by side: threads of the linear algebra beside them take twice the processor time.
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+PYTEST := $(ONE_THREAD) $(BIN)/pytest
+
 test: $(STAMP)
-	$(BIN)/pytest -n 2 --dist worksteal --ignore=tests/system
-	$(BIN)/pytest -rs tests/system
+	$(PYTEST) -n 3 --dist worksteal $(COMPUTED)
+	$(PYTEST) -rs $(IN_REAL_TIME) $(HIDDEN) $(REAL_TIME)
 
 long: $(STAMP)
-	$(BIN)/pytest -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) --ignore=$(SERVICE)
+	$(PYTEST) -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) --ignore=$(SERVICE)
 
 # Of the long ones those that .ci/run runs, but for the targets below.
 sample: $(STAMP)
-	$(BIN)/pytest -m sample -n 2 --ignore=tests/system
-	$(BIN)/pytest -m sample tests/system $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%)
+	$(PYTEST) -m sample -n 3 $(COMPUTED) $(DOCUMENTED:%=--ignore=%)
+	$(PYTEST) -m sample $(IN_REAL_TIME) $(REAL_TIME)
 
 # The unit under systemd, in a container; -rP prints the times of restart and stop. Skipped but for root with the
 # packages debootstrap and systemd-container.
 SERVICE := tests/system/test_service_in_container.py
 
 service: $(STAMP)
-	$(BIN)/pytest -m long -rsP $(SERVICE)
+	$(PYTEST) -m long -rsP $(SERVICE)
 
 # Every command and every piece of Python of README and docs/, one page after the other: they run machines in real time.
 pages: $(STAMP)
-	$(BIN)/pytest -m sample -n 2 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_runs
-	$(BIN)/pytest -m sample tests/system/test_pages.py -k test_everything_on_a_page_with_a_machine_runs
+	$(PYTEST) -m sample -n 3 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_runs
+	$(PYTEST) -m sample -n 2 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_with_a_machine_runs
 
 # The worked examples of CONTRIBUTING.md.
 walks: $(STAMP)
-	$(BIN)/pytest -m sample tests/system/test_contributing.py
+	$(PYTEST) -m sample tests/system/test_contributing.py
 
 hidden: $(STAMP)
-	$(BIN)/pytest -m '' -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
+	$(PYTEST) -m '' -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
 
 # The tutorial, a cause, a pair and a cause outside the library.
 hidden-sample: $(STAMP)
-	$(BIN)/pytest -m sample -n 2 $(HIDDEN)
+	$(PYTEST) -m sample -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
 
 lint: $(STAMP)
 	$(BIN)/ruff check
@@ -137,9 +148,6 @@ bench-sample: $(STAMP)
 soak: $(STAMP)
 	$(BIN)/python -m tests.soak $(OPTIONS)
 
-# One thread each, because cases run side by side.
-ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-
 # A part of it by option: make scoreboard OPTIONS="--family glints change --jobs 8"
 scoreboard: $(STAMP)
 	$(ONE_THREAD) $(BIN)/python -m tests.scoreboard --set full $(OPTIONS)
@@ -176,7 +184,7 @@ docs: $(STAMP) $(GALLERY) $(EXAMPLE)
 nightly: lint wheel demo test pages walks long service hidden bench
 	$(BIN)/python -m tests.soak --minutes 180 --seed $$(date +%j)
 	$(BIN)/python -m tests.soak --without-faults --hours 24
-	COMPD_FUZZ=20 $(BIN)/pytest --timeout 1800 tests/fuzz
+	COMPD_FUZZ=20 $(PYTEST) --timeout 1800 tests/fuzz
 	$(MAKE) scoreboard
 
 clean:

@@ -22,6 +22,7 @@ from compd.commissioning.conformance.report import DriverUnderTest, driver_under
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 from compd.lines.modbus_rtu import RtuMaster
 from compd.simulation.wires.device import SimulatedByteDevice
+from tests.support.sampled import sampled
 
 NAMES = polled_drivers()
 
@@ -30,7 +31,7 @@ def failures(results: Sequence[tuple[str, CaseResult]]) -> list[str]:
     return [f"{wire}: {result.case}: {result.observed}" for wire, result in results if result.verdict == "FAIL"]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", sampled(NAMES, 3))
 def test_installed_driver_in_virtual_time(name: str) -> None:
     results = list(run_conformance(driver_under_test(name), on_real_wires=False))
     assert failures(results) == []
@@ -43,9 +44,8 @@ def test_a_line_that_never_learns_where_a_map_ends_is_found(monkeypatch: pytest.
     assert any("the map ends" in text and "no reply, still: timeout" in text for text in failures(results))
 
 
-@pytest.mark.parametrize("name", ["heidenhain_nd28x", "modbus"])
-def test_driver_on_ptys_and_ports(name: str) -> None:
-    results = list(run_conformance(driver_under_test(name)))
+def test_a_driver_on_ptys_and_ports() -> None:
+    results = list(run_conformance(driver_under_test("heidenhain_nd28x")))
     assert failures(results) == []
     assert len({wire for wire, _ in results}) == 3
 
@@ -127,7 +127,7 @@ def run_through(driver: DriverUnderTest, polls: Sequence[Sequence[Fault]]) -> No
     assert session.poll().ok
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", sampled(NAMES, 4))
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_no_interleaving_of_faults_gives_a_wrong_number(name: str, data: st.DataObject) -> None:

@@ -16,6 +16,7 @@ from compd.gauge import Channel
 from compd_drivers.modbus import Modbus
 from compd_drivers.modbus_description import ModbusOptions
 from tests.support.faulty_drivers import DRIVERS
+from tests.support.sampled import sampled
 
 RIGHT = ("Comparator", "Inch", "Code", "Exponent", "Addressed", "Checked", "Pair", "Registers", "Talker", "Pulsed")
 RANGE = "range: all that the device can show"
@@ -108,14 +109,14 @@ def result_of(name: str, case: str) -> CaseResult:
     return next(result for _, result in run_conformance(driver(name), on_real_wires=False) if result.case == case)
 
 
-@pytest.mark.parametrize("name", RIGHT)
+@pytest.mark.parametrize("name", sampled(RIGHT, 3))
 def test_a_right_driver_fails_in_nothing(name: str) -> None:
     results = [result for _, result in run_conformance(driver(name), on_real_wires=False)]
     assert [result for result in results if result.verdict == "FAIL"] == []
     assert sum(result.verdict == "pass" for result in results) >= 20
 
 
-@pytest.mark.parametrize("name", FAULTY)
+@pytest.mark.parametrize("name", sampled(FAULTY, 3))
 def test_a_faulty_driver_is_found_and_its_fault_is_named(name: str) -> None:
     case, message = FAULTY[name]
     result = result_of(name, case)
@@ -185,7 +186,7 @@ def test_a_preset_that_is_asked_by_dtr_is_tried_in_virtual_time(options: dict[st
     assert why in results[-1][1].observed
 
 
-@pytest.mark.parametrize("form", ["%+08.3f", "%+08.3f mm", "%+08.3f%0<sum8>"])
+@pytest.mark.parametrize("form", sampled(["%+08.3f%0<sum8>", "%+08.3f", "%+08.3f mm"], 3))
 def test_a_described_device_that_speaks_unasked_is_tried_in_virtual_time(form: str) -> None:
     options = {"in": form, "in_terminator": r"\r\n", "channels": [{"name": "a", "unit": "mm"}]}
     results = list(run_conformance(driver_under_test("serial_ascii", options)))

@@ -19,6 +19,7 @@ from compd.gauge import Quality
 from compd.lines import open_stream
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
+from tests.support.sampled import sampled
 from tests.unit.commissioning.gauge_description.test_capture import talker
 
 CANDIDATES = preset_candidates()
@@ -74,7 +75,7 @@ DEVICES: dict[str, tuple[bytes, dict[bytes, bytes], bytes, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", DEVICES)
+@pytest.mark.parametrize("name", sampled(DEVICES, 2))
 def test_a_device_is_found_although_it_keeps_what_others_were_asked(name: str) -> None:
     end, answers, unknown, announced = DEVICES[name]
     with instrument(end, answers, unknown) as (port, _):

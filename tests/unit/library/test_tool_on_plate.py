@@ -54,10 +54,12 @@ def fit(aligned: AlignedRecording, id_: str) -> list[float]:
     return [number.value for number in model.numbers()]
 
 
+@pytest.mark.long
 def test_a_hidden_compliance_is_fitted_with_its_sign(hide: Hide) -> None:
     assert fit(hide("tool_bending=0.5"), "tool_bending") == pytest.approx([0.5], rel=0.02)
 
 
+@pytest.mark.long
 def test_a_hidden_expansion_is_fitted_along_the_tool_on_the_plate(hide: Hide) -> None:
     """The tool is 190 mm high. The cause has 15 % of the platform's temperature, which the effect does not know."""
     assert fit(hide("tool_expansion=12"), "tool_expansion") == pytest.approx([12.0], rel=0.05)

@@ -58,6 +58,7 @@ def test_a_ballbar_shows_its_own_noise_and_its_wrong_length(tmp_path: Path) -> N
     assert ends.added_mm == pytest.approx(np.full(3, BALLBAR_ERROR_MM), abs=0.003)
 
 
+@pytest.mark.long
 def test_poses_scatter_by_their_own_noise(tmp_path: Path) -> None:
     path = tmp_path / "poses.csv"
     compd.simulate_campaign("hexapod", path, seed=4, reference="pose")
@@ -79,6 +80,7 @@ def test_the_tip_of_a_ballbar_is_on_the_sphere() -> None:
     assert np.linalg.norm(away_mm, axis=1) == pytest.approx(np.full(48, BALLBAR_MM))
 
 
+@pytest.mark.long
 def test_what_no_pin_can_show_is_not_named(tmp_path: Path) -> None:
     """A grating that is wrong by a share of the way is a constant wherever the tripod comes back to."""
     path = tmp_path / "pins.csv"

@@ -297,6 +297,7 @@ def test_a_recording_of_the_planned_rows_on_the_same_machine(tmp_path: Path) -> 
     assert recorded.hidden[0].cause.values == other.hidden[0].cause.values
 
 
+@pytest.mark.long
 def test_the_same_seed_measures_the_same_and_another_day_does_not(tmp_path: Path) -> None:
     path = plan_file(tmp_path / "next.csv", [{"tip_x_mm": 10.0}, {"tip_y_mm": 10.0}])
     first, again, other = campaign(path), campaign(path), campaign(path, other_days=1)

@@ -105,6 +105,7 @@ def test_a_change_between_two_moments_is_dated_within_one_of_them(tmp_path: Path
     assert change.time_s == pytest.approx(1650.0, abs=10.0 * ROWS / MOMENTS)
 
 
+@pytest.mark.long
 def test_backlash_of_a_known_machine_that_grows_after_a_crash(tmp_path: Path) -> None:
     still = record_with_effects(tmp_path / "run.csv", 1, {})
     crash_s = float(still.rows.time_s[still.rows.session_start][2])

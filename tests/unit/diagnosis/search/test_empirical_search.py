@@ -112,6 +112,7 @@ def test_a_period_is_told_with_its_unit(tmp_path: Path) -> None:
     assert re.fullmatch(r"periodic, period = (79\d|8\d\d)(\.\d)? s", form)
 
 
+@pytest.mark.long
 def test_one_effect_and_a_cause_outside_are_both_told(tmp_path: Path) -> None:
     diagnosis = diagnose_with_cause(tmp_path, swell_with_humidity, {"link_elasticity": (1 / 30,)})
     assert diagnosis.verdict == "partial"

@@ -1,0 +1,20 @@
+"""A family of long tests, of which `make test` runs a sample and `make nightly` all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+
+
+def sampled(values: Iterable[Any], every: int) -> list[Any]:
+    """Parameters of which one in `every` is run by `make test`, the first among them; the others are `long`.
+
+    A value that is a tuple stands for several arguments.
+    """
+    return [value if k % every == 0 else _long(value) for k, value in enumerate(values)]
+
+
+def _long(value: Any) -> Any:
+    return pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.long)
