@@ -149,7 +149,7 @@ class Daemon:
         last_readings = LastReadings(Path(configuration.state.directory), configuration.zero_hash, self.trust, clock)
         if before is None or before.trust is not self.trust:
             last_readings.recall()
-        model_switch = ModelSwitch(self.control)
+        model_switch = ModelSwitch(self.control, self.setpoints.wake_reader, clock)
         version: dict[str, Any] = {
             "class": "VERSION",
             "protocol": PROTOCOL,
@@ -192,6 +192,7 @@ class Daemon:
                 access,
                 clock,
                 self._poll_requests.add,
+                publisher.tell_order,
             )
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}
