@@ -25,6 +25,7 @@ from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import available_settings
 from compd.model_file.model_file import read_model_file
+from compd.plugins import OWN_CODE, Code
 
 _HASH_DIGITS = 16
 
@@ -139,12 +140,16 @@ class Models(NamedTuple):
 class ModelLoader:
     """Reads model files for one machine, and refuses those that cannot be used live."""
 
-    def __init__(self, model: MachineModel, machine: str, geometry: str, wires: MachineWires) -> None:
-        """`model`: without effects; `machine`: the name in its configuration; `geometry`: the hash of its geometry."""
+    def __init__(
+        self, model: MachineModel, machine: str, geometry: str, wires: MachineWires, code: Code = OWN_CODE
+    ) -> None:
+        """`model`: without effects; `machine`: the name in its configuration; `geometry`: the hash of its geometry;
+        `code`: which Python files effects may be in."""
         self.without_effects = LiveModel(model, (), wires.quantity_wires(()))
         self._machine = machine
         self._geometry = geometry
         self._wires = wires
+        self._code = code
 
     def read(self, path: Path) -> LiveModel:
         """The model in a file.
@@ -159,7 +164,7 @@ class ModelLoader:
         if text is None:
             return self.without_effects
         model = self.without_effects.machine
-        file = read_model_file(Path(text.file), self._machine, model.links, self._geometry, text.content)
+        file = read_model_file(Path(text.file), self._machine, model.links, self._geometry, text.content, self._code)
         if problems := [*self._unmet_needs(file.fitted), *_id_and_value_problems(file.fitted)]:
             raise StateError(problems)
         machine = replace(model, effects=file.fitted, covariance=file.covariance)
