@@ -22,6 +22,8 @@ _LAST_RECEIVE_BYTES = 64 * 1024
 _LONGEST_INTERVAL_S = 1e6
 # struct ucred of unix(7): process, user, group.
 _CREDENTIALS = struct.Struct("3i")
+# Of SCM_RIGHTS.
+_DESCRIPTOR = struct.Struct("i")
 
 
 class Stream(Enum):
@@ -151,8 +153,14 @@ class ClientSession:
         """What has arrived, and the descriptor among it; TCP carries none. Of several the system closes the others."""
         if not self.local or self._unwanted.is_full:
             return self.connection.recv(_RECEIVE_BYTES), None
-        data, descriptors, _, _ = socket.recv_fds(self.connection, _RECEIVE_BYTES, 1, socket.MSG_CMSG_CLOEXEC)
-        return data, descriptors[0] if descriptors else None
+        # socket.recv_fds of Python 3.11 leaves the flags out
+        data, control, _, _ = self.connection.recvmsg(
+            _RECEIVE_BYTES, socket.CMSG_LEN(_DESCRIPTOR.size), socket.MSG_CMSG_CLOEXEC
+        )
+        for level, kind, content in control:
+            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS) and len(content) >= _DESCRIPTOR.size:
+                return data, _DESCRIPTOR.unpack_from(content)[0]
+        return data, None
 
     def _add_line(self, line: bytes, descriptor: int | None) -> None:
         if self._skipping_line:
