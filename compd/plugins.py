@@ -26,6 +26,8 @@ SIMULATED_GAUGES = "compd.simulated_gauges"
 GAUGE_PRESETS = "compd.gauge_presets"
 EFFECTS = "compd.effects"
 _KIND = {GAUGES: "driver", SIMULATED_GAUGES: "simulated device", EFFECTS: "effect"}
+# Where a refusal leaves the hash of a file to whoever may read it.
+HASH_PLACE = "HASH"
 # Far more than anybody writes by hand.
 _LARGEST_CODE_BYTES = 10_000_000
 _PATH = re.compile(r"^(?P<file>/.+\.py):(?P<name>[A-Za-z_]\w*)$")
@@ -177,7 +179,7 @@ class ListedCode:
                     what=f"the {kind} is Python code that the machine configuration does not list",
                     value=str(file),
                     next_step="look at the file, then write under `effects:` of the configuration "
-                    f"`- {{file: {file}, sha256: HASH}}` with the HASH that `sha256sum {file}` prints, and let the "
+                    f"`- {{file: {file}, sha256: {HASH_PLACE}}}` with the {HASH_PLACE} that `sha256sum {file}` prints, and let the "
                     "daemon read its configuration anew (`systemctl reload compd`)",
                 )
             )
@@ -211,6 +213,11 @@ class ListedCode:
         except (Exception, SystemExit) as error:
             raise _unloadable(str(file), where, kind, error) from error
         return module
+
+
+def hash_of_code(file: Path) -> str:
+    """The hash with which a file is listed. Raises OSError where it cannot be read."""
+    return hashlib.sha256(read_small_file(file, _LARGEST_CODE_BYTES)).hexdigest()
 
 
 def _module_name(file: Path) -> str:
