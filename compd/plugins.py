@@ -179,8 +179,8 @@ class ListedCode:
                     what=f"the {kind} is Python code that the machine configuration does not list",
                     value=str(file),
                     next_step="look at the file, then write under `effects:` of the configuration "
-                    f"`- {{file: {file}, sha256: {HASH_PLACE}}}` with the {HASH_PLACE} that `sha256sum {file}` prints, and let the "
-                    "daemon read its configuration anew (`systemctl reload compd`)",
+                    f"`- {{file: {file}, sha256: {HASH_PLACE}}}` with the {HASH_PLACE} that `sha256sum {file}` prints, "
+                    "and let the daemon read its configuration anew (`systemctl reload compd`)",
                 )
             )
         try:
