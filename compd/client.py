@@ -33,6 +33,7 @@ Whatever goes wrong raises `compd.errors.DaemonError`, which says what to do.
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -41,6 +42,7 @@ from typing import Self
 
 from compd.client_connection import ClientConnection, Message, open_connection
 from compd.errors import DaemonError, Problem
+from compd.files.atomic_files import open_regular
 from compd.live.loop.states import state_named
 
 __all__ = ["DEFAULT_ADDRESS", "Client", "Message", "connect"]
@@ -48,7 +50,9 @@ __all__ = ["DEFAULT_ADDRESS", "Client", "Message", "connect"]
 DEFAULT_ADDRESS = "127.0.0.1:7750"
 
 
-def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0, token: str | None = None) -> Client:
+def connect(
+    address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0, token: str | None = None, by: str = ""
+) -> Client:
     """Connect to the running daemon.
 
     Parameters
@@ -60,6 +64,9 @@ def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0, token
         For connecting, and for each answer and each setpoint, s.
     token : str, optional
         Over TCP, what is in the daemon's file `sockets.tcp.token_file`, where it has one.
+    by : str
+        For whom this client asks, one line of at most 200 characters: the daemon writes it to its log, and to
+        recordings, with every order (`zero`, `accept`, `poll`, `model`, `release`).
 
     Returns
     -------
@@ -81,7 +88,7 @@ def connect(address: str | Path = DEFAULT_ADDRESS, timeout_s: float = 5.0, token
     """
     connection = open_connection(str(address), timeout_s)
     try:
-        return Client(connection, token)
+        return Client(connection, token, by)
     except DaemonError:
         connection.close()
         raise
@@ -100,9 +107,10 @@ class Client:
         The daemon's VERSION message: `protocol`, `release`, `machine`, `config_hash`, `links`.
     """
 
-    def __init__(self, connection: ClientConnection, token: str | None = None) -> None:
-        """`connection`: to the daemon, with nothing read yet; `token`: as in `connect`."""
+    def __init__(self, connection: ClientConnection, token: str | None = None, by: str = "") -> None:
+        """`connection`: to the daemon, with nothing read yet; `token`, `by`: as in `connect`."""
         self._connection = connection
+        self._by = by
         self._setpoints: deque[Message] = deque()
         _, greeting = connection.read()
         if greeting["class"] == "AUTH":
@@ -150,8 +158,8 @@ class Client:
         """Iterate over what the cycles compute from, for a recording: each line as it came, and the message in it.
 
         The first item is the answer to WATCH, whose `columns` say which channel is which column of a recording. Then
-        come READINGS messages, without end, just as the daemon sent them. Unix socket only; use a connection for this
-        alone.
+        come READINGS messages, without end, just as the daemon sent them, and among them an ORDER for each order that
+        a client gave. Unix socket only; use a connection for this alone.
 
         Parameters
         ----------
@@ -214,7 +222,7 @@ class Client:
         DaemonError
             Where this client is not the controller, or nobody is.
         """
-        self._ask({"class": "RELEASE"}, "RELEASE")
+        self._order({"class": "RELEASE"})
 
     def status(self) -> Message:
         """Ask for STATUS.
@@ -282,7 +290,7 @@ class Client:
             Where a gauge cannot be read, the machine moves, or the file cannot be written; and where it needs
             `replace`: the problem's value is then "zero_differs".
         """
-        return self._ask({"class": "ZERO", "replace": True} if replace else {"class": "ZERO"}, "ZERO")
+        return self._order({"class": "ZERO", "replace": True} if replace else {"class": "ZERO"})
 
     def accept(self, gauge: str) -> Message:
         """Let the daemon believe a gauge again that jumped, or came back with another value. Unix socket only.
@@ -304,7 +312,7 @@ class Client:
         DaemonError
             Where there is no such gauge.
         """
-        return self._ask({"class": "ACCEPT", "gauge": gauge}, "ACCEPT")
+        return self._order({"class": "ACCEPT", "gauge": gauge})
 
     def poll(self, gauge: str) -> Message:
         """Have a gauge polled at once that did not answer, and is asked seldom since. Unix socket only.
@@ -324,18 +332,22 @@ class Client:
         DaemonError
             Where there is no such gauge, or its device sends by itself.
         """
-        return self._ask({"class": "POLL", "gauge": gauge}, "POLL")
+        return self._order({"class": "POLL", "gauge": gauge})
 
-    def model(self, file: str | None = None, shadow: bool = False) -> Message:
+    def model(self, file: str | Path | None = None, shadow: bool = False, descriptor: int | None = None) -> Message:
         """Ask which models the daemon runs with; with `file`, adopt that model first. Unix socket only.
+
+        The file is opened here, as this process may, and the daemon gets the open descriptor with the request: it
+        opens no file itself.
 
         Parameters
         ----------
-        file : str, optional
-            Absolute path of a model file on the daemon's computer; ``""`` for the machine without effects, or for no
-            shadow; None to change nothing.
+        file : str or Path, optional
+            A model file; ``""`` for the machine without effects, or for no shadow; None to change nothing.
         shadow : bool
             Compute the correction of this model beside the applied one, and do not apply it.
+        descriptor : int, optional
+            Of the file, where the caller has opened it; `file` is then only its name. It is left open.
 
         Returns
         -------
@@ -346,10 +358,40 @@ class Client:
         Raises
         ------
         DaemonError
-            Where the daemon cannot use the file; the models are as before.
+            Where the file cannot be read, or the daemon cannot use it; the models are as before.
         """
-        keys = {} if file is None else {"file": file, "shadow": shadow}
-        return self._ask({"class": "MODEL", **keys}, "MODEL")
+        if file is None:
+            return self._ask({"class": "MODEL"}, "MODEL")
+        request: Message = {"class": "MODEL", "file": str(file) and str(Path(file).absolute()), "shadow": shadow}
+        if descriptor is not None or not request["file"]:
+            return self._order(request, descriptor)
+        opened = _opened(Path(file))
+        try:
+            return self._order(request, opened)
+        finally:
+            os.close(opened)
+
+    def adopt_shadow(self, hash: str) -> Message:
+        """Apply the model that runs as the shadow: exactly what has been looked at, whatever has become of its file.
+
+        Unix socket only.
+
+        Parameters
+        ----------
+        hash : str
+            Of the model, as MODEL and STATUS tell it.
+
+        Returns
+        -------
+        dict
+            MODEL, as `model` returns it.
+
+        Raises
+        ------
+        DaemonError
+            Where no model of this hash runs as the shadow; the models are as before.
+        """
+        return self._order({"class": "MODEL", "hash": hash})
 
     def close(self) -> None:
         """Close the connection; a controller's role ends with it."""
@@ -363,8 +405,13 @@ class Client:
     ) -> None:
         self.close()
 
-    def _ask(self, message: Message, answer: str) -> Message:
-        self._connection.send(message)
+    def _order(self, message: Message, descriptor: int | None = None) -> Message:
+        """Ask for what changes the machine, in the name of whoever this client asks for."""
+        name: str = message["class"]
+        return self._ask(message | ({"by": self._by} if self._by else {}), name, descriptor)
+
+    def _ask(self, message: Message, answer: str, descriptor: int | None = None) -> Message:
+        self._connection.send(message, descriptor)
         return self._await(answer)
 
     def _await(self, wanted: str) -> Message:
@@ -377,3 +424,17 @@ class Client:
                 self._setpoints.append(message)
             if message["class"] == wanted:
                 return message
+
+
+def _opened(file: Path) -> int:
+    """A descriptor of a regular file, open for reading. Raises DaemonError."""
+    try:
+        return open_regular(file)
+    except OSError as error:
+        raise DaemonError(
+            Problem(
+                where=str(file),
+                what=f"cannot be read: {error.strerror or error}",
+                next_step="name a model file that you may read",
+            )
+        ) from error

@@ -46,10 +46,14 @@ class ClientConnection:
         self._socket = connected
         self._lines = connected.makefile("rb")
 
-    def send(self, message: Message) -> None:
-        """Raises DaemonError where the daemon has gone."""
+    def send(self, message: Message, descriptor: int | None = None) -> None:
+        """descriptor : open file that goes with the message; over TCP none does. Raises DaemonError where the daemon
+        has gone."""
+        line = json.dumps(message).encode() + b"\n"
         try:
-            self._socket.sendall(json.dumps(message).encode() + b"\n")
+            if descriptor is not None and self._socket.family == socket.AF_UNIX:
+                line = line[socket.send_fds(self._socket, [line], [descriptor]) :]
+            self._socket.sendall(line)
         except OSError as error:
             raise self._lost(error.strerror or str(error)) from error
 

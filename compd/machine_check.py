@@ -14,8 +14,9 @@ import numpy as np
 
 from compd.configuration import Configuration
 from compd.configuration.document import Document, Location
+from compd.configuration.effect_files import effect_file_problems
 from compd.configuration.geometry import Geometry
-from compd.configuration.machine_configuration import Examined, examine, in_order
+from compd.configuration.machine_configuration import SECTIONS, Examined, examine, in_order
 from compd.configuration.operation import SocketSettings, StateSettings
 from compd.configuration.places import place_problems, place_warnings
 from compd.configuration.section import Section, readable
@@ -57,7 +58,10 @@ def examine_whole(path: Path) -> Examined:
         else:
             warnings += _stroke_warnings(document, examined.geometry, model)
     sockets, state = _section(SocketSettings, document, "sockets"), _section(StateSettings, document, "state")
-    problems = in_order([*problems, *place_problems(document, sockets, state)])
+    effects = readable(SECTIONS["effects"], document.value(("effects",))) or ()
+    problems = in_order(
+        [*problems, *place_problems(document, sockets, state), *effect_file_problems(document, effects)]
+    )
     warnings = in_order([*warnings, *place_warnings(document, sockets, state)])
     configuration = examined.configuration
     if configuration is not None:

@@ -6,9 +6,11 @@ each preset is a driver and a simulated device of its own name.
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import re
 import sys
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from pathlib import Path
@@ -16,6 +18,7 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from compd.errors import PluginError, Problem
+from compd.files.atomic_files import read_small_file
 from compd.files.file_trust import own_users, trust_problem
 
 GAUGES = "compd.gauges"
@@ -23,7 +26,23 @@ SIMULATED_GAUGES = "compd.simulated_gauges"
 GAUGE_PRESETS = "compd.gauge_presets"
 EFFECTS = "compd.effects"
 _KIND = {GAUGES: "driver", SIMULATED_GAUGES: "simulated device", EFFECTS: "effect"}
+# Where a refusal leaves the hash of a file to whoever may read it.
+HASH_PLACE = "HASH"
+# Far more than anybody writes by hand.
+_LARGEST_CODE_BYTES = 10_000_000
 _PATH = re.compile(r"^(?P<file>/.+\.py):(?P<name>[A-Za-z_]\w*)$")
+
+
+class Code(Protocol):
+    """Which Python files may be executed: OWN_CODE, NO_CODE, or those of a ListedCode."""
+
+    def module(self, file: Path, where: str, kind: str) -> ModuleType:
+        """The executed file.
+
+        file : absolute.  where : the place that names it.  kind : what is sought in it, for messages.
+        Raises PluginError where it may not be executed, or cannot be.
+        """
+        ...
 
 
 class PresetFolder(Protocol):
@@ -47,13 +66,14 @@ def names(group: str) -> list[str]:
     return sorted({point.name for point in _entry_points(group)} | _preset_folders(group).keys())
 
 
-def load(group: str, name: str, where: str) -> Any:
+def load(group: str, name: str, where: str, code: Code | None = None) -> Any:
     """What `name` stands for, a class or an effect: an entry point's name, a preset's, or /absolute/file.py:Name.
 
+    code : which Python files may be executed; None is OWN_CODE.
     Raises PluginError, which names `where` and lists what there is, or every problem in a preset's file.
     """
     if match := _PATH.match(name):
-        return _load_file(Path(match["file"]), match["name"], where, _KIND.get(group, group))
+        return _load_file(Path(match["file"]), match["name"], where, _KIND.get(group, group), code or OWN_CODE)
     points: dict[str, EntryPoint] = {point.name: point for point in _entry_points(group)}
     if name in points:
         return _load_point(points[name], where)
@@ -107,13 +127,102 @@ def _load_point(point: EntryPoint, where: str) -> Any:
         ) from error
 
 
-def _load_file(file: Path, name: str, where: str, kind: str) -> Any:
-    """From a person's own file."""
-    module = load_module(file, where, kind)
+def _load_file(file: Path, name: str, where: str, kind: str, code: Code) -> Any:
+    module = code.module(file, where, kind)
     try:
         return getattr(module, name)
     except AttributeError as error:
         raise _unloadable(f"{file}:{name}", where, kind, error) from error
+
+
+class _OwnCode:
+    """A person's own files, for programs that a person starts: see `load_module`."""
+
+    def module(self, file: Path, where: str, kind: str) -> ModuleType:
+        return load_module(file, where, kind)
+
+
+class _NoCode:
+    """No file, for programs that do what somebody else asks for."""
+
+    def module(self, file: Path, where: str, kind: str) -> ModuleType:
+        raise PluginError(
+            Problem(
+                where=where,
+                what=f"the {kind} is Python code, and this program executes no file",
+                value=str(file),
+                next_step="use it on the command line: `compd compare`, `compd diagnose`, `compd effect`",
+            )
+        )
+
+
+OWN_CODE: Code = _OwnCode()
+NO_CODE: Code = _NoCode()
+
+
+class ListedCode:
+    """Files that are listed with the SHA-256 of their content, wherever they are and whoever may write them.
+
+    A file that is not listed is not opened. What is executed are the bytes whose hash was computed.
+    """
+
+    def __init__(self, files: Mapping[str, str]) -> None:
+        """`files`: absolute path -> SHA-256 of the content, 64 small hexadecimal digits."""
+        self._files = dict(files)
+
+    def module(self, file: Path, where: str, kind: str) -> ModuleType:
+        listed = self._files.get(str(file))
+        if listed is None:
+            raise PluginError(
+                Problem(
+                    where=where,
+                    what=f"the {kind} is Python code that the machine configuration does not list",
+                    value=str(file),
+                    next_step="look at the file, then write under `effects:` of the configuration "
+                    f"`- {{file: {file}, sha256: {HASH_PLACE}}}` with the {HASH_PLACE} that `sha256sum {file}` prints, "
+                    "and let the daemon read its configuration anew (`systemctl reload compd`)",
+                )
+            )
+        try:
+            content = read_small_file(file, _LARGEST_CODE_BYTES)
+        except OSError as error:
+            raise PluginError(
+                Problem(
+                    where=where,
+                    what=f"cannot read the {kind}'s file: {error.strerror or error}",
+                    value=str(file),
+                    next_step="let the daemon's user read it",
+                )
+            ) from error
+        if (found := hashlib.sha256(content).hexdigest()) != listed:
+            raise PluginError(
+                Problem(
+                    where=where,
+                    what=f"the {kind}'s file has another content than the configuration lists",
+                    value=f"{file}: sha256 {found}",
+                    allowed=listed,
+                    next_step="look at what has changed, then write the new hash under `effects:` of the "
+                    "configuration, or restore the file",
+                )
+            )
+        module = ModuleType(_module_name(file))
+        module.__file__ = str(file)
+        sys.modules[module.__name__] = module
+        try:
+            exec(compile(content, str(file), "exec", dont_inherit=True), vars(module))
+        except (Exception, SystemExit) as error:
+            raise _unloadable(str(file), where, kind, error) from error
+        return module
+
+
+def hash_of_code(file: Path) -> str:
+    """The hash with which a file is listed. Raises OSError where it cannot be read."""
+    return hashlib.sha256(read_small_file(file, _LARGEST_CODE_BYTES)).hexdigest()
+
+
+def _module_name(file: Path) -> str:
+    """One name per path: its classes look their own module up by it (pydantic resolves annotations there)."""
+    return "compd_file_" + re.sub(r"\W", "_", str(file))
 
 
 def load_module(file: Path, where: str, kind: str) -> ModuleType:
@@ -131,8 +240,7 @@ def load_module(file: Path, where: str, kind: str) -> ModuleType:
         ) from error
     if problem is not None:
         raise PluginError(problem)
-    # one name per path: its classes look their own module up by it (pydantic resolves annotations there)
-    module_name = "compd_file_" + re.sub(r"\W", "_", str(file))
+    module_name = _module_name(file)
     spec = importlib.util.spec_from_file_location(module_name, real)
     if spec is None or spec.loader is None or not real.is_file():
         raise PluginError(Problem(where=where, what="not a Python file", value=str(file)))

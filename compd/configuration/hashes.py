@@ -74,7 +74,7 @@ def hash_of(configuration: object, fields: tuple[str, ...], without: tuple[str, 
             value = value.model_dump(mode="json")
         if isinstance(value, Mapping):
             return {k: plain(v) for k, v in _stated_options(value).items() if k not in without}
-        return [plain(v) for v in value] if isinstance(value, list) else value
+        return [plain(v) for v in value] if isinstance(value, list | tuple) else value
 
     text = json.dumps({name: plain(getattr(configuration, name)) for name in fields}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

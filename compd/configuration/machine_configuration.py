@@ -13,6 +13,7 @@ from pydantic import AfterValidator, Field, ValidationError
 
 from compd.configuration import crosscheck
 from compd.configuration.document import Document, Location, read_document
+from compd.configuration.effect_files import EffectFile, EffectFiles
 from compd.configuration.geometry import LINKS, Geometry, contradictions
 from compd.configuration.hashes import NOT_IN_ZERO, hash_of
 from compd.configuration.lines import LineSettings
@@ -65,9 +66,10 @@ SECTIONS: Mapping[str, Any] = {
     "limits": LimitSettings,
     "sockets": SocketSettings,
     "state": StateSettings,
+    "effects": EffectFiles,
 }
 # What stands for a section that the file does not have.
-OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings(), "votes": VoteSettings()}
+OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings(), "votes": VoteSettings(), "effects": ()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -102,6 +104,8 @@ class Configuration:
         Which lines are polled in processes of their own.
     votes : VoteSettings
         What the gauges say of each other.
+    effects : tuple of EffectFile
+        Python files whose effects the daemon may compute, each with its hash.
     warnings : tuple of Problem
         What can be used but is probably a mistake or a risk.
     document : Document or None
@@ -121,6 +125,7 @@ class Configuration:
     state: StateSettings
     acquisition: AcquisitionSettings = OPTIONAL_SECTIONS["acquisition"]
     votes: VoteSettings = OPTIONAL_SECTIONS["votes"]
+    effects: tuple[EffectFile, ...] = ()
     warnings: tuple[Problem, ...] = ()
     document: Document | None = field(default=None, compare=False)
 

@@ -50,6 +50,7 @@ _WHAT = {
 # What a pattern means; others are shown as they are.
 _PATTERNS = {
     "^/": "an absolute path, /...",
+    "^[0-9a-f]{64}$": "64 hexadecimal digits, as `sha256sum FILE` prints them",
     r"^[78][NEO][12]$": "data bits, parity, stop bits: 8N1, 7E2, ...",
     r"^[a-z][a-z0-9_]*_(degC|N|hPa|pct|mm|1)$": "small letters with a unit: temperature_room_degC, force_N, ...",
     r"^[A-Za-z0-9_]+(\.[A-Za-z0-9_]+)?$": "gauge or gauge.channel, of letters, digits and _",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import secrets
 import stat
@@ -73,25 +74,49 @@ def file_stamp(path: Path) -> tuple[int, int] | None:
 
 
 def read_small_file(path: Path, limit_bytes: int) -> bytes:
-    """The content of a regular file of at most `limit_bytes`; a pipe or a device is never waited for.
+    """The content of a regular file of at most `limit_bytes`; a pipe or a device is neither waited for nor opened.
 
     Raises OSError, also for what is no regular file, or is longer.
     """
-    return read_descriptor(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), limit_bytes)
+    return read_descriptor(open_regular(path), limit_bytes)
+
+
+def open_regular(path: Path, follow_link: bool = True) -> int:
+    """A descriptor of a regular file, open for reading; a pipe or a device is neither waited for nor opened.
+
+    follow_link : whether the last part of the path may be a symbolic link. Raises OSError.
+    """
+    _require_regular(path.stat(follow_symlinks=follow_link).st_mode)
+    flags = os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC | (0 if follow_link else os.O_NOFOLLOW)
+    return os.open(path, flags)
 
 
 def read_descriptor(descriptor: int, limit_bytes: int) -> bytes:
-    """What `read_small_file` does, for a file that is open; it is closed in any case."""
-    with open(descriptor, "rb") as file:
-        mode = os.fstat(descriptor).st_mode
-        if stat.S_ISDIR(mode):
-            raise IsADirectoryError(errno.EISDIR, "it is a directory")
-        if not stat.S_ISREG(mode):
-            raise OSError(errno.EINVAL, "it is not a regular file")
-        content = file.read(limit_bytes + 1)
-    if len(content) > limit_bytes:
-        raise OSError(errno.EFBIG, f"it has more than {limit_bytes} bytes")
-    return content
+    """What `read_small_file` does, for a file that is open; it is closed in any case.
+
+    It is read from its start, wherever whoever shares the descriptor has read to, and to where it ends now: a file
+    that the system makes while it is read, as those in /proc, has no length and is empty.
+    """
+    try:
+        status = os.fstat(descriptor)
+        _require_regular(status.st_mode)
+        if fcntl.fcntl(descriptor, fcntl.F_GETFL) & (os.O_ACCMODE | os.O_PATH) not in (os.O_RDONLY, os.O_RDWR):
+            raise OSError(errno.EBADF, "it is not open for reading")
+        if status.st_size > limit_bytes:
+            raise OSError(errno.EFBIG, f"it has more than {limit_bytes} bytes")
+        content = bytearray()
+        while piece := os.pread(descriptor, status.st_size - len(content), len(content)):
+            content += piece
+    finally:
+        os.close(descriptor)
+    return bytes(content)
+
+
+def _require_regular(mode: int) -> None:
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a directory")
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "it is not a regular file")
 
 
 def write_new_file(path: Path, content: Content) -> None:

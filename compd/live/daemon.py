@@ -20,6 +20,7 @@ import structlog
 
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
+from compd.configuration.effect_files import listed_code
 from compd.configuration.lines import powered
 from compd.configuration.pushed_lines import PushedLineSettings
 from compd.errors import DaemonError, StateError
@@ -85,7 +86,7 @@ class Daemon:
         clock = clock or MonotonicClock()
         self.configuration = configuration
         gauges = configuration.gauge_objects()
-        pipeline = build_pipeline(configuration, gauges)
+        pipeline = build_pipeline(configuration, gauges, listed_code(configuration.effects))
         self.period_s = pipeline.settings.period_s
         self.latest, self._wires = pipeline.latest, pipeline.wires
         models = _first_models(configuration, pipeline.loader)
@@ -149,7 +150,7 @@ class Daemon:
         last_readings = LastReadings(Path(configuration.state.directory), configuration.zero_hash, self.trust, clock)
         if before is None or before.trust is not self.trust:
             last_readings.recall()
-        model_switch = ModelSwitch(self.control)
+        model_switch = ModelSwitch(self.control, self.setpoints.wake_reader, clock)
         version: dict[str, Any] = {
             "class": "VERSION",
             "protocol": PROTOCOL,
@@ -192,6 +193,7 @@ class Daemon:
                 access,
                 clock,
                 self._poll_requests.add,
+                publisher.tell_order,
             )
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}

@@ -14,6 +14,7 @@ from compd.live.loop.tip_uncertainty import declared_noise
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.machine_builder import build_model
+from compd.plugins import OWN_CODE, Code
 
 
 class Pipeline(NamedTuple):
@@ -32,8 +33,11 @@ class Pipeline(NamedTuple):
         return self.settings.wires
 
 
-def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]]) -> Pipeline:
-    """`gauges`: those of the configuration, by name. Raises KinematicsError for a geometry that is impossible."""
+def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]], code: Code = OWN_CODE) -> Pipeline:
+    """`gauges`: those of the configuration, by name; `code`: which Python files effects may be in.
+
+    Raises KinematicsError for a geometry that is impossible.
+    """
     channels = {name: [f"{name}.{channel.name}" for channel in gauge.channels] for name, gauge in gauges.items()}
     latched = [
         [channel for name in channels if configuration.gauges[name].line == line for channel in channels[name]]
@@ -43,7 +47,7 @@ def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]
     latest = Latest(list(chain.from_iterable(channels.values())), latched)
     wires = MachineWires(configuration, latest)
     model = build_model(configuration.geometry, configuration.wiring)
-    loader = ModelLoader(model, configuration.machine, configuration.geometry_hash, wires)
+    loader = ModelLoader(model, configuration.machine, configuration.geometry_hash, wires, code)
     settings = CycleSettings(
         without_effects=Models(loader.without_effects),
         wires=wires,

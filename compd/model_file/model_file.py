@@ -26,6 +26,7 @@ from compd.model_file.model_document import (
     read_document,
     write_stored,
 )
+from compd.plugins import OWN_CODE, Code
 from compd.tables import Columns, data_frame, html_table
 
 if TYPE_CHECKING:
@@ -184,13 +185,19 @@ class ModelFile:
 
 
 def read_model_file(
-    path: Path, machine: str, links: int | None, geometry: str = "", content: bytes | None = None
+    path: Path,
+    machine: str,
+    links: int | None,
+    geometry: str = "",
+    content: bytes | None = None,
+    code: Code = OWN_CODE,
 ) -> ModelFile:
     """Read a model file for the machine of this name with so many links.
 
     links : 0 for an external model of a tip; None for an external model, of as many links as the file has numbers of.
     geometry : hash of the machine's geometry, where numbers that were fitted on another one are of no use.
     content : of the file, where it has been read already.
+    code : which Python files its effects may be in; by default a person's own.
     Raises StateError with every problem: what `read_stored` refuses, another machine, an effect that is not
     installed, numbers that are missing.
     """
@@ -220,7 +227,7 @@ def read_model_file(
     for number, entry in enumerate(document.effects, start=1):
         where = f"{path}, effect {number}"
         try:
-            found.append((find_effect(entry.effect, where), entry, where))
+            found.append((find_effect(entry.effect, where, code=code), entry, where))
         except CompdError as error:
             problems += error.problems
     if links is None:

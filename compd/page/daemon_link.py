@@ -82,6 +82,8 @@ class DaemonLink:
         while True:
             async with asyncio.timeout(SILENT_AFTER_S):  # wait_for of Python 3.11 may lose a cancellation
                 message = await stream.read()
+            if message["class"] != "READINGS":  # an order stands among them
+                continue
             async with self.news:
                 self.readings = message
                 if not self.connected:

@@ -1,15 +1,20 @@
-"""The model files that the page offers: those in one directory, and those that the daemon runs with.
+"""The model files that the page offers: those in one directory. What the daemon runs with is shown beside them.
 
-A browser names one by its place in this list, and the page finds the file. An absolute path is passed on to the daemon,
-which reads it as it does for `compd adopt`; the page itself never opens, nor looks for, a file that a browser names.
+A browser names one by its place in this list, and the page opens that file, where it is a regular file and no link. No
+path from a browser is opened, nor one that the daemon tells: what a model is called there, some client has said.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+
+from compd.configuration.yaml_reader import LARGEST_BYTES
+from compd.files.atomic_files import open_regular, read_descriptor
+from compd.page.recordings import is_own
 
 # As `compd effect add --model my.model.yaml` writes them; copies beside recordings end otherwise.
 PATTERN = "*model.yaml"
@@ -26,30 +31,43 @@ class ModelFiles:
         self.directory = directory
 
     def listed(self, models: Message | None) -> list[dict[str, Any]]:
-        """Each as `name`, `changed` and `runs`: "applied", "shadow", both, or nothing. `models`: the message MODEL."""
-        return [
-            {"name": name, "changed": _changed(path), "runs": " and ".join(_runs(path, models))}
-            for name, path in self._paths(models).items()
-        ]
+        """Each as `name`, `changed`, `offered` and `runs`: "applied", "shadow", both, or nothing.
 
-    def path_of(self, subject: str, models: Message | None) -> str | None:
-        """The path of a listed name, or the absolute path that `subject` is; None for anything else."""
-        if subject.startswith("/"):
-            return subject
-        path = self._paths(models).get(subject)
-        return None if path is None else str(path)
-
-    def _paths(self, models: Message | None) -> dict[str, Path]:
+        models : the message MODEL. What runs and is not in the directory is listed and not offered.
+        """
         paths = {path.name: path for path in self._in_directory()}
+        own = len(paths)
         for role, path in _running(models):
             if path not in paths.values():
                 paths[f"{role}: {path.name}"] = path
-        return paths
+        return [
+            {
+                "name": name,
+                "changed": _changed(path) if number < own else None,
+                "offered": number < own,
+                "runs": " and ".join(_runs(path, models)),
+            }
+            for number, (name, path) in enumerate(paths.items())
+        ]
+
+    def path_of(self, name: str) -> Path | None:
+        """The path of a name that is offered; None for anything else."""
+        return next((path for path in self._in_directory() if path.name == name), None)
 
     def _in_directory(self) -> list[Path]:
         if self.directory is None:
             return []
-        return sorted(path for path in self.directory.glob(PATTERN) if path.is_file())[:MOST]
+        return sorted(path for path in self.directory.glob(PATTERN) if is_own(path))[:MOST]
+
+
+def opened(path: Path) -> int:
+    """A descriptor of an offered file. Raises OSError, also where a link has taken the file's place."""
+    return open_regular(path, follow_link=False)
+
+
+def hash_of_file(path: Path) -> str:
+    """Hash of an offered file as the daemon tells it. Raises OSError."""
+    return hashlib.sha256(read_descriptor(opened(path), LARGEST_BYTES)).hexdigest()[:16]
 
 
 def _running(models: Message | None) -> Iterator[tuple[str, Path]]:
@@ -63,7 +81,7 @@ def _runs(path: Path, models: Message | None) -> list[str]:
 
 
 def _changed(path: Path) -> str | None:
-    """None where the file is gone: the daemon has read it, and goes on."""
+    """None where the file is gone."""
     try:
         return datetime.fromtimestamp(path.stat().st_mtime, UTC).isoformat(timespec="seconds")
     except OSError:

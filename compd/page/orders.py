@@ -7,22 +7,28 @@ a browser that is armed.
 from __future__ import annotations
 
 import asyncio
+import os
+import re
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from compd.client import Client, connect
 from compd.errors import DaemonError, Problem
 from compd.gauge import Quality
 from compd.page.daemon_link import DaemonLink
-from compd.page.model_files import ModelFiles
+from compd.page.model_files import ModelFiles, hash_of_file, opened
 from compd.units import UM_PER_MM
 
 # Reading a model file takes a second; an effect of a person's own may import what it likes.
 _TIMEOUT_S = 30.0
+# Of a model, as the daemon tells it.
+_HASH = re.compile("[0-9a-f]{16}")
+_NO_HASH = "the model that runs as a shadow is adopted, and named by its hash"
 _NOT_OFFERED = "this is none of the model files in the list"
-_NAME_IT = "choose one of them, or give the absolute path of another"
+_NAME_IT = "choose one of them; another one is given on the command line"
 
 
 @dataclass(frozen=True)
@@ -52,8 +58,8 @@ class Orders:
         self._calls: Mapping[str, Callable[[Client, str], Mapping[str, Any]]] = {
             "zero": lambda client, subject: client.zero(replace=subject == "replace"),
             "accept": lambda client, subject: client.accept(subject),
-            "shadow": lambda client, subject: client.model(subject, shadow=True),
-            "adopt": lambda client, subject: client.model(_shadowed(client.model(), subject)),
+            "shadow": self._run_shadow,
+            "adopt": lambda client, subject: client.adopt_shadow(subject),
             "no-model": lambda client, subject: client.model(""),
         }
 
@@ -61,20 +67,45 @@ class Orders:
         return name in self._calls
 
     def consequence(self, name: str, subject: str) -> Consequence:
-        """Of the order `name` for a gauge (`accept`) or a model file (`shadow`, `adopt`)."""
+        """Of the order `name` for a gauge (`accept`) or a listed model file (`shadow`, `adopt`)."""
         if not self._link.connected:
             return Consequence(False, f"The daemon is not there: {self._link.reason}.", "")
         return self._consequences[name](subject)
 
-    async def do(self, name: str, subject: str) -> Mapping[str, Any]:
-        """Give the order to the daemon; its answer. Raises DaemonError, also for a model file that is not offered."""
-        if name == "adopt" or (name == "shadow" and subject):
-            subject = self._file(subject)
-        return await asyncio.to_thread(self._ask, name, subject)
+    async def do(self, name: str, subject: str, by: str = "") -> Mapping[str, Any]:
+        """Give the order to the daemon; its answer.
 
-    def _ask(self, name: str, subject: str) -> Mapping[str, Any]:
-        with connect(self._link.path, _TIMEOUT_S) as client:
+        subject : of `adopt` the hash of the shadow, as its consequence says it. by : for whom, for the daemon's log.
+        Raises DaemonError, also for a model file that is not offered; the daemon is not asked then.
+        """
+        if name == "shadow" and subject:
+            self._path(subject)
+        if name == "adopt" and not _HASH.fullmatch(subject):
+            raise DaemonError(Problem(where="page", what=_NO_HASH, value=subject))
+        return await asyncio.to_thread(self._ask, name, subject, by)
+
+    def _ask(self, name: str, subject: str, by: str) -> Mapping[str, Any]:
+        with connect(self._link.path, _TIMEOUT_S, by=by) as client:
             return self._calls[name](client, subject)
+
+    def _run_shadow(self, client: Client, subject: str) -> Mapping[str, Any]:
+        if not subject:
+            return client.model("", shadow=True)
+        path = self._path(subject)
+        try:
+            descriptor = opened(path)
+        except OSError as error:
+            raise DaemonError(Problem(where=str(path), what=f"cannot be read: {error.strerror or error}")) from error
+        try:
+            return client.model(path, shadow=True, descriptor=descriptor)
+        finally:
+            os.close(descriptor)
+
+    def _path(self, subject: str) -> Path:
+        """Of an offered model file. Raises DaemonError for any other name."""
+        if (path := self._files.path_of(subject)) is None:
+            raise DaemonError(Problem(where="page", what=_NOT_OFFERED, value=subject, next_step=_NAME_IT))
+        return path
 
     def _command(self, *words: str) -> str:
         return shlex.join(["compd", *words])
@@ -103,43 +134,49 @@ class Orders:
         text = "What it shows from now on is taken as it is. Look at the gauge, and reference it, first. "
         return Consequence(True, text + "; ".join(lines), command)
 
-    def _file(self, subject: str) -> str:
-        """The path of a model file that a browser names. Raises DaemonError where it is none that may be named."""
-        path = self._files.path_of(subject, self._link.models)
-        if path is None:
-            raise DaemonError(Problem(where="page", what=_NOT_OFFERED, value=subject, next_step=_NAME_IT))
-        return path
-
     def _shadow(self, subject: str) -> Consequence:
         if not subject:
             command = self._command("shadow", "--none", "--daemon", self._link.path)
             return Consequence(True, "No model runs beside the applied one any more.", command)
-        path = self._files.path_of(subject, self._link.models)
-        command = self._command("shadow", path or subject, "--daemon", self._link.path)
+        path = self._files.path_of(subject)
+        command = self._command("shadow", "FILE" if path is None else str(path), "--daemon", self._link.path)
         if path is None:
             return Consequence(False, f"{_NOT_OFFERED}: {_NAME_IT}.", command)
-        text = "The daemon reads and tries the file. It is computed beside the applied model; nothing of it reaches "
-        return Consequence(True, text + "the machine.", command, path)
+        text = "The daemon tries the file. It is computed beside the applied model; nothing of it reaches the machine."
+        return Consequence(True, text, command)
 
     def _adopt(self, subject: str) -> Consequence:
-        """Of the model that runs as a shadow: its correction is known."""
-        shadow_file = str((self._link.models or {}).get("shadow", {}).get("file", ""))
-        path = self._files.path_of(subject, self._link.models) if subject else shadow_file
-        command = self._command("adopt", path or subject or "FILE", "--daemon", self._link.path)
-        if path is None:
-            return Consequence(False, f"{_NOT_OFFERED}: {_NAME_IT}.", command)
-        try:
-            _shadowed(self._link.models or {}, path)
-        except DaemonError as error:
-            return Consequence(False, f"{explained(error)}.", command)
+        """Of the model that runs as a shadow: its correction is known. subject : its file's name, its hash, or ""."""
+        running = (self._link.models or {}).get("shadow", {})
+        file, hash_ = str(running.get("file", "")), str(running.get("model", ""))
+        command = self._command("adopt", file or "FILE", "--daemon", self._link.path)
+        if why := self._is_another(subject, hash_):
+            return Consequence(False, why, command)
         setpoint = (self._link.readings or {}).get("setpoint", {})
         shadow = setpoint.get("shadow", {})
         if "correction_mm" not in shadow or "sources_mm" not in setpoint:
             why = shadow.get("reason") or "there is no valid setpoint to compare it with"
             return Consequence(False, f"What it would change is not known: {why}.", command)
         asked_mm = [sum(parts) for parts in zip(*setpoint["sources_mm"].values(), strict=True)]
-        text = f"{path}: {self._change(asked_mm, shadow['correction_mm'])}"
-        return Consequence(True, text, command, path)
+        text = f"{file} ({hash_}): {self._change(asked_mm, shadow['correction_mm'])}"
+        return Consequence(True, text, command, hash_)
+
+    def _is_another(self, subject: str, hash_: str) -> str:
+        """Why `subject` is not the model that runs as a shadow and has this hash; "" where it is.
+
+        Only of the shadow it has been seen what it does.
+        """
+        if not hash_:
+            return "No model runs as a shadow: let one run first, so that its effect is known."
+        if subject in ("", hash_):
+            return ""
+        if (path := self._files.path_of(subject)) is None:
+            return f"{_NOT_OFFERED}: {_NAME_IT}."
+        try:
+            same = hash_of_file(path) == hash_
+        except OSError as error:
+            return f"{path} cannot be read: {error.strerror or error}."
+        return "" if same else f"{path}, as it is now, does not run as a shadow: let it run first."
 
     def _no_model(self, subject: str) -> Consequence:
         command = self._command("adopt", "--none", "--daemon", self._link.path)
@@ -167,23 +204,6 @@ class Orders:
     def _largest_um(self) -> float:
         setpoint = (self._link.readings or {}).get("setpoint", {})
         return max((abs(value) * UM_PER_MM for value in setpoint.get("correction_mm", ())), default=0.0)
-
-
-def _shadowed(models: Mapping[str, Any], file: str) -> str:
-    """`file`, where it is the shadow's among the models of a MODEL message: only the shadow's effect has been seen.
-
-    Raises DaemonError where it is another's.
-    """
-    running = str(models.get("shadow", {}).get("file", ""))
-    if not running or file != running:
-        raise DaemonError(
-            Problem(
-                where="adopt",
-                what=f"{running} runs as a shadow, not {file}" if running else "no model runs as a shadow",
-                next_step="let the model run as a shadow first, so that its effect is known",
-            )
-        )
-    return file
 
 
 def explained(error: DaemonError) -> str:

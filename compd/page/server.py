@@ -57,7 +57,7 @@ class Server:
         """
         self._link = link
         self._recordings = recordings
-        self._models = ModelFiles(models)
+        self._models = ModelFiles(models or recordings.directory)
         self._orders = Orders(link, self._models)
         self._browsers = Browsers(clock or MonotonicClock())
         self._broadcast = Broadcast(link, self._browsers, recordings)

@@ -95,7 +95,8 @@ def _section(name: str) -> str:
         blocks.append(f"Value: {schema.type_text(schema.schema)}.")
     for model, path in paths.items():
         blocks += [
-            heading(3, code(path), target("configuration", path)),
+            # the entries of a list stand under the section itself
+            *([heading(3, code(path), target("configuration", path))] if path != name else []),
             escape(schema.description(schema.definitions[model])),
             keys_table(schema.keys(model)),
         ]

@@ -69,7 +69,9 @@ class Connection:
 
 @cache
 def exchanges() -> Mapping[str, Exchange]:
-    """One exchange for every request, by its class, and one each for VERSION unasked, SETPOINT and ERROR."""
+    """One exchange for every request, by its class, and one each for VERSION unasked, SETPOINT, ORDER and
+    ERROR.
+    """
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
         directory = Path(temporary)
         tripod = shipped_configuration("tripod-cmm.yaml")
@@ -133,6 +135,8 @@ def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
         "MODEL": client.ask({"class": "MODEL"}, "MODEL"),
         "READINGS": client.ask({"class": "WATCH", "what": "readings", "rate_hz": 1}, "WATCH", "READINGS"),
     }
+    other.ask({"class": "POLL", "gauge": "scale_1", "by": "anna, night shift"}, "POLL")
+    talk["ORDER"] = Exchange(None, (client.next("ORDER"),))
     # a request with no part in this talk is asked as it is, without keys
     answers = {name: kind.reply.wire_name for name, kind in REQUESTS.items() if kind.reply and name not in talk}
     return talk | {name: other.ask({"class": name}, answer) for name, answer in answers.items()}

@@ -13,6 +13,7 @@ from compd.live.service.message_keys.readings import ReadingsKeys
 from compd.live.service.message_keys.setpoint import SetpointKeys
 from compd.live.service.message_keys.status import StatusKeys
 from compd.live.service.messages import LARGEST_NUMBER, MAX_LINE_BYTES, PROTOCOL, ErrorCode
+from compd.live.service.order import OrderKeys
 from compd.live.service.request import Asker, Request
 from compd.live.service.requests import REQUESTS
 from compd.live.service.seats import AUTH_WITHIN_S, IDLE_AFTER_S, MAX_CLIENTS, MAX_TCP_CLIENTS
@@ -24,6 +25,7 @@ from docs.generate.schema import Key, ModelSchema
 SENT: dict[type[SentMessage], tuple[str, ...]] = {
     SetpointKeys: (),
     ReadingsKeys: ("carried", "setpoint"),
+    OrderKeys: (),
     StatusKeys: (),
     VersionKeys: (),
     ErrorKeys: (),
@@ -76,7 +78,7 @@ before them: who asks without end waits for the answers, and delays nobody else'
 **Show the token first** where one is [configured](#configuration-sockets-tcp): a TCP client is then greeted by `AUTH`
 in place of `VERSION`.
 
-**Answers come in the order of the questions**, except `ZERO`, `MODEL` with a file, and setpoints, which come when they
+**Answers come in the order of the questions**, except `ZERO`, `MODEL` that changes models, and setpoints, which come when they
 are there. A message that cannot be followed is answered by [`ERROR`](#protocol-error), and the connection stays.
 """
 PACKET = f"""\

@@ -142,6 +142,7 @@ class Service:
                 access=TcpAccess.of(sockets.tcp),
                 clock=self.clock,
                 poll=self.poll_requests.add,
+                tell_order=self.publisher.tell_order,
             )
         )
         self.stopping = threading.Event()

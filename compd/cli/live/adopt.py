@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,17 +33,34 @@ def adopt(file: FileArgument = None, daemon: DaemonOption = DEFAULT_SOCKET, none
 def ask_daemon(file: Path | None, daemon: str, none: bool, shadow: bool) -> dict[str, Any]:
     """Ask the daemon to take a model file, or with None what it runs with; print and return its answer."""
     from compd.client import connect
+    from compd.errors import DaemonError
 
     if none and file is not None:
         raise typer.BadParameter("name a model file, or --none")
-    # the daemon has another working directory
-    wanted = "" if none else None if file is None else str(file.absolute())
+    wanted = "" if none else file
     with connect(unix_address(daemon), _TIMEOUT_S) as client:
-        answer = client.model(wanted, shadow)
+        try:
+            answer = client.model(wanted, shadow)
+        except DaemonError as error:
+            problems = [replace(problem, what=_with_hashes(problem.what)) for problem in error.problems]
+            raise DaemonError(problems) from None
     typer.echo(f"applied: {_model_text(answer['applied'])}")
     if "shadow" in answer:
         typer.echo(f"shadow:  {_model_text(answer['shadow'])}")
     return answer
+
+
+def _with_hashes(text: str) -> str:
+    """A refusal of the daemon, with the hash of each Python file in it that is not listed and can be read here."""
+    from compd.plugins import HASH_PLACE, hash_of_code
+
+    def line(match: re.Match[str]) -> str:
+        try:
+            return f"{{file: {match['file']}, sha256: {hash_of_code(Path(match['file']))}}}"
+        except OSError:
+            return match[0]
+
+    return re.sub(rf"\{{file: (?P<file>/.+?\.py), sha256: {HASH_PLACE}\}}", line, text)
 
 
 def _model_text(model: Mapping[str, Any]) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -19,7 +20,7 @@ def replay(
 ) -> None:
     """Compute a recorded run again and compare its setpoints with those that were sent, bit for bit.
 
-    Exit code 1 when one differs, or when rows of the CSV have no cycle.
+    Orders that clients gave meanwhile are listed. Exit code 1 when one differs, or when rows of the CSV have no cycle.
     """
     from compd.configuration import load
     from compd.live.record.replay import RecordedCycles, ReplayedCycle, replay_cycles
@@ -35,6 +36,8 @@ def replay(
             first = first or cycle
         if setpoints:
             typer.echo(cycle.replayed, nl=False)
+    for order in transcripts.orders:
+        typer.echo(_order_text(order), err=True)
     if transcripts.torn_lines:
         typer.echo(f"{transcripts.torn_lines} torn line at the end left out: the recorder was killed", err=True)
     lacking = transcripts.rows_without_cycle()
@@ -54,3 +57,10 @@ def replay(
     if others:
         typer.echo(another, err=True)
     raise typer.Exit(1)
+
+
+def _order_text(order: Mapping[str, Any]) -> str:
+    """One line: when, what, who, and whether it was done."""
+    words = [f"order at {order.get('time_s', 0):.3f} s:", order.get("order", ""), order.get("subject", "")]
+    words += ["from", order.get("client", "?"), f"({order['by']})" if order.get("by") else ""]
+    return " ".join(filter(None, map(str, words))) + ("" if order.get("done") else ", refused")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -19,7 +18,6 @@ from compd.compensation.values import GaugeValues, WarmStart
 from compd.configuration.yaml_reader import LARGEST_BYTES
 from compd.errors import Problem, StateError
 from compd.files.atomic_files import read_small_file
-from compd.files.file_trust import own_users, trust_problem
 from compd.live.loop.wiring import MachineWires, WiredValues, Wires
 from compd.live.memory.latest import Snapshot
 from compd.model.effect import FittedEffect
@@ -27,6 +25,7 @@ from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import available_settings
 from compd.model_file.model_file import read_model_file
+from compd.plugins import OWN_CODE, Code
 
 _HASH_DIGITS = 16
 
@@ -34,7 +33,7 @@ _HASH_DIGITS = 16
 class ModelText(NamedTuple):
     """A model file as it was read. A loop that takes over uses the same, whatever has become of the file.
 
-    file : its path. content : its bytes.
+    file : its path, or what a client calls it. content : its bytes.
     """
 
     file: str
@@ -46,39 +45,18 @@ class ModelText(NamedTuple):
         try:
             return cls(str(path), read_small_file(path, LARGEST_BYTES))
         except OSError as error:
-            raise _unreadable(path, error) from error
-
-    @classmethod
-    def read_owned(cls, path: Path, user: int) -> Self:
-        """Read a file that a client names; besides root and the daemon's user, `user` may own it.
-
-        Raises StateError as `read` does, and where somebody else could have put another file in its place.
-        """
-        try:
-            real = path.resolve(strict=True)
-            if not real.is_file():
-                raise OSError(errno.EINVAL, "it is not a regular file")
-            problem = trust_problem(real, str(path), "model", own_users() | {user})
-        except (OSError, RuntimeError) as error:  # RuntimeError: a loop of symbolic links
-            raise _unreadable(path, error) from error
-        if problem is not None:
-            raise StateError(problem)
-        return cls(str(path), cls.read(real).content)
+            raise StateError(
+                Problem(
+                    where=str(path),
+                    what=f"cannot be read: {error.strerror or error}",
+                    next_step="give the absolute path of a model file that the daemon's user may read",
+                )
+            ) from error
 
     @property
     def hash(self) -> str:
         """First digits of the SHA-256 of its content."""
         return hashlib.sha256(self.content).hexdigest()[:_HASH_DIGITS]
-
-
-def _unreadable(path: Path, error: Exception) -> StateError:
-    return StateError(
-        Problem(
-            where=str(path),
-            what=f"cannot be read: {getattr(error, 'strerror', None) or error}",
-            next_step="give the absolute path of a model file that the daemon's user may read",
-        )
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,12 +140,16 @@ class Models(NamedTuple):
 class ModelLoader:
     """Reads model files for one machine, and refuses those that cannot be used live."""
 
-    def __init__(self, model: MachineModel, machine: str, geometry: str, wires: MachineWires) -> None:
-        """`model`: without effects; `machine`: the name in its configuration; `geometry`: the hash of its geometry."""
+    def __init__(
+        self, model: MachineModel, machine: str, geometry: str, wires: MachineWires, code: Code = OWN_CODE
+    ) -> None:
+        """`model`: without effects; `machine`: the name in its configuration; `geometry`: the hash of its geometry;
+        `code`: which Python files effects may be in."""
         self.without_effects = LiveModel(model, (), wires.quantity_wires(()))
         self._machine = machine
         self._geometry = geometry
         self._wires = wires
+        self._code = code
 
     def read(self, path: Path) -> LiveModel:
         """The model in a file.
@@ -182,7 +164,7 @@ class ModelLoader:
         if text is None:
             return self.without_effects
         model = self.without_effects.machine
-        file = read_model_file(Path(text.file), self._machine, model.links, self._geometry, text.content)
+        file = read_model_file(Path(text.file), self._machine, model.links, self._geometry, text.content, self._code)
         if problems := [*self._unmet_needs(file.fitted), *_id_and_value_problems(file.fitted)]:
             raise StateError(problems)
         machine = replace(model, effects=file.fitted, covariance=file.covariance)

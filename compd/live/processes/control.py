@@ -6,10 +6,13 @@ import os
 import select
 from enum import IntEnum
 
+from compd.configuration.yaml_reader import LARGEST_BYTES
 from compd.live.memory.shared_array import shared_counters
 from compd.live.memory.shared_message import SharedMessage
 
 _TEXT_BYTES = 4096
+# Beside the bytes of a model file: its name.
+_USUAL_BYTES = 64 * 1024
 
 _PHASE, _TURN, _SUCCESSOR, _SERVICE_BEAT = range(4)
 
@@ -35,7 +38,8 @@ class Control:
     realtime : what the system granted to the loop. Written by the loop that has the turn.
     processes : STATUS's part about the processes. Written by the supervisor.
     headline : one line about the machine's state, for the service manager. Written by the service.
-    model_request : (number, file, whether as the shadow, user who asks). Written by the service.
+    model_request : (number, text of a model file or None, whether as the shadow, hash of a shadow to apply or "").
+        Written by the service.
     model_answer : (number, summary of the models, "") or (number, None, why not). Written by the successor; by the
         supervisor where that has ended.
     supervisor_woken, turn_given : event descriptors.
@@ -48,7 +52,7 @@ class Control:
         self.realtime = SharedMessage()
         self.processes = SharedMessage()
         self.headline = SharedMessage(_TEXT_BYTES)
-        self.model_request = SharedMessage()
+        self.model_request = SharedMessage(LARGEST_BYTES + _USUAL_BYTES)
         self.model_answer = SharedMessage()
         self.supervisor_woken = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self.turn_given = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)

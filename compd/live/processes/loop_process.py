@@ -8,13 +8,12 @@ between two ticks.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import structlog
 
 from compd.clock import Clock
 from compd.configuration.operation import LoopSettings
-from compd.errors import CompdError
+from compd.errors import CompdError, Problem, StateError
 from compd.live import realtime
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
@@ -54,14 +53,19 @@ def wake_latency_us(settings: LoopSettings) -> int | None:
 class ModelChange:
     """A change of models that a client asks for.
 
-    number : of the request. file : "" for none. shadow : whether it is to be computed beside the applied one.
-    user : number of the user who asks; the file must be theirs, the daemon's user's or root's.
+    number : of the request. text : of the model file; None for none. shadow : whether it is to be computed beside the
+    applied one. hash : of the model that runs as the shadow and is to be applied; "" where `text` counts.
     """
 
     number: int
-    file: str
+    text: ModelText | None
     shadow: bool
-    user: int = 0
+    hash: str = ""
+
+    @property
+    def name(self) -> str:
+        """What is asked for, for the log."""
+        return self.hash or ("none" if self.text is None else self.text.file)
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ class LoopProcess:
             self._try_cycles(self._state_left(before, forget=False))
         except (Exception, SystemExit) as error:  # noqa: BLE001  an effect of a user's own may do anything
             reason = str(error) if isinstance(error, CompdError | ValueError) else f"{type(error).__name__}: {error}"
-            _log.warning("model refused", file=request.file, reason=reason)
+            _log.warning("model refused", file=request.name, reason=reason)
             self.answer(request.number, None, reason)
             return
         realtime.use_fifo(self.settings.loop.priority)
@@ -125,9 +129,9 @@ class LoopProcess:
 
     def _models_wanted(self, before: Models, request: ModelChange) -> Models:
         """The pair of applied model and shadow with the new one (none: no effects, or no shadow) in its place."""
-        model: LiveModel | None = (
-            self.loader.load(ModelText.read_owned(Path(request.file), request.user)) if request.file else None
-        )
+        if request.hash:
+            return _shadow_applied(before, request.hash)
+        model: LiveModel | None = None if request.text is None else self.loader.load(request.text)
         if request.shadow:
             return Models(before.applied, model)
         if model is not None and before.shadow is not None and model.hash == before.shadow.hash:
@@ -200,3 +204,19 @@ class LoopProcess:
             _log.warning("the last cycle cannot be computed again", error=f"{type(error).__name__}: {error}")
             return bare
         return left
+
+
+def _shadow_applied(models: Models, hash_: str) -> Models:
+    """The shadow in the place of the applied model. Raises StateError where none of this hash runs as the shadow."""
+    shadow = models.shadow
+    if shadow is None or shadow.hash != hash_:
+        raise StateError(
+            Problem(
+                where="shadow",
+                what="no model of this hash runs as the shadow",
+                value=hash_,
+                allowed="none runs" if shadow is None else shadow.hash,
+                next_step="let the model run as the shadow, and look at it, before it is applied",
+            )
+        )
+    return Models(shadow)

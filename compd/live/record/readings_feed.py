@@ -27,7 +27,7 @@ class ReadingsClient(Protocol):
 
 
 class FeedItem(NamedTuple):
-    """One READINGS message, the line in which it came, and the VERSION and WATCH of the connection."""
+    """One READINGS or ORDER message, the line in which it came, and the VERSION and WATCH of the connection."""
 
     first_messages: tuple[Message, Message]
     line: bytes

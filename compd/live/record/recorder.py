@@ -9,7 +9,8 @@ A recording is written in parts, NAME-0001, NAME-0002 ..., each complete in itse
     NAME-0001.csv           one row per cycle in the recording format: readings less machine zero; or NAME-0001.parquet,
                             which is NAME-0001.arrow until the part is closed
     NAME-0001.yaml          its sidecar; `provenance` holds machine zero and signs: raw = zero + sign * column
-    NAME-0001.cycles.jsonl  the daemon's messages as they came, byte for byte, for `compd replay`
+    NAME-0001.cycles.jsonl  the daemon's messages as they came, byte for byte, for `compd replay`; among them an ORDER
+                            for each order that a client gave, with who gave it
     NAME-0001.model-*.yaml  copies of the model files that were applied or ran as the shadow
 
 A new part begins when machine zero is taken anew, since the columns of a part have one zero, and when the daemon has
@@ -32,7 +33,7 @@ from compd.clock import Clock
 from compd.errors import CompdError, Problem, RecordingError, StateError
 from compd.live.record.part_table import close_left_parts
 from compd.live.record.readings_feed import FeedItem
-from compd.live.record.recording_part import Message, RecordingPart
+from compd.live.record.recording_part import ORDER, Message, RecordingPart
 from compd.recording.table_file import PARQUET
 from compd.recording.tables.parquet_table import arrow_modules
 from compd.recording.tables.table_format import TableFormat
@@ -140,6 +141,9 @@ class Recorder:
         for first_messages, line, message in items:
             if first_messages is not self._first_messages:
                 self._first_messages, last_seq = first_messages, None
+            if message.get("class") == ORDER:
+                self._waiting.append(FeedItem(first_messages, line, message))
+                continue
             if last_seq is not None and self._every_cycle:
                 self.missing += message["seq"] - last_seq - 1
             last_seq = message["seq"]
@@ -207,6 +211,10 @@ class Recorder:
         while self._waiting:
             item = self._waiting.popleft()
             message = item.message
+            if message.get("class") == ORDER:
+                if self._parts:
+                    self._parts[-1].add_order(item.line)
+                continue
             if "zero" not in message and self._parts:
                 self._leave_out()
                 continue

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from compd.files.atomic_files import sync_directory, write_new_file
+from compd.configuration.yaml_reader import LARGEST_BYTES
+from compd.files.atomic_files import read_small_file, sync_directory, write_new_file
 from compd.live.record.appended_file import AppendedFile
 from compd.live.record.part_table import Row, part_table
 from compd.recording.columns import SKEW_COLUMN, approach_columns, decimals
@@ -20,6 +21,8 @@ Message = Mapping[str, Any]
 
 CYCLES_SUFFIX = ".cycles.jsonl"
 MODEL_MARK = ".model-"
+# Class of the messages that stand among the READINGS and have no row.
+ORDER = "ORDER"
 
 
 class RecordingPart:
@@ -102,6 +105,10 @@ class RecordingPart:
         self._table.add(self._row(message))
         self._rows_added += 1
 
+    def add_order(self, line: bytes) -> None:
+        """Append an ORDER line as it came; it has no row."""
+        self._cycles.add(line)
+
     def copy_model(self, hash_: str, file: Path) -> str:
         """Copy a model file beside the part, once. Returns what is wrong with the file, "" where nothing is.
 
@@ -111,9 +118,10 @@ class RecordingPart:
             return ""
         self._models[hash_] = self._stem.with_name(f"{self._stem.name}{MODEL_MARK}{hash_}.yaml")
         try:
-            content = file.read_bytes()
+            # the path is what a client called the file
+            content = read_small_file(file, LARGEST_BYTES)
         except OSError as error:
-            return f"cannot be read: {error.strerror}"
+            return f"cannot be read: {error.strerror or error}"
         if not hashlib.sha256(content).hexdigest().startswith(hash_):
             return "has changed since the daemon read it"
         self._write_complete(self._models[hash_], content)

@@ -13,7 +13,7 @@ from compd.errors import Problem, RecordingError
 from compd.live.loop.cycle import step
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.pipeline import build_pipeline
-from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, Message
+from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER, Message
 from compd.live.service.readings_message import RecordedCycle, parse_readings
 from compd.recording.columns import SKEW_COLUMN
 from compd.recording.open_part import ARROW, OpenPart
@@ -21,6 +21,8 @@ from compd.recording.table_file import CSV, SUFFIXES, row_count
 
 # Of a part's messages the first two say who spoke, and what the columns are.
 _FIRST_CLASSES = ("VERSION", "WATCH")
+# The daemon writes the class first.
+_ORDER_BEGINS = f'{{"class":"{ORDER}",'.encode()
 
 
 class ReplayedCycle(NamedTuple):
@@ -41,7 +43,14 @@ class ReplayedCycle(NamedTuple):
 
 
 class RecordedCycles:
-    """The cycles in all parts of a recording, oldest first. `torn_lines` counts lines that were cut off by a kill."""
+    """The cycles in all parts of a recording, oldest first.
+
+    Attributes
+    ----------
+    torn_lines : how many lines were cut off by a kill.
+    orders : the ORDER messages among the cycles that have been read: who ordered what meanwhile; none of daemons up to
+        0.3.0.
+    """
 
     def __init__(self, name: Path) -> None:
         """`name`: as it was given to the recorder, for all parts; or that of one part, with or without a suffix.
@@ -54,6 +63,7 @@ class RecordedCycles:
         path = name.with_name(stem + CYCLES_SUFFIX)
         self.paths = [path] if path.is_file() else sorted(name.parent.glob(f"{stem}-[0-9]*{CYCLES_SUFFIX}"))
         self.torn_lines = 0
+        self.orders: list[Message] = []
         if not self.paths:
             raise RecordingError(
                 Problem(
@@ -84,6 +94,8 @@ class RecordedCycles:
             for where, message in self._messages(path):
                 if message.get("class") == "READINGS":
                     yield where, message
+                elif message.get("class") == ORDER:
+                    self.orders.append(message)
 
     def rows_without_cycle(self) -> dict[Path, int]:
         """How many rows of each part's table have no cycle from which they could be computed; only parts with such."""
@@ -94,7 +106,7 @@ class RecordedCycles:
                 if not table.is_file():
                     continue
                 rows = _rows(table)
-                cycles = _whole_lines(path) - len(_FIRST_CLASSES)
+                cycles = _whole_lines(path, but_for=_ORDER_BEGINS) - len(_FIRST_CLASSES)
                 if rows > cycles:
                     lacking[table] = rows - cycles
         return lacking
@@ -189,9 +201,10 @@ def _rows(table: Path) -> int:
     return _whole_lines(table) - 1 if table.suffix == CSV else row_count(table)
 
 
-def _whole_lines(path: Path) -> int:
+def _whole_lines(path: Path, but_for: bytes | None = None) -> int:
+    """but_for : lines that begin with it are not counted."""
     with path.open("rb") as file:
-        return sum(line.endswith(b"\n") for line in file)
+        return sum(line.endswith(b"\n") and not (but_for and line.startswith(but_for)) for line in file)
 
 
 def _damaged(where: str, what: str) -> RecordingError:

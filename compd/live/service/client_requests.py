@@ -13,6 +13,7 @@ from compd.live.service.message_keys.machine import MachineKeys
 from compd.live.service.message_keys.message import Keys, SentMessage, VersionKeys
 from compd.live.service.message_keys.status import StatusKeys
 from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError, line, unknown_key
+from compd.live.service.order import OrderRequest
 from compd.live.service.request import Asker, Request
 from compd.live.service.request_context import RequestContext, SendLater
 
@@ -106,7 +107,7 @@ class ReleaseKeys(SentMessage):
     wire_name = "RELEASE"
 
 
-class ReleaseRequest(Request):
+class ReleaseRequest(OrderRequest):
     """Gives the controller's role back: the mode is CMM again.
 
     A client of the Unix socket ends with it the role of whoever has it. A controller that loses its role in this way
@@ -117,6 +118,10 @@ class ReleaseRequest(Request):
     reply = ReleaseKeys
     asker = Asker.CONTROLLER
     refusal = "only the controller, or a client of the Unix socket, can end the controller's role"
+
+    @property
+    def subject(self) -> str:
+        return ""
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         context.end_role(client)

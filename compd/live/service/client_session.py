@@ -8,8 +8,9 @@ import struct
 from collections import deque
 from contextlib import suppress
 from enum import Enum, auto
-from typing import Any
+from typing import Any, NamedTuple
 
+from compd.live.service.descriptor_bin import DescriptorBin
 from compd.live.service.messages import MAX_LINE_BYTES, ErrorCode, ProtocolError
 
 # About 150 setpoints: 0.7 s at 200 Hz. A client that is further behind acts on old setpoints.
@@ -21,6 +22,8 @@ _LAST_RECEIVE_BYTES = 64 * 1024
 _LONGEST_INTERVAL_S = 1e6
 # struct ucred of unix(7): process, user, group.
 _CREDENTIALS = struct.Struct("3i")
+# Of SCM_RIGHTS.
+_DESCRIPTOR = struct.Struct("i")
 
 
 class Stream(Enum):
@@ -30,11 +33,22 @@ class Stream(Enum):
     READINGS = auto()
 
 
+class _ReceivedLine(NamedTuple):
+    """A line, or the error in the place of one that is too long, and the descriptor that came with it."""
+
+    content: bytes | ProtocolError
+    descriptor: int | None
+
+
 class ClientSession:
     """A connected client; used by the publisher's thread alone.
 
+    Over the Unix socket a line may come with one open descriptor (SCM_RIGHTS), sent in the same `sendmsg`. It belongs
+    to that line and is closed after it: a request that wants it takes it. At most two wait at any time.
+
     Attributes
     ----------
+    name : for the log: "unix, user 1000", or the address and port.
     open : False once the connection has ended.
     due_s : time of the next setpoint (s) that this client wants; inf while it watches none, -inf for the very next.
     stream : what this client watches.
@@ -45,13 +59,21 @@ class ClientSession:
     dismissed_s : from when on its connection is to be closed; inf for never.
     """
 
-    def __init__(self, connection: socket.socket, name: str, local: bool, now_s: float = 0.0) -> None:
-        """`name`: of the other end, for the log; `local`: connected over the Unix socket, from this computer."""
+    def __init__(
+        self,
+        connection: socket.socket,
+        name: str,
+        local: bool,
+        now_s: float = 0.0,
+        unwanted: DescriptorBin | None = None,
+    ) -> None:
+        """`name`: of the other end; `local`: connected over the Unix socket, from this computer; `unwanted`: closes
+        descriptors."""
         connection.setblocking(False)
         self.connection = connection
-        self.name = name
         self.local = local
         self.user = _user(connection) if local else -1
+        self.name = f"{name}, user {self.user}" if local else name
         self.authorized = True
         self.lost_role = False
         self.connected_s = self.asked_s = now_s
@@ -62,7 +84,10 @@ class ClientSession:
         self._interval_s = math.inf
         self._max_behind_bytes = MAX_BEHIND_BYTES
         self._received = bytearray()
-        self._lines: deque[bytes | ProtocolError] = deque()
+        self._lines: deque[_ReceivedLine] = deque()
+        self._unwanted = unwanted or DescriptorBin()
+        self._descriptor: int | None = None  # of the line that is still coming
+        self._answered_descriptor: int | None = None  # of the line that `next_line` has given
         self._skipping_line = False
         self._unsent = bytearray()
 
@@ -72,6 +97,11 @@ class ClientSession:
         self._max_behind_bytes = MAX_READINGS_BEHIND_BYTES if stream is Stream.READINGS else MAX_BEHIND_BYTES
         self._interval_s = min(1.0 / rate_hz, _LONGEST_INTERVAL_S) if rate_hz else math.inf
         self.due_s = -math.inf if rate_hz else math.inf
+
+    @property
+    def watches_readings(self) -> bool:
+        """Whether it is sent the readings, and the orders among them."""
+        return self.stream is Stream.READINGS and self.due_s < math.inf
 
     def take(self, time_s: float, half_period_s: float) -> bool:
         """Whether the setpoint of `time_s` is the one that is due; the next is then due an interval later.
@@ -88,29 +118,63 @@ class ClientSession:
     def receive(self) -> None:
         """Take what has arrived; whole lines wait for `next_line`. `open` is False afterwards when the stream ended."""
         try:
-            data = self.connection.recv(_RECEIVE_BYTES)
+            data, descriptor = self._receive_bytes()
         except BlockingIOError:
             return
         except OSError:
-            data = b""
+            data, descriptor = b"", None
         if not data:
             self.open = False
             return
         self._received += data
         *lines, rest = self._received.split(b"\n")
         self._received = rest
-        for line in lines:
-            if self._skipping_line:
-                self._skipping_line = False
-            elif len(line) > MAX_LINE_BYTES:
-                self._lines.append(_too_long())
-            elif line.strip():
-                self._lines.append(bytes(line))
+        # of each whole line, and of the one that is still coming
+        owned: list[int | None] = [self._descriptor, *[None] * len(lines)]
+        if descriptor is not None:
+            # what the system gives at once ends with the bytes that came with a descriptor: it is the last line's
+            last = len(lines) if rest else len(lines) - 1
+            if owned[last] is None:
+                owned[last] = descriptor
+            else:
+                self._unwanted.put(descriptor)
+        self._descriptor = owned.pop()
+        for line, of_line in zip(lines, owned, strict=True):
+            self._add_line(bytes(line), of_line)
         if len(rest) > MAX_LINE_BYTES:
             self._received = bytearray()
+            self._unwant(self._descriptor)
+            self._descriptor = None
             if not self._skipping_line:
                 self._skipping_line = True
-                self._lines.append(_too_long())
+                self._lines.append(_ReceivedLine(_too_long(), None))
+
+    def _receive_bytes(self) -> tuple[bytes, int | None]:
+        """What has arrived, and the descriptor among it; TCP carries none. Of several the system closes the others."""
+        if not self.local or self._unwanted.is_full:
+            return self.connection.recv(_RECEIVE_BYTES), None
+        # socket.recv_fds of Python 3.11 leaves the flags out
+        data, control, _, _ = self.connection.recvmsg(
+            _RECEIVE_BYTES, socket.CMSG_LEN(_DESCRIPTOR.size), socket.MSG_CMSG_CLOEXEC
+        )
+        for level, kind, content in control:
+            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS) and len(content) >= _DESCRIPTOR.size:
+                return data, _DESCRIPTOR.unpack_from(content)[0]
+        return data, None
+
+    def _add_line(self, line: bytes, descriptor: int | None) -> None:
+        if self._skipping_line:
+            self._skipping_line = False
+        elif len(line) > MAX_LINE_BYTES:
+            self._lines.append(_ReceivedLine(_too_long(), None))
+        elif line.strip():
+            self._lines.append(_ReceivedLine(line, descriptor))
+            return
+        self._unwant(descriptor)
+
+    def _unwant(self, descriptor: int | None) -> None:
+        if descriptor is not None:
+            self._unwanted.put(descriptor)
 
     @property
     def is_heard(self) -> bool:
@@ -123,8 +187,22 @@ class ClientSession:
         return bool(self._lines)
 
     def next_line(self) -> bytes | ProtocolError:
-        """The line that has waited longest, or an error in the place of one that is too long."""
-        return self._lines.popleft()
+        """The line that has waited longest, or an error in the place of one that is too long.
+
+        The descriptor that came with it can be taken until `end_line`, or the next one, closes it.
+        """
+        self.end_line()
+        content, self._answered_descriptor = self._lines.popleft()
+        return content
+
+    def take_descriptor(self) -> int | None:
+        """The descriptor that came with the line; whoever takes it closes it. None where none came, or it is taken."""
+        descriptor, self._answered_descriptor = self._answered_descriptor, None
+        return descriptor
+
+    def end_line(self) -> None:
+        """The line has been answered: what came with it and was not taken is closed."""
+        self._unwant(self.take_descriptor())
 
     def send(self, data: bytes) -> bool:
         """Send what the system takes at once and keep the rest; False when the client is too far behind."""
@@ -163,8 +241,14 @@ class ClientSession:
         return summary
 
     def close(self) -> None:
-        """Close the connection."""
+        """Close the connection, and the descriptors that came over it."""
         self.open = False
+        self.end_line()
+        for _, descriptor in self._lines:
+            self._unwant(descriptor)
+        self._lines.clear()
+        self._unwant(self._descriptor)
+        self._descriptor = None
         with suppress(OSError):  # with data that nobody has read the system would reset it, and the last line be lost
             self.connection.recv(_LAST_RECEIVE_BYTES)
         self.connection.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Self
 
 import structlog
@@ -11,11 +10,10 @@ from pydantic import Field, field_validator, model_validator
 from compd.live.service.client_session import ClientSession
 from compd.live.service.message_keys.message import ModelsKeys, SentMessage
 from compd.live.service.messages import ErrorCode, ProtocolError, line
-from compd.live.service.request import Asker, Request
+from compd.live.service.model_switch import ModelWish
+from compd.live.service.order import OrderRequest
+from compd.live.service.request import Asker
 from compd.live.service.request_context import RequestContext, SendLater
-
-# In no file's name: the null character, and halves of surrogate pairs.
-_NOT_IN_PATHS = re.compile("[\0\ud800-\udfff]")
 
 _log = structlog.get_logger()
 
@@ -27,7 +25,7 @@ class AcceptKeys(SentMessage):
     gauges: list[str] = Field(description="channels that are believed again by it; empty where all were already")
 
 
-class AcceptRequest(Request):
+class AcceptRequest(OrderRequest):
     """Makes the daemon believe a gauge again that jumped, or came back with another value.
 
     A person asks it after looking at the gauge: what it reads from now on is taken as it is.
@@ -38,6 +36,10 @@ class AcceptRequest(Request):
     asker = Asker.LOCAL
     refusal = "gauges are accepted over the Unix socket only"
     gauge: Annotated[str, Field(min_length=1)] = Field(description='a gauge, one channel as "gauge.channel", or "all"')
+
+    @property
+    def subject(self) -> str:
+        return self.gauge
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         try:
@@ -54,7 +56,7 @@ class PollKeys(SentMessage):
     wire_name = "POLL"
 
 
-class PollRequest(Request):
+class PollRequest(OrderRequest):
     """Has a gauge polled at once that did not answer, and that is asked seldom since because the others waited for it.
 
     If it does not answer now either, it is asked as seldom as before.
@@ -65,6 +67,10 @@ class PollRequest(Request):
     asker = Asker.LOCAL
     refusal = "gauges are polled at once over the Unix socket only"
     gauge: Annotated[str, Field(min_length=1)] = Field(description="a gauge that is polled, by its name")
+
+    @property
+    def subject(self) -> str:
+        return self.gauge
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         try:
@@ -88,7 +94,7 @@ class ZeroKeys(SentMessage):
     )
 
 
-class ZeroRequest(Request):
+class ZeroRequest(OrderRequest):
     """Takes machine zero, with the machine at rest at its zero position. The answer comes after about a second.
 
     It does not come in turn: other answers may come before it. Where a gauge differs by more than 0.5 mm from the
@@ -101,6 +107,10 @@ class ZeroRequest(Request):
     refusal = "machine zero is taken over the Unix socket only"
     replace: bool = Field(default=False, description="true: take it whatever the machine zero before it was")
 
+    @property
+    def subject(self) -> str:
+        return "replace" if self.replace else ""
+
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         context.take_zero(self.replace, send_later)
         return b""
@@ -112,13 +122,14 @@ class ModelKeys(SentMessage, ModelsKeys):
     wire_name = "MODEL"
 
 
-class ModelRequest(Request):
-    """Asks which models the daemon runs with; with `file` the daemon adopts that one first.
+class ModelRequest(OrderRequest):
+    """Asks which models the daemon runs with; with `file` or `hash` the daemon adopts that one first.
 
-    With a file the answer comes when it has been read and tried, and the next cycle uses it; or an error with the code
+    The daemon opens no file that a client names: with a `file` the client sends an open descriptor of it (SCM_RIGHTS,
+    unix(7)) in the same `sendmsg` as the line; the file is read from its start, is a regular file and has at most 1 MB.
+    The answer comes when it has been read and tried, and the next cycle uses it; or an error with the code
     `model_refused` comes, and nothing has changed. An adopted model survives a crash of the loop and lasts until the
-    daemon starts anew. Only clients of the Unix socket may ask, because request and answer name files of the daemon's
-    computer.
+    daemon starts anew.
     """
 
     wire_name = "MODEL"
@@ -126,27 +137,46 @@ class ModelRequest(Request):
     asker = Asker.LOCAL
     refusal = "models are asked for and adopted over the Unix socket only"
     file: str = Field(
-        default="", description='absolute path of a model file to adopt, "" for none; left out: only tell the models'
+        default="",
+        description="absolute path of the model file whose descriptor comes with the line, by which people are told of "
+        'it, "" for no model; left out, with `hash`: only tell the models',
     )
     shadow: bool = Field(default=False, description="true: compute this model's correction and do not apply it")
+    hash: str = Field(
+        default="",
+        pattern="^[0-9a-f]{16}$",
+        description="apply the model that runs as the shadow and has this hash; nothing is read again",
+    )
 
     @field_validator("file")
     @classmethod
     def _absolute(cls, file: str) -> str:
-        if file and (not file.startswith("/") or _NOT_IN_PATHS.search(file)):
-            raise ValueError(f'file is {file[:200]!r}, allowed: an absolute path, or "" for none')
+        if file and not (file.startswith("/") and file.isprintable()):
+            raise ValueError(f'file is {file[:200]!r}, allowed: an absolute path in printable characters, or ""')
         return file
 
     @model_validator(mode="after")
     def _named(self) -> Self:
-        if self.model_fields_set == {"shadow"}:
+        if self.hash and {"file", "shadow"} & self.model_fields_set:
+            raise ValueError("hash stands alone: the model that has it is applied")
+        if "shadow" in self.model_fields_set and "file" not in self.model_fields_set:
             raise ValueError("needs file, a text (shadow: true or false)")
         return self
+
+    @property
+    def is_order(self) -> bool:
+        return bool(self.model_fields_set - {"by"})
+
+    @property
+    def subject(self) -> str:
+        if self.hash:
+            return f"apply the shadow {self.hash}"
+        return f"{'run as the shadow' if self.shadow else 'apply'} {self.file or 'none'}"
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         if context.switch_model is None:
             raise ProtocolError(ErrorCode.UNIX_ONLY, self.refusal)
-        if self.model_fields_set:
-            context.switch_model(self.file, self.shadow, client.user, send_later)
+        if self.is_order:
+            context.switch_model(ModelWish(self.file, self.shadow, self.hash), client.take_descriptor, send_later)
             return b""
         return line({"class": self.wire_name, **context.models()})

@@ -1,54 +1,146 @@
-"""Adopting a model file, or running it as a shadow, while the loop goes on with the model that it has."""
+"""Adopting a model file, or running it as a shadow, while the loop goes on with the model that it has.
+
+The daemon opens no file that a client names. The client opens it, as it may, and sends the descriptor; it is read on a
+thread of its own, since its file system may hang.
+"""
 
 from __future__ import annotations
 
+import math
+import queue
+import threading
 from collections.abc import Callable
+from typing import NamedTuple
 
 import structlog
 
+from compd.clock import Clock
+from compd.configuration.yaml_reader import LARGEST_BYTES
+from compd.files.atomic_files import read_descriptor
+from compd.live.loop.model_loader import ModelText
 from compd.live.processes.control import Control
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 
+# A file of 1 MB is read in milliseconds, from a network in a second.
+READ_WITHIN_S = 5.0
+# Threads that wait for file systems which do not answer; what they wait for is taken to be of one kind.
+MOST_HANGING = 8
+
 _log = structlog.get_logger()
+
+
+class ModelWish(NamedTuple):
+    """What a client asks for: the model in `file`, "" for none; or with `hash` the one that runs as the shadow.
+
+    file : a name for people; it is never opened. shadow : compute the model's correction, and do not apply it.
+    """
+
+    file: str = ""
+    shadow: bool = False
+    hash: str = ""
+
+
+class _Read(NamedTuple):
+    """What became of reading the file of request `number`: its text, or why there is none."""
+
+    number: int
+    text: ModelText | None
+    refusal: str
 
 
 class ModelSwitch:
     """Passes a client's wish to the supervisor, and the answer of the loop that takes over to the client.
 
-    One file at a time; used by the publisher's thread.
+    One at a time; used by the publisher's thread.
     """
 
-    def __init__(self, control: Control) -> None:
+    def __init__(self, control: Control, wake: Callable[[], None], clock: Clock) -> None:
+        """`wake` lets the publisher's thread call `look`; it is called from any thread."""
         self._control = control
+        self._wake = wake
+        self._clock = clock
         self._number = 0
-        self._file = ""
-        self._shadow = False
+        self._wish = ModelWish()
         self._answer: Callable[[bytes], None] | None = None
+        self._read: queue.SimpleQueue[_Read] = queue.SimpleQueue()
+        self._read_until_s = math.inf
+        self._readers: list[threading.Thread] = []
 
-    def start(self, file: str, shadow: bool, user: int, answer: Callable[[bytes], None]) -> None:
-        """Begin to switch to the model in `file`, "" for none; `answer` gets the MODEL or ERROR line when it is done.
+    def start(self, wish: ModelWish, descriptor: Callable[[], int | None], answer: Callable[[bytes], None]) -> None:
+        """Begin to switch models; `answer` gets the MODEL or ERROR line when it is done.
 
-        shadow : compute this model's correction and do not apply it. user : number of the user who asks, whose own file
-        may be used. Raises ProtocolError while another is being read.
+        descriptor : gives the one that the client sent, which is closed when it has been read; None where there is
+        none. Raises ProtocolError without it, and while another model is being read.
         """
-        if self._answer is not None:
+        self._readers = [reader for reader in self._readers if reader.is_alive()]
+        if self._answer is not None or len(self._readers) >= MOST_HANGING:
             raise ProtocolError(ErrorCode.BUSY, "another model is being read")
-        self._number += 1
-        self._file, self._shadow, self._answer = file, shadow, answer
-        self._control.model_request.write((self._number, file, shadow, user))
-        self._control.wake_supervisor()
+        if not wish.file:
+            self._begin(wish, answer)
+            self._pass_on(None)
+            return
+        if (sent := descriptor()) is None:
+            raise ProtocolError(
+                ErrorCode.BAD_MESSAGE,
+                "file is a name, and the daemon opens no file: send an open descriptor of it with the line "
+                "(SCM_RIGHTS, in the same sendmsg), as `compd adopt FILE` and compd.client do",
+            )
+        self._begin(wish, answer)
+        self._read_until_s = self._clock.monotonic() + READ_WITHIN_S
+        reader = threading.Thread(
+            target=self._read_file, args=(self._number, wish.file, sent), name="model file", daemon=True
+        )
+        self._readers.append(reader)
+        reader.start()
 
     def look(self) -> None:
-        """Send the answer, if it has come."""
-        answer = self._answer
-        if answer is None or (message := self._control.model_answer.read()) is None:
+        """Pass on what has been read, and send the answer, if it has come."""
+        while not self._read.empty():
+            self._take(self._read.get())
+        if self._answer is not None and self._clock.monotonic() >= self._read_until_s:
+            self._end(f"{self._wish.file} could not be read within {READ_WITHIN_S:g} s: its file system hangs")
+        if self._answer is None or (message := self._control.model_answer.read()) is None:
             return
         number, summary, refusal = message
         if number != self._number:
             return
-        self._answer = None
         if refusal:
-            answer(ProtocolError(ErrorCode.MODEL_REFUSED, refusal).to_json())
+            self._end(refusal)
             return
-        _log.info("shadow" if self._shadow else "model adopted", file=self._file or "none")
-        answer(line({"class": "MODEL", **summary}))
+        role = "shadow" if self._wish.shadow else "applied"
+        _log.info("shadow" if self._wish.shadow else "model adopted", file=summary.get(role, {}).get("file", "none"))
+        self._send(line({"class": "MODEL", **summary}))
+
+    def _begin(self, wish: ModelWish, answer: Callable[[bytes], None]) -> None:
+        self._number += 1
+        self._wish, self._answer = wish, answer
+
+    def _read_file(self, number: int, file: str, descriptor: int) -> None:
+        """On a thread of its own."""
+        try:
+            read = _Read(number, ModelText(file, read_descriptor(descriptor, LARGEST_BYTES)), "")
+        except OSError as error:
+            read = _Read(number, None, f"{file} cannot be read: {error.strerror or error}")
+        self._read.put(read)
+        self._wake()
+
+    def _take(self, read: _Read) -> None:
+        if read.number != self._number or self._answer is None:  # it came too late
+            return
+        if read.text is None:
+            self._end(read.refusal)
+        else:
+            self._pass_on(read.text)
+
+    def _pass_on(self, text: ModelText | None) -> None:
+        self._read_until_s = math.inf
+        self._control.model_request.write((self._number, text, self._wish.shadow, self._wish.hash))
+        self._control.wake_supervisor()
+
+    def _end(self, refusal: str) -> None:
+        self._send(ProtocolError(ErrorCode.MODEL_REFUSED, refusal).to_json())
+
+    def _send(self, reply: bytes) -> None:
+        answer, self._answer, self._read_until_s = self._answer, None, math.inf
+        assert answer is not None
+        answer(reply)

@@ -24,6 +24,7 @@ from compd.live.loop.sent_cycle import CycleUnpacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
 from compd.live.memory.shared_ring import RingReader, SharedRing
 from compd.live.service.client_session import ClientSession, Stream
+from compd.live.service.descriptor_bin import DescriptorBin
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import ErrorCode, ProtocolError
@@ -72,6 +73,8 @@ class Publisher:
         self._unpacker = CycleUnpacker()
         self._sessions: set[ClientSession] = set()
         self._answers: deque[tuple[ClientSession, bytes]] = deque()
+        self._orders: deque[bytes] = deque()
+        self._unwanted = DescriptorBin()
         self._waiting: list[ClientSession] = []  # with lines to answer; not read from meanwhile
         self._next_turn_s = self._next_look_s = -math.inf
         self._selector: selectors.BaseSelector  # from `run` on, in the process that serves
@@ -137,7 +140,7 @@ class Publisher:
         if not local:
             prepare_tcp(connection)
         name = "unix" if local else f"{address[0]}:{address[1]}"
-        session = ClientSession(connection, name, local, self._clock.monotonic())
+        session = ClientSession(connection, name, local, self._clock.monotonic(), self._unwanted)
         tcp_clients = sum(not other.local for other in self._sessions)
         if (refusal := seat_refused(local, len(self._sessions), tcp_clients)) is not None:
             session.send(refusal.to_json())
@@ -191,6 +194,8 @@ class Publisher:
                 _log.warning("a client has not shown the token", client=session.name, reason=error.text)
                 session.dismissed_s = self._clock.monotonic() + WRONG_TOKEN_REST_S
             return error.to_json() if session.is_heard else b""
+        finally:
+            session.end_line()
 
     def _look_at_seats(self) -> None:
         """Close the connections of clients that have lost their place."""
@@ -214,11 +219,20 @@ class Publisher:
         self._answers.append((session, answer))
         self._setpoints.ring.wake_reader()
 
+    def tell_order(self, order: bytes) -> None:
+        """Hand an ORDER line, for whoever watches readings, to the publisher's thread; called from any thread."""
+        self._orders.append(order)
+        self._setpoints.ring.wake_reader()
+
     def _be_woken(self, ring: SharedRing, _events: int) -> None:
-        """Send the late answers; what is in the rings follows at the end of the round."""
+        """Send the late answers, and orders to those who record; what is in the rings follows after them."""
         os.eventfd_read(ring.woken)
         while self._answers:
             self._send(*self._answers.popleft())
+        while self._orders:
+            order = self._orders.popleft()
+            for session in [session for session in self._sessions if session.watches_readings]:
+                self._send(session, order)
 
     def _forward(self) -> None:
         """Publish what is due; where there is nothing from the loop, say so."""

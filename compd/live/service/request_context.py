@@ -13,6 +13,7 @@ from compd.configuration.operation import TargetSettings
 from compd.live.loop.commands import Commands, Target
 from compd.live.service.client_session import ClientSession
 from compd.live.service.messages import ErrorCode, ProtocolError, line
+from compd.live.service.model_switch import ModelWish
 from compd.live.service.readings_message import ReadingsMessage
 from compd.live.service.tcp_access import TcpAccess
 
@@ -42,6 +43,10 @@ def _accept_nothing(gauge: str) -> Sequence[str]:
     return ()
 
 
+def _tell_nobody(order: bytes) -> None:
+    return
+
+
 def _poll_nothing(gauge: str) -> None:
     return
 
@@ -59,23 +64,25 @@ class RequestContext:
         budget: Callable[[], Mapping[str, Any]],
         take_zero: Callable[[bool, SendLater], None],
         readings: ReadingsMessage | None = None,
-        switch_model: Callable[[str, bool, int, SendLater], None] | None = None,
+        switch_model: Callable[[ModelWish, Callable[[], int | None], SendLater], None] | None = None,
         models: Callable[[], Mapping[str, Any]] = dict,
         accept: Callable[[str], Sequence[str]] = _accept_nothing,
         targets: TargetSettings | None = None,
         access: TcpAccess | None = None,
         clock: Clock | None = None,
         poll: Callable[[str], None] = _poll_nothing,
+        tell_order: Callable[[bytes], None] = _tell_nobody,
     ) -> None:
         """`version`, `machine`: these messages; `status`, `budget`: make theirs; `readings`: makes READINGS messages;
         `models`: summary of the models; `targets`: how long a target may be used, and who may give one.
 
-        `take_zero` (whether to replace one that differs) starts to take machine zero, `switch_model` (file, shadow,
-        user who asks) to adopt a model; both answer later, and raise ProtocolError (busy) while another such request is
-        being worked on. `accept` makes the acquisition believe a gauge, "gauge.channel" or "all" again, and returns the
-        channels that it did not believe; it raises ValueError, with a text for the client, for a name that is none.
-        `access`: who may use TCP; None: everybody who reaches it. `poll` has a gauge polled at once; it raises
-        ValueError, with a text for the client, for a name that is none.
+        `take_zero` (whether to replace one that differs) starts to take machine zero, `switch_model` (what is asked
+        for, what gives the descriptor that came with it) to adopt a model; both answer later, and raise ProtocolError
+        (busy) while another such request is being worked on. `accept` makes the acquisition believe a gauge,
+        "gauge.channel" or "all" again, and returns the channels that it did not believe; it raises ValueError, with a
+        text for the client, for a name that is none. `access`: who may use TCP; None: everybody who reaches it. `poll`
+        has a gauge polled at once; it raises ValueError, with a text for the client, for a name that is none.
+        `tell_order` gets an ORDER line for whoever records, from any thread.
         """
         self.version = line(version)
         self.target_keys = target_keys
@@ -92,7 +99,8 @@ class RequestContext:
         self.controller: ClientSession | None = None
         self._targets = targets or TargetSettings()
         self.access = access
-        self._clock = clock or MonotonicClock()
+        self.clock = clock or MonotonicClock()
+        self.tell_order = tell_order
 
     def authorize(self, client: ClientSession, token: str) -> None:
         """Let a client in that shows the token. Raises ProtocolError (not_authorized) for another one."""
@@ -119,7 +127,7 @@ class RequestContext:
         if self.controller is None:
             _log.info("controller", client=client.name)
         self.controller = client
-        valid_until_s = self._clock.monotonic() + self._targets.valid_for_s
+        valid_until_s = self.clock.monotonic() + self._targets.valid_for_s
         self.commands.target = Target(tip_mm, rotation_B0_rad, valid_until_s)
 
     def end_role(self, client: ClientSession) -> None:

@@ -7,7 +7,8 @@ strictly, unknown keys refused), `answer`, and the keys of the answer's message.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -25,11 +26,21 @@ from compd.live.service.messages import (
     line,
     parse,
 )
+from compd.live.service.order import OrderBook, OrderKeys, OrderRequest
 from compd.live.service.request import Asker, Request
 from compd.live.service.request_context import RequestContext, SendLater
 
+
+def _with_a_name(kind: type[Any]) -> Iterator[type[Request]]:
+    """The requests among the classes below `kind`; others are bases of several."""
+    for below in kind.__subclasses__():
+        if "wire_name" in vars(below):
+            yield below
+        yield from _with_a_name(below)
+
+
 # Those of any client first, whatever the order of the modules.
-_KINDS = sorted(Request.__subclasses__(), key=lambda kind: kind.__module__ == local_requests.__name__)
+_KINDS = sorted(_with_a_name(Request), key=lambda kind: kind.__module__ == local_requests.__name__)
 REQUESTS: Mapping[str, type[Request]] = {kind.wire_name: kind for kind in _KINDS}
 _SENT: tuple[type[SentMessage], ...] = (
     *(kind.reply for kind in REQUESTS.values() if kind.reply is not None),
@@ -37,6 +48,7 @@ _SENT: tuple[type[SentMessage], ...] = (
     ErrorKeys,
     SetpointKeys,
     ReadingsKeys,
+    OrderKeys,
 )
 SENT_MESSAGES: Mapping[str, type[SentMessage]] = {kind.wire_name: kind for kind in _SENT}
 
@@ -46,6 +58,7 @@ class Requests:
 
     def __init__(self, context: RequestContext) -> None:
         self.context = context
+        self._orders = OrderBook(context.tell_order, context.clock)
 
     def greeting(self, client: ClientSession) -> bytes:
         """The first line for a client: VERSION, or AUTH where it has to show a token."""
@@ -68,7 +81,25 @@ class Requests:
             raise ProtocolError(ErrorCode.NOT_CONTROLLER, request.refusal)
         if request.asker is Asker.LOCAL and not client.local:
             raise ProtocolError(ErrorCode.UNIX_ONLY, request.refusal)
+        if isinstance(request, OrderRequest) and request.is_order:
+            return self._follow(request, client, send_later)
         return request.answer(self.context, client, send_later)
+
+    def _follow(self, order: OrderRequest, client: ClientSession, send_later: SendLater) -> bytes:
+        """What `answer` does, for an order, which is noted with what becomes of it."""
+
+        def send_and_note(reply: bytes) -> None:
+            self._orders.note(order, client, reply)
+            send_later(reply)
+
+        try:
+            reply = order.answer(self.context, client, send_and_note)
+        except ProtocolError as error:
+            self._orders.note(order, client, error.to_json())
+            raise
+        if reply:
+            self._orders.note(order, client, reply)
+        return reply
 
     def _read(self, data: bytes) -> Request:
         name, keys = parse(data)

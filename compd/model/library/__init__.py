@@ -17,7 +17,7 @@ from typing import Any
 from compd.errors import PluginError, Problem
 from compd.model.effect import PORTS, Effect
 from compd.model.formula.declaration import formula_effect
-from compd.plugins import EFFECTS, load, names
+from compd.plugins import EFFECTS, OWN_CODE, Code, load, names
 
 _PORT_FILES = {module.name for module in pkgutil.iter_modules(__path__)}
 
@@ -50,16 +50,22 @@ def load_library() -> dict[str, Effect]:
     return effects
 
 
-def find_effect(declaration: str | Mapping[str, Any], where: str, given: Mapping[str, Effect] | None = None) -> Effect:
+def find_effect(
+    declaration: str | Mapping[str, Any],
+    where: str,
+    given: Mapping[str, Effect] | None = None,
+    code: Code = OWN_CODE,
+) -> Effect:
     """An effect by its id, as /absolute/file.py:NAME, or written out as a formula.
 
     where : the place in the person's file, for errors.  given : effects beside those of the library, by id.
+    code : which Python files may be executed; by default a person's own.
     Raises PluginError, or ConfigurationError for a formula.
     """
     if not isinstance(declaration, str):
         return formula_effect(declaration, where)
     if ":" in declaration:
-        effect = _require_effect(load(EFFECTS, declaration, where), where)
+        effect = _require_effect(load(EFFECTS, declaration, where, code), where)
         return effect if effect.declared else replace(effect, declared=declaration)
     effects = {**load_library(), **(given or {})}
     if declaration not in effects:

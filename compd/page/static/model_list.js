@@ -1,9 +1,9 @@
-// The model files that the daemon's computer offers; choosing one writes its name, and any absolute path can be typed.
+// The model files that the page offers. Those that run and are elsewhere are shown, and cannot be chosen.
 import { dateText, element } from "./format.js";
 
 export class ModelList {
   constructor() {
-    this.input = element("input", { type: "text", placeholder: "a name of the list, or /path/of/a.model.yaml", "aria-label": "Model file on the daemon's computer" });
+    this.input = element("input", { type: "text", placeholder: "a name of the list", "aria-label": "Model file on the daemon's computer" });
     this.input.addEventListener("input", () => this.mark());
     this.body = element("tbody");
     this.where = element("p", { class: "note" });
@@ -26,9 +26,10 @@ export class ModelList {
 
   async list() {
     const listing = await (await fetch("models")).json();
-    this.rows = listing.models.map(({ name, changed, runs }) => {
+    this.rows = listing.models.map(({ name, changed, offered, runs }) => {
       const button = element("button", { type: "button", onclick: () => this.choose(name) }, name);
-      return { name, button, row: element("tr", {}, element("td", {}, button), element("td", {}, changed ? dateText(new Date(changed)) : "not there any more"), element("td", {}, runs ? `● ${runs}` : "")) };
+      button.disabled = !offered;
+      return { name, button, row: element("tr", {}, element("td", {}, button), element("td", {}, changed ? dateText(new Date(changed)) : offered ? "not there any more" : "in another directory"), element("td", {}, runs ? `● ${runs}` : "")) };
     });
     const beside = listing.directory ? `*model.yaml in ${listing.directory}` : "start the page with the configuration, or --models, to have a list";
     this.where.textContent = this.rows.length ? beside : `no model files: ${beside}`;

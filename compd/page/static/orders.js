@@ -51,7 +51,7 @@ export class Orders {
     if (question !== this.question || consequence.text === this.impossible) return;
     this.impossible = consequence.possible ? null : consequence.text;
     const title = nameOf(name, subject);
-    // what is shown is what is given: the file that a name stands for now, not later
+    // what is shown is what is given: of a shadow that is adopted, the model with this hash
     const give = element("button", { type: "button", id: this.confirm, onclick: () => this.give(name, consequence.subject || subject) }, title);
     give.disabled = !consequence.possible;
     this.showConsequence(element("b", {}, title), element("p", {}, consequence.text), new CommandLine(consequence.command).row, element("div", { class: "row" }, give, element("button", { type: "button", onclick: () => this.leave() }, "Leave it")));

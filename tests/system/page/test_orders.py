@@ -143,7 +143,7 @@ def given(tab, order):
 
 def choose(tab, file):
     tab.keyboard.press("o")
-    tab.locator("#drawer input[aria-label^='Model file']").fill(str(file))
+    tab.locator("#drawer input[aria-label^='Model file']").fill(file.name)
 
 
 def test_zero(tab, live, daemon):

@@ -120,4 +120,4 @@ def test_what_is_not_compd_is_named(tmp_path, greeting):
 
 def test_every_request_has_a_method_of_its_name_and_the_version_is_there_already():
     methods = {name for name in vars(Client) if not name.startswith("_")}
-    assert methods - {"close", "readings"} == {name.lower() for name in REQUESTS} - {"version", "auth"}
+    assert methods - {"close", "readings", "adopt_shadow"} == {name.lower() for name in REQUESTS} - {"version", "auth"}

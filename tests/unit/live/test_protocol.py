@@ -10,6 +10,7 @@ import pytest
 from compd.clock import MonotonicClock
 from compd.live.loop.states import State
 from compd.live.service.messages import MAX_LINE_BYTES, line
+from compd.live.service.model_switch import ModelWish
 from compd.live.service.requests import REQUESTS, Asker
 from tests.support.service import PERIOD_S, VERSION, setpoint
 
@@ -121,9 +122,20 @@ def test_an_empty_line_is_ignored(service):
         ({"class": "TARGET", "tip_B0_mm": [1, 2, -2e9]}, "tip_B0_mm must be within +-1e+09"),
         ({"class": "TARGET", "tip_P_mm": [1, 2, 3]}, "TARGET: unknown key 'tip_P_mm', allowed: tip_B0_mm"),
         ({"class": "MODEL", "shadow": True}, "needs file, a text (shadow: true or false)"),
-        ({"class": "MODEL", "file": "m.yaml"}, "file is 'm.yaml', allowed: an absolute path, or \"\" for none"),
-        ({"class": "MODEL", "file": "/m\0"}, "file is '/m\\x00', allowed: an absolute path, or \"\" for none"),
-        ({"class": "MODEL", "file": "/\ud800"}, "file is '/\\ud800', allowed: an absolute path, or \"\" for none"),
+        (
+            {"class": "MODEL", "file": "m.yaml"},
+            "file is 'm.yaml', allowed: an absolute path in printable characters, or \"\"",
+        ),
+        (
+            {"class": "MODEL", "file": "/m\0"},
+            "file is '/m\\x00', allowed: an absolute path in printable characters, or \"\"",
+        ),
+        (
+            {"class": "MODEL", "file": "/\ud800"},
+            "file is '/\\ud800', allowed: an absolute path in printable characters, or \"\"",
+        ),
+        ({"class": "MODEL", "hash": "0" * 16, "shadow": True}, "hash stands alone: the model that has it is applied"),
+        ({"class": "POLL", "gauge": "scale_1", "by": "a\nb"}, "by must be one line of printable characters"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -148,7 +160,13 @@ def test_a_model_is_switched_over_the_unix_socket_alone(service):
     local.send({"class": "MODEL", "file": "/m.yaml", "shadow": True})
     local.send({"class": "MODEL", "file": ""})
     local.ask({"class": "STATUS"})
-    assert [(file, shadow) for file, shadow, _, _ in service.models] == [("/m.yaml", True), ("", False)]
+    local.send({"class": "MODEL", "hash": "0123456789abcdef"})
+    local.ask({"class": "STATUS"})
+    assert [wish for wish, _, _ in service.models] == [
+        ModelWish("/m.yaml", shadow=True),
+        ModelWish(""),
+        ModelWish(hash="0123456789abcdef"),
+    ]
 
 
 def test_every_request_documents_itself_and_each_of_its_keys():

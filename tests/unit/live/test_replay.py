@@ -327,3 +327,32 @@ def test_a_recording_of_another_machine_is_refused(tmp_path):
 def test_what_is_not_there_is_told_with_what_would_be_right(tmp_path):
     with pytest.raises(RecordingError, match="a recording by `compd record`"):
         RecordedCycles(tmp_path / "nothing")
+
+
+def with_orders(lines):
+    """Each line and message as a feed gives it, with an order before every seventh."""
+    for number, (line, message, _) in enumerate(lines):
+        if number % 7 == 6:
+            order = {"class": "ORDER", "time_s": message["time_s"], "order": "MODEL", "subject": "apply none"}
+            order |= {"client": "unix, user 1000", "by": "anna (operate)", "done": number % 2 == 0}
+            yield json.dumps(order, separators=(",", ":")).encode() + b"\n", order
+        yield line, message
+
+
+def test_orders_are_kept_as_they_came_and_change_no_replay(tmp_path):
+    run = Run(machine())
+    with run.recorder(tmp_path / "run") as recorder:
+        items = list(with_orders(run.quiet(40)))
+        first_messages = (run.version, run.watch)
+        recorder.follow((first_messages, line, message) for line, message in items)
+    assert recorder.missing == 0
+    assert recorder.summary() == "40 rows in 1 part"
+    kept = (tmp_path / "run-0001.cycles.jsonl").read_bytes().splitlines(keepends=True)[2:]
+    assert kept == [line for line, _ in items]
+    recording = RecordedCycles(tmp_path / "run")
+    assert not any(cycle.differs for cycle in replay_cycles(run.machine.configuration, recording))
+    assert [order["by"] for order in recording.orders] == ["anna (operate)"] * 5
+    assert recording.rows_without_cycle() == {}
+    path = tmp_path / "run-0001.cycles.jsonl"
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
+    assert list(RecordedCycles(tmp_path / "run").rows_without_cycle().values()) == [1], "orders are no cycles"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 
-from compd.page.model_files import MOST, ModelFiles
+from compd.page.model_files import MOST, ModelFiles, opened
 
 
 @pytest.fixture
@@ -21,28 +23,34 @@ def names(files, models=None):
 
 def test_model_files_of_the_directory_are_offered_and_nothing_else(files):
     assert names(files) == ["model.yaml", "my.model.yaml"]
-    assert files.path_of("my.model.yaml", None) == str(files.directory / "my.model.yaml")
+    assert files.path_of("my.model.yaml") == files.directory / "my.model.yaml"
 
 
-def test_what_the_daemon_runs_with_is_offered_wherever_it_is(files):
+def test_what_the_daemon_runs_with_is_shown_wherever_it_is_and_offered_from_the_directory_alone(files):
     inside, outside = str(files.directory / "my.model.yaml"), "/elsewhere/my.model.yaml"
     models = {"applied": {"effects": ["backlash"], "file": inside}, "shadow": {"effects": [], "file": outside}}
     assert names(files, models) == ["model.yaml", "my.model.yaml", "shadow: my.model.yaml"]
     assert [entry["runs"] for entry in files.listed(models)] == ["", "applied", "shadow"]
-    assert files.listed(models)[2]["changed"] is None, "it is gone, and still runs"
-    assert files.path_of("shadow: my.model.yaml", models) == outside
-    assert files.path_of("shadow: my.model.yaml", None) is None
+    assert [entry["offered"] for entry in files.listed(models)] == [True, True, False]
+    assert files.listed(models)[2]["changed"] is None, "the page does not look at it"
+    assert files.path_of("shadow: my.model.yaml") is None
 
 
 @pytest.mark.parametrize(
     "name", ["", ".", "..", "../my.model.yaml", "tripod-cmm.yaml", "a.model.yaml", "my.model.yaml/"]
 )
 def test_no_other_name_is_a_file(files, name):
-    assert files.path_of(name, None) is None
+    assert files.path_of(name) is None
 
 
-def test_an_absolute_path_is_not_looked_for(files):
-    assert files.path_of("/etc/shadow", None) == "/etc/shadow"
+def test_a_link_a_path_and_what_is_no_file_are_not_offered(files):
+    (files.directory / "link.model.yaml").symlink_to("/etc/shadow")
+    os.mkfifo(files.directory / "pipe.model.yaml")
+    assert names(files) == ["model.yaml", "my.model.yaml"]
+    for name in ("link.model.yaml", "pipe.model.yaml", "/etc/shadow", str(files.directory / "my.model.yaml")):
+        assert files.path_of(name) is None
+    with pytest.raises(OSError, match="not a regular file"):
+        opened(files.directory / "link.model.yaml")
 
 
 def test_without_a_directory_there_is_what_runs(tmp_path):

@@ -55,7 +55,7 @@ class ProcessStatusKeys(Keys):
 class ConnectedClientKeys(Keys):
     """One client."""
 
-    name: str = Field(description='"unix", or its address and port')
+    name: str = Field(description='"unix" and its user, or its address and port')
     user: int | None = Field(default=None, description="over the Unix socket, the number of its user")
     connected_s: float = Field(description="since when, s on the daemon's monotonic clock")
     controller: bool = Field(description="whether its `TARGET` counts")

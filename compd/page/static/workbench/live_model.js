@@ -24,8 +24,8 @@ export class LiveModel {
     this.orders = new Orders(this.page, "confirm-order");
     const button = (text, id, order) => element("button", { type: "button", id, onclick: order }, text);
     const ask = (name, subject) => this.bench.attempt(() => this.orders.ask(name, subject));
-    this.run = button("Run this model as a shadow", "live-shadow", () => ask("shadow", this.bench.summary.model));
-    this.adopt = button("Adopt it", "live-adopt", () => ask("adopt", this.bench.summary.model));
+    this.run = button("Run this model as a shadow", "live-shadow", () => ask("shadow", fileName(this.bench.summary.model)));
+    this.adopt = button("Adopt it", "live-adopt", () => ask("adopt", this.bench.summary.model_hash));
     this.state = element("p", { id: "live-state", "aria-live": "polite" });
     this.models = element("p", { id: "live-models" });
     this.why = element("p", { class: "note", id: "live-why" });

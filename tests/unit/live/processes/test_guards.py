@@ -188,7 +188,7 @@ def test_a_request_is_answered_where_the_successor_ends_with_the_turn_and_withou
     loops = LoopSuccession(process, MonotonicClock(), None)
     loops.start()
     loops.loop.wait()
-    loops.start_successor(ModelChange(3, "m.yaml", False))
+    loops.start_successor(ModelChange(3, None, False))
     while not control.successor:
         pass
     control.give_turn(control.successor)

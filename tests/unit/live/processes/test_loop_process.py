@@ -10,7 +10,7 @@ from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.directions import Directions
-from compd.live.loop.model_loader import Models
+from compd.live.loop.model_loader import Models, ModelText
 from compd.live.loop.sent_cycle import CyclePacker
 from compd.live.loop.states import State
 from compd.live.loop.timing import LoopTiming
@@ -120,13 +120,13 @@ def test_a_last_cycle_that_cannot_be_computed_again_does_not_end_the_next_loop(p
     assert predecessor.left().correction_mm.tolist() == [0.0, 0.0, 0.0]
 
 
-def test_a_model_that_is_refused_is_answered_and_leaves_the_turn_where_it_is(predecessor, tmp_path):
+def test_a_model_that_is_refused_is_answered_and_leaves_the_turn_where_it_is(predecessor):
     process, control = predecessor.process, predecessor.control
     control.give_turn(1)
-    process.run_successor(2, ModelChange(7, str(tmp_path / "none.yaml"), False))
+    process.run_successor(2, ModelChange(7, ModelText("/none.yaml", b"no model"), False))
     number, summary, refusal = control.model_answer.read()
     assert (number, summary) == (7, None)
-    assert "cannot be read" in refusal
+    assert "/none.yaml" in refusal
     assert control.turn == 1
     assert control.successor == 0
 
@@ -143,7 +143,7 @@ def test_a_successor_takes_the_turn_between_two_ticks_and_tells_its_models(prede
             control.give_turn(3)
 
     process = replace(process, timing=Once(process.settings.period_s))
-    process.run_successor(2, ModelChange(1, str(file), False))
+    process.run_successor(2, ModelChange(1, ModelText.read(file), False))
     number, summary, refusal = control.model_answer.read()
     assert (number, refusal) == (1, "")
     assert summary["applied"]["effects"] == ["link_zero"]

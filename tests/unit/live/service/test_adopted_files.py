@@ -1,62 +1,16 @@
-"""Files that a client lets the daemon adopt: regular, small, whole, and nobody else's."""
+"""Model files that would take all memory or never come to an end."""
 
 from __future__ import annotations
-
-import os
-import socket
 
 import pytest
 
 from compd.clock import MonotonicClock
 from compd.errors import StateError
-from compd.live.loop.model_loader import ModelText
 from compd.live.processes import loop_succession
 from compd.live.processes.control import Control
 from compd.live.processes.loop_process import ModelChange
 from compd.live.processes.loop_succession import LoopSuccession
 from compd.model_file.model_document import read_document
-from tests.support.live_models import file_with
-
-NOBODY = 65534
-as_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files to another user")
-
-
-def bind(path):
-    with socket.socket(socket.AF_UNIX) as bound:
-        bound.bind(str(path))
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (os.mkfifo, "it is not a regular file"),
-        (lambda path: path.symlink_to("/dev/zero"), "it is not a regular file"),
-        (lambda path: path.symlink_to(path.name), "cannot be read"),
-        (os.mkdir, "cannot be read|not a regular file"),
-        (bind, "cannot be read"),
-        (lambda path: path.write_text("x" * 1_000_001), "more than 1000000 bytes"),
-        (lambda path: None, "cannot be read: No such file"),
-    ],
-)
-def test_what_is_no_model_file_is_neither_waited_for_nor_kept_in_memory(tmp_path, make, says):
-    path = tmp_path / "m.yaml"
-    make(path)
-    if path.is_fifo():
-        path.chmod(0o600)
-    with pytest.raises(StateError, match=says):
-        ModelText.read_owned(path, os.geteuid())
-
-
-@as_root
-def test_a_file_may_belong_to_the_user_who_asks_and_to_nobody_else(tmp_path):
-    path = file_with(tmp_path / "m.yaml", "link_zero")
-    os.chown(path, NOBODY, -1)
-    with pytest.raises(StateError, match="belongs to another user"):
-        ModelText.read_owned(path, 0)
-    assert ModelText.read_owned(path, NOBODY).content == path.read_bytes()
-    tmp_path.chmod(0o777)
-    with pytest.raises(StateError, match="directory of the model's file may be written"):
-        ModelText.read_owned(path, NOBODY)
 
 
 def aliases(levels):
@@ -103,7 +57,7 @@ def test_a_loop_that_is_never_ready_with_its_model_is_ended_and_the_request_answ
             control.model_answer.write(answer)
 
     loops = LoopSuccession(Endless(), MonotonicClock(), None)
-    loops.start_successor(ModelChange(4, "m.yaml", False))
+    loops.start_successor(ModelChange(4, None, False))
     while control.model_answer.read() is None:
         loops.end_late_successor(MonotonicClock().monotonic())
         loops.collect(4)
