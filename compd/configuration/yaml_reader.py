@@ -22,6 +22,8 @@ except ImportError:
 
 from compd.errors import ConfigurationError, Problem
 from compd.files.atomic_files import read_small_file
+from compd.files.file_kind import FileKind
+from compd.text.secrets import holds_secret
 
 Location = tuple[str | int, ...]
 
@@ -33,6 +35,8 @@ MOST_NODES = 100_000
 # PyYAML 6.0.4 reads ahead of the levels that are counted here, and has a limit of its own (1000): its words.
 _LIBRARYS_LIMIT = "maximum nesting depth"
 _LONGEST_KEY = 60
+# Parts of a file in the words of PyYAML: an alias, a tag, a character.
+_QUOTED = re.compile(r"\s*(?:'[^']*'|\"[^\"]*\")")
 
 _TAG = "tag:yaml.org,2002:"
 _MERGE = f"{_TAG}merge"
@@ -97,14 +101,10 @@ def decode(content: bytes, path: Path) -> str:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        before = content[: error.start]
-        line = before.count(b"\n") + 1
-        # most often it is text of Windows or of an old editor, in which every byte is a character
-        shown = content[before.rfind(b"\n") + 1 :].partition(b"\n")[0].decode("latin-1").strip()
+        line = content.count(b"\n", 0, error.start) + 1
         raise _unusable(
             f"{path}:{line}",
             "is not in UTF-8",
-            value=repr(shown[:_LONGEST_KEY]),
             allowed="UTF-8",
             next_step="save the file as UTF-8",
         ) from error
@@ -119,11 +119,16 @@ def decode(content: bytes, path: Path) -> str:
     return text
 
 
-def parse_yaml(text: str, path: Path, dumped: bool = False) -> tuple[Any, dict[Location, int]]:
+def parse_yaml(
+    text: str, path: Path, kind: FileKind | None = None, dumped: bool = False
+) -> tuple[Any, dict[Location, int]]:
     """The data of a YAML text, and the line of each part of it, from 1; parts that are merged have those of the anchor.
 
+    kind : of file that it is to be, of which nothing is quoted where it is of another one; None: of a text that the
+        person who reads the message has typed.
     dumped : whether compd itself has written it, with PyYAML.
-    Raises ConfigurationError with every problem at once, or with the place where the text is no YAML.
+    Raises ConfigurationError with every problem at once, or with the place where the text is no YAML, or where it is of
+    another kind.
     """
     loader = _DumpLoader(text) if dumped else _Loader(text)
     try:
@@ -138,14 +143,16 @@ def parse_yaml(text: str, path: Path, dumped: bool = False) -> tuple[Any, dict[L
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         if _LIBRARYS_LIMIT in (error.problem or ""):
             raise _too_deep(path, line) from error
-        what = f"not YAML: {error.problem or error.context}"
+        what = f"not YAML: {_QUOTED.sub('', error.problem or error.context or 'it ends too soon')}"
         raise _unusable(
             f"{path}:{line}", what, next_step="mend this line; indent with spaces, write `key: value`"
         ) from error
     except yaml.YAMLError as error:
-        raise _unusable(path, f"not YAML: {str(error).splitlines()[0]}") from error
+        raise _unusable(path, "not YAML") from error
     finally:
         loader.dispose()
+    if kind is not None and not kind.recognises(data):
+        raise ConfigurationError(kind.refused(path))
     if reading.problems:
         raise ConfigurationError(reading.problems)
     return data, reading.lines
@@ -244,6 +251,8 @@ class _Reading:
         self._add(node.start_mark.line + 1, location, "tags are not used here", value=tag, next_step="delete the tag")
 
     def _add(self, line: int, location: Location, what: str, **rest: str) -> None:
+        if holds_secret(location):
+            rest.pop("value", None)
         self.problems.append(Problem(where=f"{self.path}:{line} {dotted(location)}".rstrip(), what=what, **rest))
 
 
@@ -267,7 +276,6 @@ def _check_structure(text: str, path: Path) -> None:
                 raise _unusable(
                     f"{path}:{line}",
                     "this alias stands within what it stands for",
-                    value=f"*{event.anchor}",
                     next_step="write out what is meant",
                 )
     finally:

@@ -28,12 +28,15 @@ def read_tokens(path: Path) -> list[Token]:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise _problem(path, f"cannot be read: {error.strerror}", "compd page --new-token makes it") from error
+    except UnicodeDecodeError:
+        raise _problem(path, "is no file of tokens", "compd page --new-token makes it") from None
     if mode & _OTHERS:
         raise _problem(path, f"can be read by others (mode {stat.S_IMODE(mode):o})", f"chmod 600 {path}")
     try:
         return _File.model_validate(yaml.safe_load(text)).tokens
-    except (yaml.YAMLError, ValidationError) as error:
-        raise _problem(path, f"is no file of tokens: {error}", "compd page --new-token makes it") from error
+    except (yaml.YAMLError, ValidationError, RecursionError) as error:
+        # without its words, and not as its cause: both repeat what is in the file
+        raise _problem(_place(path, error), "is no file of tokens", "compd page --new-token makes it") from None
 
 
 def add_token(path: Path, role_and_name: str) -> str:
@@ -58,5 +61,16 @@ def add_token(path: Path, role_and_name: str) -> str:
     return token
 
 
-def _problem(path: Path, what: str, next_step: str) -> ConfigurationError:
+def _place(path: Path, error: Exception) -> str:
+    """The file, with the line that is no YAML, or with the number of the token that is wrong."""
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
+        return f"{path}:{error.problem_mark.line + 1}"
+    if isinstance(error, ValidationError):
+        numbers = [part for detail in error.errors(include_input=False) for part in detail["loc"] if part != "tokens"]
+        if numbers and isinstance(numbers[0], int):
+            return f"{path}, token {numbers[0] + 1}"
+    return str(path)
+
+
+def _problem(path: Path | str, what: str, next_step: str) -> ConfigurationError:
     return ConfigurationError(Problem(where=str(path), what=what, next_step=next_step))
