@@ -134,11 +134,12 @@ def parse_yaml(
     try:
         _check_structure(text, path)
         root = loader.get_single_node()
-        if root is None:
-            return None, {}
-        _check_size(root, path)
         reading = _Reading(loader, path)
-        data = reading.plain(root, ())
+        if root is None:
+            data = None
+        else:
+            _check_size(root, path)
+            data = reading.plain(root, ())
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         if _LIBRARYS_LIMIT in (error.problem or ""):
@@ -152,7 +153,7 @@ def parse_yaml(
     finally:
         loader.dispose()
     if kind is not None and not kind.recognises(data):
-        raise ConfigurationError(kind.refused(path))
+        raise ConfigurationError(reading.unquoted or kind.refused(path))
     if reading.problems:
         raise ConfigurationError(reading.problems)
     return data, reading.lines
@@ -160,12 +161,16 @@ def parse_yaml(
 
 @dataclass
 class _Reading:
-    """Turns nodes into plain data; the line of every part goes to `lines`, what is wrong to `problems`."""
+    """Turns nodes into plain data; the line of every part goes to `lines`, what is wrong to `problems`.
+
+    unquoted : the same problems without the keys and values of the file.
+    """
 
     loader: SafeLoader
     path: Path
     lines: dict[Location, int] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
+    unquoted: list[Problem] = field(default_factory=list)
 
     def plain(self, node: yaml.Node, location: Location) -> Any:
         """Data below `node`."""
@@ -247,13 +252,15 @@ class _Reading:
             return None
 
     def _refuse_tag(self, node: yaml.Node, location: Location) -> None:
-        tag = node.tag.replace(_TAG, "!!")
-        self._add(node.start_mark.line + 1, location, "tags are not used here", value=tag, next_step="delete the tag")
+        self._add(node.start_mark.line + 1, location, "tags are not used here", next_step="delete the tag")
 
     def _add(self, line: int, location: Location, what: str, **rest: str) -> None:
         if holds_secret(location):
             rest.pop("value", None)
-        self.problems.append(Problem(where=f"{self.path}:{line} {dotted(location)}".rstrip(), what=what, **rest))
+        where = f"{self.path}:{line}"
+        self.problems.append(Problem(where=f"{where} {dotted(location)}".rstrip(), what=what, **rest))
+        rest.pop("value", None)
+        self.unquoted.append(Problem(where=where, what=what, **rest))
 
 
 def _check_structure(text: str, path: Path) -> None:

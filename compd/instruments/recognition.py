@@ -11,9 +11,10 @@ from compd.errors import Problem
 from compd.instruments.cells import is_number
 from compd.instruments.time_stamps import is_stamp
 
-# Rows that are looked at; of the cells of a table that are no dates, so many are numbers.
 _LOOKED_AT = 500
-_LEAST_SHARE = 1 / 3
+# Of the cells of a table that are no dates more than half are numbers; of a longer one at least half.
+_LEAST_SHARE = 1 / 2
+_LONGER_ROWS = 3
 _BETWEEN = re.compile(r"[;\t,]|\s+")
 _COMMENT = ("#", "%", "//")
 
@@ -25,12 +26,13 @@ def is_table(lines: Sequence[str]) -> bool:
     if not rows:
         return False
     usual = Counter(map(len, rows)).most_common(1)[0][1]
-    return 2 * usual > len(rows) and _has_numbers(cell for cells in rows for cell in cells)
+    return 2 * usual > len(rows) and _has_numbers((cell for cells in rows for cell in cells), len(rows))
 
 
 def is_of_numbers(columns: Sequence[Sequence[str]]) -> bool:
     """Whether many of the cells, column by column, are numbers."""
-    return _has_numbers(cell for cells in columns for cell in cells[:_LOOKED_AT])
+    rows = max(map(len, columns), default=0)
+    return _has_numbers((cell for cells in columns for cell in cells[:_LOOKED_AT]), rows)
 
 
 def no_table(path: Path) -> Problem:
@@ -43,6 +45,7 @@ def no_table(path: Path) -> Problem:
     )
 
 
-def _has_numbers(cells: Iterable[str]) -> bool:
+def _has_numbers(cells: Iterable[str], rows: int) -> bool:
     filled = [cell for cell in cells if cell and not is_stamp(cell)]
-    return sum(map(is_number, filled)) >= _LEAST_SHARE * len(filled)
+    numbers, least = sum(map(is_number, filled)), _LEAST_SHARE * len(filled)
+    return numbers > least or (numbers == least and rows >= _LONGER_ROWS)

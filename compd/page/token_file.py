@@ -10,10 +10,14 @@ from typing import get_args
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from compd.configuration.yaml_reader import parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem
+from compd.files.file_kind import FileKind
 from compd.page.guard import Role, Token, hashed, new_token
 
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
+_MADE_BY = "compd page --new-token makes it"
+TOKENS = FileKind("a file of tokens", frozenset({"tokens"}), least=1, next_step=_MADE_BY)
 
 
 class _File(BaseModel):
@@ -25,18 +29,22 @@ def read_tokens(path: Path) -> list[Token]:
     """The tokens in the file. Raises ConfigurationError where others may read it, or it is no such file."""
     try:
         mode = path.stat().st_mode
-        text = path.read_text(encoding="utf-8")
     except OSError as error:
-        raise _problem(path, f"cannot be read: {error.strerror}", "compd page --new-token makes it") from error
-    except UnicodeDecodeError:
-        raise _problem(path, "is no file of tokens", "compd page --new-token makes it") from None
+        raise _problem(path, f"cannot be read: {error.strerror}", _MADE_BY) from error
     if mode & _OTHERS:
         raise _problem(path, f"can be read by others (mode {stat.S_IMODE(mode):o})", f"chmod 600 {path}")
+    text = read_text(path, TOKENS.name)
     try:
-        return _File.model_validate(yaml.safe_load(text)).tokens
-    except (yaml.YAMLError, ValidationError, RecursionError) as error:
-        # without its words, and not as its cause: both repeat what is in the file
-        raise _problem(_place(path, error), "is no file of tokens", "compd page --new-token makes it") from None
+        data, _ = parse_yaml(text, path, TOKENS, dumped=True)
+        return _File.model_validate(data).tokens
+    except ConfigurationError as error:
+        # of this file nothing is quoted, nor any key
+        line = error.problems[0].where.removeprefix(f"{path}").partition(" ")[0]
+        raise _problem(f"{path}{line}", f"is not {TOKENS.name}", _MADE_BY) from None
+    except ValidationError as error:
+        numbers = [detail["loc"][1] for detail in error.errors(include_input=False) if len(detail["loc"]) > 1]
+        place = f"{path}, token {int(numbers[0]) + 1}" if numbers else str(path)
+        raise _problem(place, f"is not {TOKENS.name}", _MADE_BY) from None
 
 
 def add_token(path: Path, role_and_name: str) -> str:
@@ -59,17 +67,6 @@ def add_token(path: Path, role_and_name: str) -> str:
         file.write(text)
     beside.replace(path)
     return token
-
-
-def _place(path: Path, error: Exception) -> str:
-    """The file, with the line that is no YAML, or with the number of the token that is wrong."""
-    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
-        return f"{path}:{error.problem_mark.line + 1}"
-    if isinstance(error, ValidationError):
-        numbers = [part for detail in error.errors(include_input=False) for part in detail["loc"] if part != "tokens"]
-        if numbers and isinstance(numbers[0], int):
-            return f"{path}, token {numbers[0] + 1}"
-    return str(path)
 
 
 def _problem(path: Path | str, what: str, next_step: str) -> ConfigurationError:

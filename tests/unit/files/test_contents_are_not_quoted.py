@@ -1,4 +1,4 @@
-"""Every reader of a file, given some other file by mistake: nothing of it is in an error, on the terminal, in the log."""
+"""Every reader of a file, given some other file: nothing of it is in an error, on the terminal or in the log."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ CONTENTS: dict[str, bytes] = {
         "certificate": f"-----BEGIN CERTIFICATE-----\n{SECRET}{SECRET}\n-----END CERTIFICATE-----\n",
         "log of key: value": f"level: info\nevent: a client\ntoken: {SECRET}\nurl: http://10.0.0.5/?token={SECRET}\n",
         "log of lines": f"2026-11-25 21:00:01 INFO client 10.0.0.5 token={SECRET} 12\n" * 3 + f"short {SECRET}\n",
-        "log in columns": f"1 2 {SECRET} login\n1 3 {SECRET} login\n{SECRET}\n",
+        "log in columns": f"12 login {SECRET} anna\n" * 5 + f"{SECRET}\n",
         ".env": f"API_TOKEN={SECRET}\nDB_PASSWORD='{SECRET}'\nexport X={SECRET}\n",
         "JSON": json.dumps({"token": SECRET, "list": [SECRET, {SECRET: SECRET}], SECRET: 1}, indent=1),
         "JSON in one line": json.dumps({"class": SECRET, "password": SECRET}) + "\n",
@@ -167,7 +167,7 @@ READERS: dict[str, Reader] = {
     "effects": Reader("effects.yaml", load_effects),
     "effects in Python": Reader("effects.py", load_effects),
     "effects of the page": Reader("own.yaml", lambda path: entries_of(path.read_text("utf-8", "replace"), path)),
-    "sidecar": Reader("x.yaml", _problems(lambda path, problems: read_sidecar(path, problems))),
+    "sidecar": Reader("x.yaml", _problems(read_sidecar)),
     "recording by its sidecar": Reader("x.yaml", _without_table(read_recording)),
     "rows left out": Reader("x.yaml", _without_table(lambda path: exclude_rows(path, [2], "why"))),
     "recording, CSV": Reader("x.csv", _recording),
@@ -182,7 +182,7 @@ READERS: dict[str, Reader] = {
     **{f"export as {shape}": Reader("export.txt", _export(shape)) for shape in SHAPES},
     "export before it is joined": Reader("export.txt", lambda path: preview_export(path, ReadOptions())),
     "preset": Reader("mine.yaml", lambda path: PresetDirectory(path.parent).driver("mine")),
-    "gauges": Reader("gauges.yaml", lambda path: gauge_of_file(path, None, PortArguments())),
+    "gauges": Reader("gauges.yaml", lambda path: gauge_of_file(path, None, PortArguments("", None, None, 1.0))),
     "capture": Reader("capture.txt", read_capture),
     "tokens": Reader("tokens.yaml", _private(read_tokens)),
     "token of the TCP port": Reader("token", _private(read_token)),
