@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TextIO
 
 import structlog
 
@@ -21,7 +22,7 @@ def log_to_stderr(named: Sequence[Any] = ()) -> None:
         processors=[
             structlog.processors.add_log_level,
             *named,
-            *([] if sys.stderr.isatty() else [structlog.processors.format_exc_info]),
+            structlog.processors.format_exc_info,
             hide_secrets,
             structlog.processors.TimeStamper(fmt="iso"),
             terminal if sys.stderr.isatty() else lines,
@@ -41,3 +42,13 @@ def hide_secrets_of_libraries() -> None:
     handler.setLevel(logging.WARNING)
     handler.setFormatter(_WithoutSecrets("%(message)s"))
     logging.lastResort = handler
+
+
+def is_journal(stream: TextIO) -> bool:
+    """Whether what is written to this stream ends in systemd's journal, for everybody who may read that."""
+    try:
+        status = os.fstat(stream.fileno())
+    except (OSError, ValueError):
+        return False
+    # systemd.exec(5): "device:inode" of what it has connected
+    return os.environ.get("JOURNAL_STREAM") == f"{status.st_dev}:{status.st_ino}"

@@ -26,7 +26,10 @@ class _File(BaseModel):
 
 
 def read_tokens(path: Path) -> list[Token]:
-    """The tokens in the file. Raises ConfigurationError where others may read it, or it is no such file."""
+    """The tokens in the file, none in an empty one.
+
+    Raises ConfigurationError where others may read it, or it is no such file.
+    """
     try:
         mode = path.stat().st_mode
     except OSError as error:
@@ -34,6 +37,8 @@ def read_tokens(path: Path) -> list[Token]:
     if mode & _OTHERS:
         raise _problem(path, f"can be read by others (mode {stat.S_IMODE(mode):o})", f"chmod 600 {path}")
     text = read_text(path, TOKENS.name)
+    if not text.strip():
+        return []
     try:
         data, _ = parse_yaml(text, path, TOKENS, dumped=True)
         return _File.model_validate(data).tokens
@@ -64,6 +69,9 @@ def add_token(path: Path, role_and_name: str) -> str:
     beside = path.with_name(path.name + ".new")
     descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+        if os.geteuid() == 0 and path.exists():  # an administrator adds one: the page's user goes on reading the file
+            owner = path.stat()
+            os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
         file.write(text)
     beside.replace(path)
     return token
