@@ -16,7 +16,7 @@ CONFIGURATION = FileKind(
     "a machine's configuration",
     frozenset({"machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state"}),
     least=2,
-    others=frozenset({"acquisition", "votes"}),
+    others=frozenset({"acquisition", "votes", "effects"}),
 )
 
 

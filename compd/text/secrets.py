@@ -11,9 +11,8 @@ _KEY = re.compile(r"passw(?:or)?d|passphrase|pwd|secret|token|credential|private
 # RFC 3986, section 3.2.1: what stands before the @ of a URL.
 _USER_OF_URL = re.compile(r"(?<=://)[^\s/?#'\"]*@")
 # `token=...` of an address, `password: ...` of a file, "token": "..." of a message; no file of that name.
-_ASSIGNED = re.compile(
-    rf"""(?<![/-])((?:{_KEY.pattern})["']?\s*[=:]\s*)("[^"\n]*"|'[^'\n]*'|[^\s,;&}}\]]+)""", re.IGNORECASE
-)
+_VALUE = r"""("[^"\n]*"|'[^'\n]*'|[^\s,;&}\]]+)"""
+_ASSIGNED = re.compile(rf"""(?<![/-])((?:{_KEY.pattern})["']?\s*[=:]\s*){_VALUE}""", re.IGNORECASE)
 HIDDEN = "***"
 
 
