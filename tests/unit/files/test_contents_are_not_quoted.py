@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import tempfile
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +12,12 @@ from typing import NamedTuple
 
 import pytest
 import structlog
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+from compd.cli.main import app
+from compd.cli.problems import print_problems
 from compd.clock import MonotonicClock
 from compd.commissioning.gauge_description.capture import read_capture
 from compd.commissioning.gauge_file import gauge_of_file
@@ -42,6 +49,7 @@ from compd.recording.plan_file import read_plan_file
 from compd.recording.reader import read_recording
 from compd.recording.sidecar import read_sidecar
 from compd_drivers.preset_directory import PresetDirectory
+from tests.support.paths import CONFIG
 
 # No part of it, six characters long, is a word.
 SECRET = "Zq7vK2xW9pLm4TnB"
@@ -219,3 +227,54 @@ def assert_quotes_nothing(text: str) -> None:
 @pytest.mark.parametrize("name", READERS)
 def test_nothing_of_another_file_is_quoted(name: str, content: str, tmp_path: Path) -> None:
     assert_quotes_nothing(said(READERS[name], tmp_path, CONTENTS[content]))
+
+
+TRIPOD = str(CONFIG / "tripod-cmm.yaml")
+# FILE stands for the path of the file that is another one.
+COMMANDS: dict[str, tuple[str, list[str]]] = {
+    "check": ("machine.yaml", ["check", "FILE"]),
+    "run": ("machine.yaml", ["run", "FILE"]),
+    "page": ("machine.yaml", ["page", "FILE"]),
+    "page --tokens": ("tokens.yaml", ["page", "--tokens", "FILE", "--listen", "127.0.0.1"]),
+    "page --new-token": ("tokens.yaml", ["page", "--tokens", "FILE", "--new-token", "view:anna"]),
+    "compare": ("run.csv", ["compare", "FILE", "--machine", TRIPOD]),
+    "effect remove": ("x.model.yaml", ["effect", "remove", "link_sag", "--model", "FILE"]),
+    "diagnose --effects": ("own.yaml", ["diagnose", "none.csv", "--effects", "FILE"]),
+    "effect show": ("own.yaml", ["effect", "show", "FILE"]),
+    "ledger": ("x.model.yaml", ["ledger", "FILE"]),
+    "recording check": ("run.csv", ["recording", "check", "FILE"]),
+    "join": ("export.txt", ["join", "none.csv", "FILE"]),
+    "driver test --options": ("options.yaml", ["driver", "test", "serial_ascii", "--options", "FILE"]),
+    "campaign --plan": ("plan.csv", ["campaign", TRIPOD, "--plan", "FILE", "--out", "out.csv"]),
+}
+
+
+@pytest.mark.parametrize(
+    "content", ["shadow", "private key", ".env", "JSON", "log of key: value", "YAML tag", "binary"]
+)
+@pytest.mark.parametrize("name", COMMANDS)
+def test_no_command_prints_anything_of_another_file(name: str, content: str, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    file_name, words = COMMANDS[name]
+    path = tmp_path / file_name
+    path.write_bytes(CONTENTS[content])
+    path.chmod(0o600)
+    result = CliRunner().invoke(app, [str(path) if word == "FILE" else word for word in words])
+    assert result.exit_code != 0, result.output
+    assert isinstance(result.exception, CompdError | SystemExit), result.exception
+    printed = io.StringIO()
+    print_problems(getattr(result.exception, "problems", ()), stream=printed)
+    assert_quotes_nothing(result.output + printed.getvalue() + str(result.exception))
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    name=st.sampled_from(sorted(READERS)),
+    pieces=st.lists(
+        st.sampled_from([SECRET, "\n", ": ", "- ", "  ", *"{}[],;\t\"'!=#", "&a ", "*a", "<<", "1.5"]),
+        max_size=30,
+    ),
+)
+def test_nothing_of_a_file_of_any_form_is_quoted(name: str, pieces: list[str], tmp_path: Path) -> None:
+    with tempfile.TemporaryDirectory(dir=tmp_path) as directory:
+        assert_quotes_nothing(said(READERS[name], Path(directory), "".join(pieces).encode()))
