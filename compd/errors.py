@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from compd.text.secrets import without_users
+
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
@@ -29,6 +31,11 @@ class Problem:
     value: str = ""
     allowed: str = ""
     next_step: str = ""
+
+    def __post_init__(self) -> None:
+        # user and password of a URL are nobody's to read
+        for name in ("where", "what", "value"):
+            object.__setattr__(self, name, without_users(getattr(self, name)))
 
     def __str__(self) -> str:
         parts = [f"{self.where}: {self.what}"]

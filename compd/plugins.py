@@ -6,6 +6,7 @@ each preset is a driver and a simulated device of its own name.
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import importlib.util
 import re
@@ -249,8 +250,22 @@ def load_module(file: Path, where: str, kind: str) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
+        if not _uses_compd(real):  # some other file: an error's words may be a part of it
+            other = ImportError(f"{type(error).__name__} in a file that is no Python or does not import compd")
+            raise _unloadable(str(file), where, kind, other) from None
         raise _unloadable(str(file), where, kind, error) from error
     return module
+
+
+def _uses_compd(file: Path) -> bool:
+    """Whether a file is Python that imports compd, as every driver and effect does."""
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (SyntaxError, ValueError, RecursionError, MemoryError, OSError):
+        return False
+    imports = (node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom))
+    names = (name for node in imports for name in (getattr(node, "module", None), *(part.name for part in node.names)))
+    return any(name is not None and name.partition(".")[0] == "compd" for name in names)
 
 
 def _unloadable(value: str, where: str, kind: str, error: BaseException) -> PluginError:

@@ -13,15 +13,23 @@ import yaml
 
 from compd.commissioning.open_gauge import GaugeTarget, PortArguments, line_settings
 from compd.configuration import load
-from compd.configuration.document import Document, read_document
+from compd.configuration.document import CONFIGURATION, Document, read_document
 from compd.configuration.lines import LineSettings, powered
 from compd.configuration.machine_configuration import SECTIONS, gauges_of, in_order
 from compd.configuration.section import validate
 from compd.errors import ConfigurationError, Problem
+from compd.files.file_kind import FileKind
 from compd.gauge import Gauge, GaugeOptions
 
 LEARNED_GAUGE, LEARNED_LINE = "learned_gauge", "learned_line"
 _SECTIONS = {"gauges", "lines"}
+GAUGE_FILE = FileKind(
+    "a file of gauges or a configuration",
+    frozenset({"gauges"}),
+    least=1,
+    others=CONFIGURATION.keys,
+    next_step="`compd gauge learn --to` writes one",
+)
 
 
 def gauge_file_text(options: Mapping[str, Any], line: LineSettings | None) -> str:
@@ -41,7 +49,7 @@ def gauge_of_file(path: Path, name: str | None, port: PortArguments) -> GaugeTar
     port : where it hangs if the file does not say it; what the file says counts otherwise.
     Raises ConfigurationError for every problem of the file, and where there is no such gauge, or no line.
     """
-    document = read_document(path)
+    document = read_document(path, GAUGE_FILE)
     if set(document.data) - _SECTIONS:
         configuration = load(path)
         return _target(document, name, port, configuration.gauges, configuration.drivers, configuration.lines)

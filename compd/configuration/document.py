@@ -7,9 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from compd.configuration.yaml_reader import Location, dotted, parse_yaml, read_text
-from compd.errors import ConfigurationError, Problem
+from compd.files.file_kind import FileKind
 
-__all__ = ["Document", "Location", "dotted", "read_document", "read_entries"]
+__all__ = ["CONFIGURATION", "Document", "Location", "dotted", "read_document", "read_entries"]
+
+# Two sections, as a person's first lines have them: a recording's sidecar has the machine's name, too.
+CONFIGURATION = FileKind(
+    "a machine's configuration",
+    frozenset({"machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state"}),
+    least=2,
+    others=frozenset({"acquisition", "votes", "effects"}),
+)
 
 
 @dataclass(frozen=True)
@@ -47,27 +55,24 @@ class Document:
         return value
 
 
-def read_document(path: Path) -> Document:
+def read_document(path: Path, kind: FileKind = CONFIGURATION) -> Document:
     """Read a YAML file of sections: a configuration, a sidecar, a preset.
 
-    Raises ConfigurationError for a file that cannot be read or is not YAML, with every problem of the YAML at once.
+    Raises ConfigurationError for a file that cannot be read, is not YAML or not of this kind, with every problem of the
+    YAML at once.
     """
-    data, lines = parse_yaml(read_text(path, "a configuration file"), path)
-    if not isinstance(data, dict):
-        raise ConfigurationError(Problem(where=str(path), what="must hold `key: value` sections at its top"))
+    data, lines = parse_yaml(read_text(path, kind.name), path, kind)
     return Document(path, data, lines)
 
 
-def read_entries(path: Path, key: str) -> Document:
-    """Read a YAML file of entries: a list, a mapping that has the list under `key`, or a single entry by itself.
+def read_entries(path: Path, kind: FileKind) -> Document:
+    """Read a YAML file of entries: a list, a mapping that has the list under `kind.listed_under`, or a single entry.
 
-    The document has the list under `key` in any case; a single entry is not a list: the mapping itself.
+    The document has the list under that key in any case; a single entry is not a list: the mapping itself.
     Raises ConfigurationError as `read_document` does, and for a file that is none of the three.
     """
-    data, lines = parse_yaml(read_text(path, f"a file of {key}"), path)
+    key = kind.listed_under
+    data, lines = parse_yaml(read_text(path, kind.name), path, kind)
     if isinstance(data, dict) and key in data:
         return Document(path, data, lines)
-    if not isinstance(data, list | dict):
-        allowed = f"a list of {key}, `{key}:` with that list, or a single one"
-        raise ConfigurationError(Problem(where=str(path), what=f"holds no {key}", allowed=allowed))
     return Document(path, {key: data}, {(key, *location): line for location, line in lines.items()})

@@ -324,7 +324,7 @@ def gauges_of(
                 Problem(
                     where=document.where(location),
                     what="needs `driver:`",
-                    value=value_text(raw.get("driver", "") if isinstance(raw, dict) else raw),
+                    value=value_text(raw.get("driver", "") if isinstance(raw, dict) else raw, location),
                     next_step="`compd check --drivers` lists them",
                 )
             )

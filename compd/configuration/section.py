@@ -14,6 +14,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from compd.configuration.document import Document, Location
 from compd.errors import Problem
+from compd.text.secrets import has_secret, holds_secret
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -144,12 +145,14 @@ def separate_errors(error: ValidationError) -> list[ErrorDetails]:
 
 
 def unknown_key(document: Document, location: Location, allowed: Sequence[str]) -> Problem:
-    """The problem of a key that nothing reads, with the allowed key that resembles it most."""
+    """The problem of a key that nothing reads, with the allowed key that resembles it most.
+
+    Its value is not shown: it may be a password, under whatever key somebody thought of.
+    """
     close = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
     return Problem(
         where=document.where(location),
         what="unknown key",
-        value=value_text(document.value(location)),
         allowed=", ".join(allowed),
         next_step=f"did you mean `{close[0]}`?" if close else "remove it",
     )
@@ -163,7 +166,7 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
         return Problem(
             where=where,
             what=context["what"],
-            value="" if value is None else value_text(value),
+            value="" if value is None else value_text(value, location),
             allowed=context["allowed"],
             next_step=context["next_step"],
         )
@@ -179,7 +182,7 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
         )
     if detail["type"] == "missing" and detail["loc"] and isinstance(detail["loc"][-1], int):
         return Problem(
-            where=document.where(location[:-1]), what="has too few entries", value=value_text(detail["input"])
+            where=document.where(location[:-1]), what="has too few entries", value=value_text(detail["input"], location)
         )
     if detail["type"] == "missing":
         return Problem(where=where, what="is missing", next_step=f"add `{location[-1]}:`")
@@ -197,7 +200,9 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
     if detail["type"] == "string_pattern_mismatch" and pattern in _PATTERNS:
         message = "is not what it must be"
     what = _WHAT.get(detail["type"], message)
-    return Problem(where=where, what=what, value=value_text(value), allowed=allowed, next_step=_remedy(what, value))
+    shown = value_text(value, location)
+    step = _remedy(what, value) if shown else ""
+    return Problem(where=where, what=what, value=shown, allowed=allowed, next_step=step)
 
 
 def _remedy(what: str, value: Any) -> str:
@@ -209,8 +214,10 @@ def _remedy(what: str, value: Any) -> str:
     return ""
 
 
-def value_text(value: Any) -> str:
-    """A value as a problem shows it: not at all where it is long, since the line is enough to find it."""
+def value_text(value: Any, location: Location = ()) -> str:
+    """A value as a problem shows it: not at all where it is long, since the line is enough to find it, or a secret."""
+    if holds_secret(location) or has_secret(value):
+        return ""
     text = repr(value)
     if len(text) <= _LONGEST_VALUE:
         return text

@@ -22,6 +22,8 @@ except ImportError:
 
 from compd.errors import ConfigurationError, Problem
 from compd.files.atomic_files import read_small_file
+from compd.files.file_kind import FileKind
+from compd.text.secrets import holds_secret
 
 Location = tuple[str | int, ...]
 
@@ -33,6 +35,8 @@ MOST_NODES = 100_000
 # PyYAML 6.0.4 reads ahead of the levels that are counted here, and has a limit of its own (1000): its words.
 _LIBRARYS_LIMIT = "maximum nesting depth"
 _LONGEST_KEY = 60
+# Parts of a file in the words of PyYAML: an alias, a tag, a character.
+_QUOTED = re.compile(r"\s*(?:'[^']*'|\"[^\"]*\")")
 
 _TAG = "tag:yaml.org,2002:"
 _MERGE = f"{_TAG}merge"
@@ -97,14 +101,10 @@ def decode(content: bytes, path: Path) -> str:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        before = content[: error.start]
-        line = before.count(b"\n") + 1
-        # most often it is text of Windows or of an old editor, in which every byte is a character
-        shown = content[before.rfind(b"\n") + 1 :].partition(b"\n")[0].decode("latin-1").strip()
+        line = content.count(b"\n", 0, error.start) + 1
         raise _unusable(
             f"{path}:{line}",
             "is not in UTF-8",
-            value=repr(shown[:_LONGEST_KEY]),
             allowed="UTF-8",
             next_step="save the file as UTF-8",
         ) from error
@@ -119,33 +119,41 @@ def decode(content: bytes, path: Path) -> str:
     return text
 
 
-def parse_yaml(text: str, path: Path, dumped: bool = False) -> tuple[Any, dict[Location, int]]:
+def parse_yaml(
+    text: str, path: Path, kind: FileKind | None = None, dumped: bool = False
+) -> tuple[Any, dict[Location, int]]:
     """The data of a YAML text, and the line of each part of it, from 1; parts that are merged have those of the anchor.
 
+    kind : of file that it is to be, of which nothing is quoted where it is of another one; None: of a text that the
+        person who reads the message has typed.
     dumped : whether compd itself has written it, with PyYAML.
-    Raises ConfigurationError with every problem at once, or with the place where the text is no YAML.
+    Raises ConfigurationError with every problem at once, or with the place where the text is no YAML, or where it is of
+    another kind.
     """
     loader = _DumpLoader(text) if dumped else _Loader(text)
     try:
         _check_structure(text, path)
         root = loader.get_single_node()
-        if root is None:
-            return None, {}
-        _check_size(root, path)
         reading = _Reading(loader, path)
-        data = reading.plain(root, ())
+        if root is None:
+            data = None
+        else:
+            _check_size(root, path)
+            data = reading.plain(root, ())
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         if _LIBRARYS_LIMIT in (error.problem or ""):
             raise _too_deep(path, line) from error
-        what = f"not YAML: {error.problem or error.context}"
+        what = f"not YAML: {_QUOTED.sub('', error.problem or error.context or 'it ends too soon')}"
         raise _unusable(
             f"{path}:{line}", what, next_step="mend this line; indent with spaces, write `key: value`"
         ) from error
     except yaml.YAMLError as error:
-        raise _unusable(path, f"not YAML: {str(error).splitlines()[0]}") from error
+        raise _unusable(path, "not YAML") from error
     finally:
         loader.dispose()
+    if kind is not None and not kind.recognises(data):
+        raise ConfigurationError(reading.unquoted or kind.refused(path))
     if reading.problems:
         raise ConfigurationError(reading.problems)
     return data, reading.lines
@@ -153,12 +161,16 @@ def parse_yaml(text: str, path: Path, dumped: bool = False) -> tuple[Any, dict[L
 
 @dataclass
 class _Reading:
-    """Turns nodes into plain data; the line of every part goes to `lines`, what is wrong to `problems`."""
+    """Turns nodes into plain data; the line of every part goes to `lines`, what is wrong to `problems`.
+
+    unquoted : the same problems without the keys and values of the file.
+    """
 
     loader: SafeLoader
     path: Path
     lines: dict[Location, int] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
+    unquoted: list[Problem] = field(default_factory=list)
 
     def plain(self, node: yaml.Node, location: Location) -> Any:
         """Data below `node`."""
@@ -240,11 +252,15 @@ class _Reading:
             return None
 
     def _refuse_tag(self, node: yaml.Node, location: Location) -> None:
-        tag = node.tag.replace(_TAG, "!!")
-        self._add(node.start_mark.line + 1, location, "tags are not used here", value=tag, next_step="delete the tag")
+        self._add(node.start_mark.line + 1, location, "tags are not used here", next_step="delete the tag")
 
     def _add(self, line: int, location: Location, what: str, **rest: str) -> None:
-        self.problems.append(Problem(where=f"{self.path}:{line} {dotted(location)}".rstrip(), what=what, **rest))
+        if holds_secret(location):
+            rest.pop("value", None)
+        where = f"{self.path}:{line}"
+        self.problems.append(Problem(where=f"{where} {dotted(location)}".rstrip(), what=what, **rest))
+        rest.pop("value", None)
+        self.unquoted.append(Problem(where=where, what=what, **rest))
 
 
 def _check_structure(text: str, path: Path) -> None:
@@ -267,7 +283,6 @@ def _check_structure(text: str, path: Path) -> None:
                 raise _unusable(
                     f"{path}:{line}",
                     "this alias stands within what it stands for",
-                    value=f"*{event.anchor}",
                     next_step="write out what is meant",
                 )
     finally:

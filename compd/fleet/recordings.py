@@ -10,7 +10,7 @@ from compd.configuration.yaml_reader import parse_yaml, read_text
 from compd.errors import CompdError, Problem
 from compd.fleet.fleet_recording import FleetRecording, RecordingFiles
 from compd.fleet.machine_names import MachinesBy, machine_in, matches_of, name_machines
-from compd.recording.sidecar import SECTIONS
+from compd.recording.sidecar import SECTIONS, SIDECAR
 
 # What the table of a recording may end in. Where two tables have one sidecar, the first of these counts.
 TABLES = (".csv", ".parquet")
@@ -142,7 +142,7 @@ def _has_own_columns(file: Path) -> bool:
 def _looks_like_sidecar(path: Path) -> bool:
     """Whether a YAML file names a machine and has no key that a sidecar has not: no configuration, no model file."""
     try:
-        data, _ = parse_yaml(read_text(path, "a sidecar"), path)
+        data, _ = parse_yaml(read_text(path, SIDECAR.name), path, SIDECAR)
     except CompdError:
         return False
     return isinstance(data, dict) and "machine" in data and set(data) <= set(SECTIONS)

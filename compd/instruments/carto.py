@@ -80,7 +80,7 @@ class _CartoReader:
     def read(self, content: bytes) -> InstrumentExport | None:
         data = _DATA.search(content[:_LONGEST_HEADER])
         if not content.lstrip().startswith(MAGIC):
-            self._add(":1", "is no CARTO .rtx", repr(content[:20]), "a file that begins with HEADER::", "check --as")
+            self._add(":1", "is no CARTO .rtx", "", "a file that begins with HEADER::", "check --as")
         elif data is None:
             self._add("", "has no data", allowed="a line `Data:`", next_step="export it again: the file is incomplete")
         if self.problems or data is None:

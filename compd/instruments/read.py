@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from compd.errors import RecordingError
+from compd.files.file_kind import without_values
 from compd.instruments.columns import to_export
 from compd.instruments.delimited import read_delimited
 from compd.instruments.export import SHAPES, InstrumentExport, ReadOptions
 from compd.instruments.export_problems import ExportProblems
 from compd.instruments.raw_table import RawTable
+from compd.instruments.recognition import is_of_numbers, is_table, no_table
 from compd.instruments.spatial_analyzer import is_spatial_analyzer, read_spatial_analyzer
 from compd.instruments.text_file import decode_text, read_content
 
@@ -26,7 +28,14 @@ def read_export(path: Path, options: ReadOptions | None = None) -> InstrumentExp
     """
     options = options or ReadOptions()
     table = read_table(path, options)
-    return table if isinstance(table, InstrumentExport) else to_export(table, options)
+    if isinstance(table, InstrumentExport):
+        return table
+    try:
+        return to_export(table, options)
+    except RecordingError:
+        if is_of_numbers(table.columns):
+            raise
+        raise RecordingError(no_table(path)) from None
 
 
 def read_table(path: Path, options: ReadOptions) -> RawTable | InstrumentExport:
@@ -63,6 +72,11 @@ def _shape_of_bytes(path: Path, content: bytes) -> str | None:
 
 def _read_text(path: Path, content: bytes, options: ReadOptions) -> RawTable:
     text = decode_text(path, content)
-    if options.shape == "sa" or (options.shape is None and is_spatial_analyzer(text)):
-        return read_spatial_analyzer(text, options)
-    return read_delimited(text, options)
+    try:
+        if options.shape == "sa" or (options.shape is None and is_spatial_analyzer(text)):
+            return read_spatial_analyzer(text, options)
+        return read_delimited(text, options)
+    except RecordingError as error:
+        if is_table(text.lines):
+            raise
+        raise RecordingError(without_values(error.problems)) from None

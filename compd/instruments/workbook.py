@@ -12,7 +12,14 @@ from compd.errors import Problem, RecordingError
 from compd.instruments.export import ReadOptions
 from compd.instruments.raw_table import RawTable
 from compd.instruments.workbook_cells import VALUES, Row, SheetReader, cell_name
-from compd.instruments.workbook_parts import BROKEN, SheetPart, check_workbook_file, read_sheet_part, unreadable
+from compd.instruments.workbook_parts import (
+    BROKEN,
+    SheetPart,
+    check_workbook_file,
+    read_sheet_part,
+    unreadable,
+    why_broken,
+)
 from compd.instruments.workbook_table import SheetTable, find_table
 
 if TYPE_CHECKING:
@@ -41,7 +48,7 @@ def read_workbook(path: Path, options: ReadOptions) -> RawTable:
         try:
             return _read(path, options)
         except BROKEN as error:
-            raise RecordingError(unreadable(path, str(error) or type(error).__name__)) from error
+            raise RecordingError(unreadable(path, why_broken(error))) from error
 
 
 def sheet_names(path: Path) -> tuple[str, ...]:
@@ -52,7 +59,7 @@ def sheet_names(path: Path) -> tuple[str, ...]:
     try:
         book = load_workbook(path, read_only=True)
     except BROKEN as error:
-        raise RecordingError(unreadable(path, str(error) or type(error).__name__)) from error
+        raise RecordingError(unreadable(path, why_broken(error))) from error
     try:
         return tuple(sheet.title for sheet in book.worksheets)
     finally:

@@ -58,17 +58,13 @@ def check_workbook_file(path: Path) -> None:
         what = "is of an Excel before 2007 (.xls), or has a password"
         raise RecordingError(Problem(where=str(path), what=what, allowed=".xlsx", next_step=_SAVE_AS))
     if not begin.startswith(_ZIP):
-        raise RecordingError(
-            Problem(
-                where=str(path), what="is no .xlsx file", value=repr(begin), allowed=".xlsx", next_step="check --as"
-            )
-        )
+        raise RecordingError(Problem(where=str(path), what="is no .xlsx file", allowed=".xlsx", next_step="check --as"))
     try:
         with zipfile.ZipFile(path) as archive:
             unpacked = sum(part.file_size for part in archive.infolist())
             names = archive.namelist()
     except BROKEN as error:
-        raise RecordingError(unreadable(path, str(error))) from error
+        raise RecordingError(unreadable(path, why_broken(error))) from error
     if size > MOST_BYTES or unpacked > MOST_UNPACKED_BYTES:
         raise RecordingError(
             Problem(
@@ -85,6 +81,12 @@ def check_workbook_file(path: Path) -> None:
         raise RecordingError(
             Problem(where=str(path), what="is a binary workbook (.xlsb)", allowed=".xlsx", next_step=_SAVE_AS)
         )
+
+
+def why_broken(error: Exception) -> str:
+    """Why a workbook cannot be read. The words of other errors than an archive's may be a part of the file."""
+    words = str(error) if isinstance(error, zipfile.BadZipFile | NotImplementedError | EOFError) else ""
+    return words if words and "'" not in words else type(error).__name__
 
 
 def unreadable(path: Path, reason: str) -> Problem:

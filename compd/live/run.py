@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import structlog
 
 from compd.clock import MonotonicClock
@@ -14,7 +12,9 @@ from compd.live.events import name_event
 from compd.live.journal import Journal
 from compd.live.processes.supervisor import Ending, Supervisor
 from compd.live.systemd import Notifier
+from compd.log import hide_secrets_of_libraries, log_to_stderr
 from compd.machine_check import load_whole
+from compd.text.secrets import hide_secrets
 
 _log = structlog.get_logger()
 
@@ -83,19 +83,11 @@ def _report(daemon: Daemon) -> None:
 
 def _log_to_stderr() -> None:
     """Log one line per event to stderr, with colours on a terminal; under systemd an entry of the journal."""
-    named = [structlog.processors.add_log_level, name_event]
-    if (journal := Journal.from_environment()) is not None:
-        structlog.configure(
-            processors=[*named, structlog.processors.format_exc_info, journal.render], logger_factory=journal
-        )
+    hide_secrets_of_libraries()
+    if (journal := Journal.from_environment()) is None:
+        log_to_stderr([name_event])
         return
+    named = [structlog.processors.add_log_level, name_event]
     structlog.configure(
-        processors=[
-            *named,
-            structlog.processors.TimeStamper(fmt="iso"),
-            structlog.dev.ConsoleRenderer()
-            if sys.stderr.isatty()
-            else structlog.processors.LogfmtRenderer(key_order=["timestamp", "level", "id", "event"]),
-        ],
-        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+        processors=[*named, structlog.processors.format_exc_info, hide_secrets, journal.render], logger_factory=journal
     )

@@ -29,7 +29,9 @@ from pydantic_core import ErrorDetails
 from compd.configuration.yaml_reader import decode, parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem, StateError
 from compd.files.atomic_files import write_files
+from compd.files.file_kind import FileKind
 from compd.release import __version__
+from compd.text.secrets import has_secret, holds_secret
 
 FORMAT = 2
 Kind = Literal["add", "remove", "fit", "undo"]
@@ -125,6 +127,15 @@ class ModelDocument(FilePart):
     )
 
 
+MODEL = FileKind(
+    "a model file",
+    frozenset({"machine", "effects"}),
+    least=2,
+    others=frozenset(ModelDocument.model_fields),
+    next_step="`compd effect add` writes one",
+)
+
+
 def read_stored(path: Path) -> StoredModel:
     """Read a model file without looking up its effects.
 
@@ -142,22 +153,10 @@ def read_document(path: Path, content: bytes | None = None) -> tuple[ModelDocume
     """
     where = str(path)
     try:
-        text = (
-            read_text(path, "a model file; `compd effect add` writes one") if content is None else decode(content, path)
-        )
-        data, _ = parse_yaml(text, path, dumped=True)
+        text = read_text(path, f"{MODEL.name}; {MODEL.next_step}") if content is None else decode(content, path)
+        data, _ = parse_yaml(text, path, MODEL, dumped=True)
     except ConfigurationError as error:
         raise StateError(error.problems) from error
-    if not isinstance(data, dict):
-        raise StateError(
-            Problem(
-                where=where,
-                what="is no model file",
-                value=str(data)[:80],
-                allowed=", ".join(ModelDocument.model_fields),
-                next_step="`compd effect add` writes one",
-            )
-        )
     if isinstance(data.get("format"), int) and data["format"] > FORMAT:
         raise StateError(
             Problem(
@@ -201,10 +200,17 @@ def _problem(detail: ErrorDetails, where: str) -> Problem:
     return Problem(
         where=f"{where}{place}",
         what=what,
-        value="" if detail["type"] == "missing" else str(detail["input"])[:80],
+        value=_shown(detail),
         allowed=allowed,
         next_step="mend it, or take the file from a copy",
     )
+
+
+def _shown(detail: ErrorDetails) -> str:
+    """The value that is wrong; not that of an unknown key, which may be anything, nor a secret."""
+    hidden = detail["type"] in ("missing", "extra_forbidden", "unexpected_keyword_argument")
+    secret = holds_secret(detail["loc"]) or has_secret(detail["input"])
+    return "" if hidden or secret else str(detail["input"])[:80]
 
 
 class _DumperWithoutAliases(yaml.SafeDumper):

@@ -10,10 +10,14 @@ from typing import get_args
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from compd.configuration.yaml_reader import parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem
+from compd.files.file_kind import FileKind
 from compd.page.guard import Role, Token, hashed, new_token
 
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
+_MADE_BY = "compd page --new-token makes it"
+TOKENS = FileKind("a file of tokens", frozenset({"tokens"}), least=1, next_step=_MADE_BY)
 
 
 class _File(BaseModel):
@@ -22,18 +26,30 @@ class _File(BaseModel):
 
 
 def read_tokens(path: Path) -> list[Token]:
-    """The tokens in the file. Raises ConfigurationError where others may read it, or it is no such file."""
+    """The tokens in the file, none in an empty one.
+
+    Raises ConfigurationError where others may read it, or it is no such file.
+    """
     try:
         mode = path.stat().st_mode
-        text = path.read_text(encoding="utf-8")
     except OSError as error:
-        raise _problem(path, f"cannot be read: {error.strerror}", "compd page --new-token makes it") from error
+        raise _problem(path, f"cannot be read: {error.strerror}", _MADE_BY) from error
     if mode & _OTHERS:
         raise _problem(path, f"can be read by others (mode {stat.S_IMODE(mode):o})", f"chmod 600 {path}")
+    text = read_text(path, TOKENS.name)
+    if not text.strip():
+        return []
     try:
-        return _File.model_validate(yaml.safe_load(text)).tokens
-    except (yaml.YAMLError, ValidationError) as error:
-        raise _problem(path, f"is no file of tokens: {error}", "compd page --new-token makes it") from error
+        data, _ = parse_yaml(text, path, TOKENS, dumped=True)
+        return _File.model_validate(data).tokens
+    except ConfigurationError as error:
+        # of this file nothing is quoted, nor any key
+        line = error.problems[0].where.removeprefix(f"{path}").partition(" ")[0]
+        raise _problem(f"{path}{line}", f"is not {TOKENS.name}", _MADE_BY) from None
+    except ValidationError as error:
+        numbers = [detail["loc"][1] for detail in error.errors(include_input=False) if len(detail["loc"]) > 1]
+        place = f"{path}, token {int(numbers[0]) + 1}" if numbers else str(path)
+        raise _problem(place, f"is not {TOKENS.name}", _MADE_BY) from None
 
 
 def add_token(path: Path, role_and_name: str) -> str:
@@ -53,10 +69,13 @@ def add_token(path: Path, role_and_name: str) -> str:
     beside = path.with_name(path.name + ".new")
     descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+        if os.geteuid() == 0 and path.exists():  # an administrator adds one: the page's user goes on reading the file
+            owner = path.stat()
+            os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
         file.write(text)
     beside.replace(path)
     return token
 
 
-def _problem(path: Path, what: str, next_step: str) -> ConfigurationError:
+def _problem(path: Path | str, what: str, next_step: str) -> ConfigurationError:
     return ConfigurationError(Problem(where=str(path), what=what, next_step=next_step))

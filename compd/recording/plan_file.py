@@ -159,6 +159,16 @@ class _PlanFileReader:
             raise CompdError(
                 Problem(where=str(self._path), what="is empty", allowed="a header and rows", next_step=WRITTEN_BY)
             )
+        if not set(NEEDED_COLUMNS) & set(rows[0][1]):
+            # nothing of a file is quoted that is no plan
+            raise CompdError(
+                Problem(
+                    where=f"{self._path}:1",
+                    what="is no header of a plan",
+                    allowed=", ".join(NEEDED_COLUMNS),
+                    next_step=WRITTEN_BY,
+                )
+            )
         return rows
 
     def _check_header(self, header: Sequence[str]) -> None:

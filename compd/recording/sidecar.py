@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, mo
 from compd.configuration.document import Document, read_document
 from compd.configuration.section import Section, refusal, unknown_key, validate
 from compd.errors import ConfigurationError, Problem, RecordingError
+from compd.files.file_kind import FileKind
 from compd.recording.reference import Quantity, Reference
 from compd.units import REFERENCE_UNITS
 
@@ -163,6 +164,15 @@ SECTIONS: Mapping[str, Any] = {
 }
 
 
+SIDECAR = FileKind(
+    "the sidecar of a recording",
+    frozenset({"machine", "reference", "excluded_rows", "folds"}),
+    least=1,
+    others=frozenset(SECTIONS),
+    next_step=f"write it: {_EXAMPLE}",
+)
+
+
 @dataclass(frozen=True)
 class Sidecar:
     """A sidecar, checked by itself.
@@ -207,7 +217,7 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
         problems.append(Problem(where=str(path), what="the sidecar is missing", next_step=f"write it: {_EXAMPLE}"))
         return None
     try:
-        document = read_document(path)
+        document = read_document(path, SIDECAR)
     except ConfigurationError as error:
         problems += error.problems
         return None

@@ -18,11 +18,19 @@ from pydantic import BaseModel, ValidationError
 
 from compd.configuration.document import Document, Location, read_document
 from compd.errors import ConfigurationError, PluginError, Problem
+from compd.files.file_kind import FileKind
 from compd.gauge import Gauge
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd_drivers.preset import Preset
 
 SUFFIX = ".yaml"
+PRESET = FileKind(
+    "a preset",
+    frozenset({"title", "delivers", "source", "base", "gauge"}),
+    least=2,
+    others=frozenset(Preset.model_fields),
+    next_step="drivers/compd_drivers/presets/README.md says what a preset may hold",
+)
 WORDS = {"missing": "is missing", "extra_forbidden": "unknown key"}
 
 
@@ -46,7 +54,7 @@ class PresetDirectory:
             )
         try:
             with as_file(self._folder / f"{name}{SUFFIX}") as path:
-                document = read_document(path)
+                document = read_document(path, PRESET)
             return Preset.model_validate(document.data), document
         except ConfigurationError as error:
             raise PluginError(error.problems) from error
@@ -135,12 +143,12 @@ def _problems(document: Document, error: ValidationError, root: Location = ()) -
             problems += _problems(document, in_description, ("gauge",))
             continue
         location = (*root, *detail["loc"])
-        value = document.value(location)
+        value, unknown = document.value(location), detail["type"] == "extra_forbidden"
         problems.append(
             Problem(
                 where=document.where(location),
                 what=WORDS.get(detail["type"], detail["msg"].removeprefix("Value error, ")),
-                value="" if value is None or isinstance(value, dict | list) else str(value),
+                value="" if unknown or value is None or isinstance(value, dict | list) else str(value),
                 allowed=str(context.get("expected") or context.get("pattern") or ""),
                 next_step="drivers/compd_drivers/presets/README.md says what a preset may hold",
             )

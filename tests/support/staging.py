@@ -2,7 +2,7 @@
 
 What a page writes below /opt, /etc and /usr/lib goes into the stage. `sudo` runs the command that follows.
 `python3 -m venv` makes an environment whose pip does not install, but checks what it is told (.ci/run builds and
-installs the wheel).
+installs the wheel). `install` leaves the owner of a file out, a user that has been made in the stage alone.
 `systemd-sysusers` runs with the stage as its root. `systemctl` checks that what it is told to start could be started.
 """
 
@@ -19,7 +19,7 @@ from pathlib import Path
 from tests.support.paths import ROOT
 
 PREFIXES = ("/opt/", "/etc/", "/usr/lib/")
-PROGRAMS = ("sudo", "python3", "systemctl", "systemd-sysusers")
+PROGRAMS = ("sudo", "python3", "install", "systemctl", "systemd-sysusers")
 # Directories that a system has before anything is installed.
 DIRECTORIES = ("opt", "etc/systemd/system", "usr/lib/sysusers.d")
 
@@ -68,6 +68,13 @@ def _pip(stage: Path, arguments: list[str]) -> None:
     (stage / "opt/compd/bin/compd").symlink_to(Path(sys.executable).parent / "compd")
 
 
+def _install(_: Path, arguments: list[str]) -> None:
+    match arguments:
+        case ["-m", mode, "-o", "compd-page", "-g", "compd-page", *files]:
+            arguments = ["-m", mode, *files]
+    os.execv("/usr/bin/install", ["install", *arguments])
+
+
 def _sysusers(stage: Path, arguments: list[str]) -> None:
     program = shutil.which("systemd-sysusers", path="/usr/bin:/bin")
     if program is None:
@@ -82,6 +89,8 @@ def _systemctl(stage: Path, arguments: list[str]) -> None:
     match arguments:
         case ["daemon-reload"]:
             pass
+        case ["restart", name] if (stage / f"etc/systemd/system/{name}.service").is_file():
+            pass
         case ["enable", "--now", name]:
             _check_unit(stage, stage / f"etc/systemd/system/{name}.service")
         case _:
@@ -91,7 +100,7 @@ def _systemctl(stage: Path, arguments: list[str]) -> None:
 def _check_unit(stage: Path, unit: Path) -> None:
     """The unit's program and configuration are there, its user has been made, and systemd accepts it."""
     text = unit.read_text()
-    start = re.search(r"(?m)^ExecStart=(\S+) run (\S+)$", text)
+    start = re.search(r"(?m)^ExecStart=(\S+) (?:run|page) (\S+)(?: .*)?$", text)
     user = re.search(r"(?m)^User=(\S+)$", text)
     assert start is not None, text
     assert user is not None, text
@@ -106,7 +115,10 @@ def _check_unit(stage: Path, unit: Path) -> None:
     subprocess.run(["systemd-analyze", "verify", "--man=no", str(copy)], check=True)
 
 
-MAIN = {"sudo": _sudo, "python3": _python3, "pip": _pip, "systemd-sysusers": _sysusers, "systemctl": _systemctl}
+MAIN = {
+    **{"sudo": _sudo, "python3": _python3, "pip": _pip, "install": _install},
+    **{"systemd-sysusers": _sysusers, "systemctl": _systemctl},
+}
 
 if __name__ == "__main__":
     MAIN[sys.argv[2]](Path(sys.argv[1]), sys.argv[3:])

@@ -1,10 +1,11 @@
-"""The shipped unit under a real systemd, in a container: what it promises on a machine whose gauges are simulated.
+"""The shipped units under a real systemd, in a container: what they promise on a machine whose gauges are simulated.
 
 The times that are printed (`make service`) are this computer's.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import tempfile
 import time
@@ -26,6 +27,8 @@ UNITS = Path("/opt/systemd")
 SIMULATED = Path("/run/simulated")
 MACHINE = Path("/etc/compd/machine.yaml")
 SOCKET = Path("/run/compd/compd.sock")
+TOKENS = Path("/etc/compd/page-tokens.yaml")
+OF_THE_PAGE = Path("/var/lib/compd-page")
 SHIPPED = "tripod-cmm.yaml"
 
 MOST_EXPOSURE = 2.0
@@ -270,3 +273,149 @@ def test_stop_ends_at_once_and_by_itself(service: Service) -> None:
     assert service.shown("ExecMainStatus") == "0"
     assert not service.container.path(SOCKET).exists()
     assert took_s <= STOP_S
+
+
+@dataclass(frozen=True)
+class PageService:
+    """The page as systemd runs it beside the daemon. token : of a person who may operate."""
+
+    service: Service
+    token: str
+
+    def as_its_user(self, command: str, user: str = "compd-page") -> bool:
+        """Whether a command of the shell succeeds in the page's mounts. user : that runs it, with its groups."""
+        pid = self.service.systemctl("show", "--value", "--property=MainPID", "compd-page").strip()
+        command = f"{command} >/dev/null 2>&1 && echo succeeded"
+        entered = ("nsenter", f"--target={pid}", "--mount", "setpriv", f"--reuid={user}", f"--regid={user}")
+        words = self.service.container.run(*entered, "--init-groups", "sh", "-c", command, check=False)
+        return words == "succeeded\n"
+
+    def asked(self, *requests: tuple[str, Any]) -> dict[str, Any]:
+        """What a browser with the token gets: `state` of an event that is ok, and each request's status and answer."""
+        words = self.service.container.run(
+            f"{COMPD}/bin/python3", "-c", _BROWSER, self.token, json.dumps(requests), check=True
+        )
+        return dict(json.loads(words))
+
+
+# What a browser does: the token becomes a cookie, the stream tells the connection's id, orders come from the page.
+_BROWSER = """
+import http.client, json, sys, time
+token, requests = sys.argv[1], json.loads(sys.argv[2])
+
+def ask(method, path, body=None, headers={}):
+    connection = http.client.HTTPConnection("127.0.0.1", 7760, timeout=60)
+    connection.request(method, path, None if body is None else json.dumps(body), headers)
+    return connection.getresponse()
+
+entered = ask("GET", "/?token=" + token)
+own = {"Cookie": entered.getheader("Set-Cookie", "").partition(";")[0], "Origin": "http://127.0.0.1:7760"}
+stream = ask("GET", "/live", headers=own)
+data = (json.loads(line[5:]) for line in stream if line.startswith(b"data:"))
+id = next(data)["id"]
+state = next(event for event in data if '"ok"' in json.dumps(event)) and "ok"
+answers = []
+for path, keys in requests:
+    answer = ask("POST", path, {"id": id, **keys}, own)
+    answers.append([answer.status, answer.read().decode()])
+print(json.dumps({"state": state, "answers": answers}))
+"""
+
+
+@pytest.fixture(scope="module")
+def installed_page(installed: Service) -> PageService:
+    """The page's unit, installed as its header says, enabled, with one token."""
+    container = installed.container
+    header = re.findall(r"(?m)^#   ((?:install|systemctl) .*)$", (ROOT / "systemd/compd-page.service").read_text())
+    assert len(header) == 4
+    for line in header:
+        container.run("sh", "-ec", f"cd {UNITS}; {line}")
+    added = container.run(f"{COMPD}/bin/compd", "page", f"--tokens={TOKENS}", "--new-token=operate:anna")
+    installed.systemctl("restart", "compd-page")
+    return PageService(installed, added.strip())
+
+
+@pytest.fixture
+def page(service: Service, installed_page: PageService) -> PageService:
+    """The page, active and listening, beside a daemon that is ok."""
+    service.systemctl("start", "compd-page")
+
+    def answers() -> bool:
+        script = "import http.client as h; c = h.HTTPConnection('127.0.0.1', 7760); c.request('GET', '/')"
+        return "no" not in service.container.run(
+            "sh", "-c", f'{COMPD}/bin/python3 -c "{script}" || echo no', check=False
+        )
+
+    try:
+        wait_until(answers, "the page", PATIENCE_S)
+    except AssertionError as error:
+        raise AssertionError(page_log(service)) from error
+    return installed_page
+
+
+def page_log(service: Service) -> str:
+    return service.container.run("journalctl", "--unit=compd-page", "--output=cat", "--no-pager", check=False)
+
+
+def test_the_page_has_a_user_of_its_own_that_reaches_the_socket_and_nothing_else(page: PageService) -> None:
+    run, daemon = page.service.container.run, page.service
+    pid = daemon.systemctl("show", "--value", "--property=MainPID", "compd-page").strip()
+    assert run("ps", "-o", "user=", "-p", pid).startswith("compd-pa")
+    assert run("ps", "-o", "user=", "-p", daemon.shown("MainPID")).strip() == "compd"
+    assert page.as_its_user(f"test -w {SOCKET}")
+    assert page.as_its_user(f"cat {TOKENS}"), "root has added a token, and the file is still the page's"
+    for path in ("/etc/shadow", "/var/lib/compd", "/var/lib/compd/machine-zero.json", "/var/cache/compd"):
+        assert run("ls", path).strip()
+        assert not page.as_its_user(f"cat {path}/* || cat {path} || ls {path}"), path
+    for place in ("/", "/etc", "/etc/compd", "/opt", "/run", "/run/compd", "/var", "/var/lib", "/usr", "/dev", "/home"):
+        assert not page.as_its_user(f"touch {place}/x"), place
+    assert not page.as_its_user(f"touch {TOKENS}"), "it gives nobody a token"
+    for place in (OF_THE_PAGE, OF_THE_PAGE / "recordings", OF_THE_PAGE / "models", "/var/cache/compd-page", "/tmp"):
+        assert page.as_its_user(f"touch {place}/x && rm {place}/x"), place
+    assert not page.as_its_user("ls /dev/ttyS* || ls /dev/kmsg || ls /dev/cpu_dma_latency"), "no devices"
+    assert not page.as_its_user(f"ls {OF_THE_PAGE}", user="compd"), "the daemon reads nothing of the page's"
+
+
+def test_a_browser_with_a_token_sees_arms_and_orders_and_the_page_records(page: PageService) -> None:
+    name = "from-the-page"
+    said = page.asked(
+        ("/orders/zero", {"subject": "replace"}),
+        ("/arm", {}),
+        ("/orders/zero", {"subject": "replace"}),
+        ("/recordings", {"name": name}),
+    )
+    assert said["state"] == "ok"
+    assert [status for status, _ in said["answers"]] == [403, 200, 200, 200], said
+    recordings = page.service.container.path(OF_THE_PAGE / "recordings")
+    wait_until(lambda: list(recordings.glob(f"{name}*")), "a recording", PATIENCE_S)
+    page.asked(("/recordings", {"stop": True}))
+    assert all(file.stat().st_mode & 0o077 == 0 for file in recordings.glob(f"{name}*"))
+    assert page.token not in page_log(page.service) + page.service.log()
+
+
+def test_a_model_of_the_page_goes_to_the_daemon_by_an_open_descriptor(page: PageService) -> None:
+    """The daemon may not read the file: it gets it opened."""
+    model = OF_THE_PAGE / "models" / "page.model.yaml"
+    words = "format: 2\\nmachine: tripod-cmm\\neffects: []\\n"
+    assert page.as_its_user(f"umask 077; printf '{words}' > {model}; cat {model}")
+    assert not page.as_its_user(f"cat {model}", user="compd")
+    said = page.asked(("/arm", {}), ("/orders/shadow", {"subject": model.name}))
+    assert [status for status, _ in said["answers"]] == [200, 200], said
+
+
+def test_page_and_daemon_stop_and_start_alone(page: PageService) -> None:
+    daemon = page.service
+    main = daemon.shown("MainPID")
+    daemon.systemctl("stop", "compd-page")
+    assert daemon.shown("MainPID") == main
+    assert daemon.systemctl("show", "--value", "--property=Result", "compd-page").strip() == "success"
+    daemon.systemctl("start", "compd-page")
+    daemon.systemctl("stop", "compd")
+    assert daemon.systemctl("is-active", "compd-page").strip() == "active"
+
+
+def test_the_pages_exposure_is_at_most_two(page: PageService) -> None:
+    last = page.service.container.run("systemd-analyze", "security", "--no-pager", "compd-page").splitlines()[-1]
+    exposure = re.search(r"exposure level for compd-page.service: ([\d.]+)", last)
+    assert exposure is not None, last
+    assert float(exposure[1]) <= MOST_EXPOSURE

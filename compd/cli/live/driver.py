@@ -40,7 +40,7 @@ def try_on_wires(
     from compd.commissioning.conformance.report import driver_under_test
     from compd.errors import PluginError
 
-    chosen = _read_options(options) if options else None
+    chosen = _read_options(options, name) if options and name else None
     if name is not None:
         failed = _try(driver_under_test(name, chosen, simulator), quick)
     else:
@@ -85,8 +85,11 @@ def _print_table(name: str, results: list[tuple[str, CaseResult]]) -> None:
     typer.echo(f"{name}: {failed} of {len(results)} cases failed" if failed else f"{name}: nothing failed")
 
 
-def _read_options(path: Path) -> dict[str, Any]:
+def _read_options(path: Path, driver: str) -> dict[str, Any]:
     from compd.configuration.document import read_document
+    from compd.files.file_kind import FileKind
+    from compd.plugins import GAUGES, load
 
-    data = read_document(path).data
+    keys = load(GAUGES, driver, f"driver {driver}").Options.model_fields
+    data = read_document(path, FileKind(f"a file of options of {driver}", frozenset(keys), least=1)).data
     return {key: value for key, value in data.items() if key not in ("driver", "line")}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 from urllib.parse import urlsplit
@@ -44,6 +45,7 @@ def page(
     It runs until Ctrl-C, beside the daemon, and prints the address to open.
     """
     from compd.cli.options import unix_address
+    from compd.log import hide_secrets_of_libraries, is_journal, log_to_stderr
     from compd.page.guard import Token, hashed
     from compd.page.guard import new_token as make_token
     from compd.page.run import run_page
@@ -62,8 +64,15 @@ def page(
             for token in read_tokens(_needed(tokens, "--behind" if listen is None else "--listen", f"; {_TLS}"))
         ]
 
+    # a token of the command's own is for who has started it, on the terminal or behind a pipe, and not for a log
+    shown = alone and not is_journal(sys.stdout)
+    log_to_stderr()
+    hide_secrets_of_libraries()
+
     def started(origin: str) -> None:
-        typer.echo(f"open {origin}/?token={own if alone else 'YOUR-TOKEN'}")
+        typer.echo(f"open {origin}/?token={own if shown else 'YOUR-TOKEN'}")
+        if alone and not shown:
+            typer.echo("its token would be in the journal, for others to read: give --tokens and --listen", err=True)
         if listen is not None and behind is None:
             typer.echo(_TLS, err=True)
 

@@ -35,8 +35,9 @@ def read_capture(path: Path) -> list[CapturedReply]:
     request, captured = b"", []
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        raise CompdError(Problem(where=str(path), what=f"cannot be read: {error.strerror}")) from error
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is not in UTF-8"
+        raise CompdError(Problem(where=str(path), what=f"cannot be read: {why}")) from error
     for number, line in enumerate(lines, start=1):
         text = line.strip()
         if not text or text.startswith("#"):
@@ -67,7 +68,6 @@ def _bytes_of_line(where: str, text: str) -> bytes:
             Problem(
                 where=where,
                 what="is neither sent nor received",
-                value=text,
                 allowed="> hex, < hex, or quoted text, # comment",
             )
         )
@@ -76,9 +76,7 @@ def _bytes_of_line(where: str, text: str) -> bytes:
             return unescaped(data[1:-1])
         return bytes.fromhex(data)
     except ValueError as error:
-        raise CompdError(
-            Problem(where=where, what=f"cannot be read: {error}", value=data, allowed='3F 0D, or "?\\r"')
-        ) from error
+        raise CompdError(Problem(where=where, what=f"cannot be read: {error}", allowed='3F 0D, or "?\\r"')) from error
 
 
 def unescaped(text: str) -> bytes:

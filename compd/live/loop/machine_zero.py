@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.errors import Problem, StateError
 from compd.files.atomic_files import read_small_file, write_files
+from compd.files.file_kind import FileKind
 
 FILE_NAME = "machine-zero.json"
 # The machine zero before the present one, as its file was.
@@ -33,6 +34,15 @@ class _ZeroFile(BaseModel):
     taken_at: str
     readings_mm: dict[str, FiniteFloat]
     checksum: str = ""
+
+
+ZERO_FILE = FileKind(
+    "a machine zero",
+    frozenset({"zero_hash", "taken_at", "readings_mm"}),
+    least=2,
+    others=frozenset(_ZeroFile.model_fields),
+    next_step=_TAKE_ONE,
+)
 
 
 @dataclass(frozen=True)
@@ -146,6 +156,8 @@ def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> Mac
 
 def _parse_zero(content: Any, path: Path) -> MachineZero:
     """The machine zero in the content of the file. Raises StateError for anything that is wrong with it."""
+    if not ZERO_FILE.recognises(content):
+        raise StateError(ZERO_FILE.refused(path))
     if isinstance(content, dict) and isinstance(version := content.get("format"), int) and version > _FORMAT:
         raise StateError(
             Problem(

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, NoReturn, Self
 from pydantic import ValidationError
 
 from compd.text.json_text import encode_compact
+from compd.text.secrets import holds_secret
 
 PROTOCOL = 1
 MAX_LINE_BYTES = 4096
@@ -136,6 +137,8 @@ def bad_message(error: ValidationError, name: str, allowed: tuple[str, ...]) -> 
     details = error.errors(include_url=False)
     detail = next((detail for detail in details if detail["type"] == "extra_forbidden"), details[0])
     value, context = detail["input"], detail.get("ctx", {})
+    if holds_secret(allowed):  # whatever stands there may be the token, also under a key that is spelt wrongly
+        return ProtocolError(ErrorCode.BAD_MESSAGE, f"{name} needs {', '.join(allowed)}, a text, and nothing else")
     if not detail["loc"] and detail["type"] == "string_unicode":  # the key itself
         return unknown_key(name, str(value), allowed)
     key = str(detail["loc"][0]) if detail["loc"] else name

@@ -191,7 +191,7 @@ class Publisher:
             return self._requests.answer(session, received, partial(self._answer_later, session))
         except ProtocolError as error:
             if not session.authorized and session.is_heard:
-                _log.warning("a client has not shown the token", client=session.name, reason=error.text)
+                _log.warning("a client has not shown the token", client=session.name, reason=error.code)
                 session.dismissed_s = self._clock.monotonic() + WRONG_TOKEN_REST_S
             return error.to_json() if session.is_heard else b""
         finally:

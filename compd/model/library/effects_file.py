@@ -10,14 +10,24 @@ from compd.configuration.document import Document, read_entries
 from compd.configuration.section import unknown_key
 from compd.configuration.shipped import shipped_effects
 from compd.errors import CompdError, ConfigurationError, PluginError, Problem
+from compd.files.file_kind import FileKind
 from compd.model.effect import Effect
 from compd.model.formula.declaration import formula_effect
+from compd.model.formula.keys import FormulaDeclaration
 from compd.model.library import find_effect, load_library
 from compd.plugins import load_module
 
 YAML_SUFFIXES = (".yaml", ".yml")
 SUFFIXES = (*YAML_SUFFIXES, ".py")
 _KEY = "effects"
+EFFECTS_FILE = FileKind(
+    "a file of effects",
+    frozenset({"id", "port", "formula", "parameters"}),
+    least=2,
+    others=frozenset(FormulaDeclaration.model_fields),
+    next_step="see the guide `Add an effect`",
+    listed_under=_KEY,
+)
 
 
 def load_effects(source: str | Path) -> dict[str, Effect]:
@@ -149,7 +159,7 @@ def _read_file(path: Path) -> list[Effect]:
         raise ConfigurationError(
             Problem(where=str(path), what="is no file of effects", value=path.suffix, allowed=", ".join(SUFFIXES))
         )
-    document = read_entries(path, _KEY)
+    document = read_entries(path, EFFECTS_FILE)
     problems = [unknown_key(document, (key,), [_KEY]) for key in document.data if key != _KEY]
     entries = document.data[_KEY]
     if isinstance(entries, dict):
@@ -159,7 +169,6 @@ def _read_file(path: Path) -> list[Effect]:
             Problem(
                 where=document.where((_KEY,)),
                 what="is no list of effects",
-                value=str(entries)[:80],
                 allowed="- id: ...",
             )
         )
@@ -180,9 +189,7 @@ def _read_file(path: Path) -> list[Effect]:
 def _entry_effect(document: Document, number: int, entry: object) -> Effect:
     where = document.where((_KEY, number))
     if not isinstance(entry, Mapping):
-        raise ConfigurationError(
-            Problem(where=where, what="is no effect", value=str(entry)[:80], allowed="a mapping: id, port, formula ...")
-        )
+        raise ConfigurationError(Problem(where=where, what="is no effect", allowed="a mapping: id, port, formula ..."))
     return formula_effect(entry, where)
 
 

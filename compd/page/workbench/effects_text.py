@@ -15,6 +15,7 @@ import yaml
 
 from compd.configuration.yaml_reader import parse_yaml
 from compd.errors import Problem, StateError
+from compd.model.library.effects_file import EFFECTS_FILE
 
 _KEY = "effects"
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -41,7 +42,7 @@ def entries_of(text: str, path: Path) -> list[Declaration]:
 
     path : of the file, for messages. Raises ConfigurationError where it is no YAML.
     """
-    data, _ = parse_yaml(text, path)
+    data, _ = parse_yaml(text, path, EFFECTS_FILE)
     entries = data.get(_KEY, data) if isinstance(data, dict) else data
     if isinstance(entries, list):
         return entries

@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from compd.files.file_kind import without_values
 from compd.recording.tables.problem_list import ProblemList, column_letters, rows_text, values_text
 from compd.recording.tables.table import FIRST_ROW
 
@@ -99,12 +100,17 @@ def read_cells(content: bytes, problems: ProblemList, is_header: HeaderTest, fir
     """Cells of the CSV file `content`; what is wrong goes to `problems`. None where no header can be found.
 
     first_row : the row that the first line under the header has in the file; more than 2 in a block of a file.
+
+    Nothing of a file without a header is quoted: it is another file than was meant.
     """
     rows_before = first_row - FIRST_ROW
-    all_rows = _rows(_decode(content, problems, rows_before), problems, rows_before)
-    header_index = _find_header(all_rows, problems, is_header)
+    found = ProblemList(problems.path)
+    all_rows = _rows(_decode(content, found, rows_before), found, rows_before)
+    header_index = _find_header(all_rows, found, is_header)
     if header_index is None:
+        problems.problems += without_values(found.problems)
         return None
+    problems.problems += found.problems
     header = all_rows[header_index][1]
     names = _column_names(header, all_rows[header_index + 1 :], problems)
     rows = [(row, cells) for row, cells in all_rows[header_index + 1 :] if any(cells)]
@@ -180,12 +186,19 @@ def _find_header(rows: Sequence[Row], problems: ProblemList, is_header: HeaderTe
         problems.add(
             "row 1",
             "numbers where the header belongs",
-            values_text(rows[0][1]),
+            "",
             "column names in row 1",
             "add a header row",
         )
-        return None
-    return 0 if rows else None
+    elif rows:
+        problems.add(
+            "row 1",
+            "is not the header of such a table",
+            "",
+            "column names in row 1",
+            "give another file, or add the header row",
+        )
+    return None
 
 
 def _column_names(header: Sequence[str], rows: Sequence[Row], problems: ProblemList) -> dict[str, int]:

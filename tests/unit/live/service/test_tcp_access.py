@@ -6,6 +6,7 @@ import os
 from contextlib import closing
 
 import pytest
+import structlog
 
 from compd.client import connect
 from compd.configuration.operation import TcpSocket
@@ -122,3 +123,22 @@ def test_a_port_for_other_computers_needs_both(host, keys, missing):
     with pytest.raises(ValueError, match=missing):
         TcpSocket(host=host, **keys)
     assert TcpSocket(host=host, allow=("10.0.0.0/8",), token_file="/t").is_open
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        {"class": "AUTH", "token": ["Zq7vK2xW9pLm4TnB"]},
+        {"class": "AUTH", "tokn": "Zq7vK2xW9pLm4TnB"},
+        {"class": "AUTH", "token": TOKEN, "Zq7vK2xW9pLm4TnB": "Zq7vK2xW9pLm4TnB"},
+        b'{"class": "AUTH", "Zq7vK2xW9pLm4TnB": 1, "Zq7vK2xW9pLm4TnB": 1}\n',
+    ],
+    ids=str,
+)
+def test_what_a_wrong_auth_holds_is_not_in_the_log(guarded, line):
+    with structlog.testing.capture_logs() as logged:
+        client = guarded.tcp()
+        client.send(line)
+        guarded.unix().ask({"class": "STATUS"})
+    assert any(event["event"] == "a client has not shown the token" for event in logged)
+    assert "Zq7vK2" not in str(logged)
