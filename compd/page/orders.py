@@ -66,8 +66,11 @@ class Orders:
             return Consequence(False, f"The daemon is not there: {self._link.reason}.", "")
         return self._consequences[name](subject)
 
-    async def do(self, name: str, subject: str) -> Mapping[str, Any]:
-        """Give the order to the daemon; its answer. Raises DaemonError, also for a model file that is not offered."""
+    async def do(self, name: str, subject: str, by: str) -> Mapping[str, Any]:
+        """Give the order to the daemon; its answer. by : who gives it, in one line.
+
+        Raises DaemonError, also for a model file that is not offered.
+        """
         if name == "adopt" or (name == "shadow" and subject):
             subject = self._file(subject)
         return await asyncio.to_thread(self._ask, name, subject)

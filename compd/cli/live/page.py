@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 from urllib.parse import urlsplit
@@ -31,7 +32,10 @@ def page(
     ] = None,
     new_token: Annotated[
         str | None,
-        typer.Option(metavar="ROLE:NAME", help="Add a token, role view or operate, to --tokens; print it; end."),
+        typer.Option(
+            metavar="ROLE:NAME",
+            help="Add a token, role view or operate, to --tokens; print it (with --listen or --behind: as an address); end.",
+        ),
     ] = None,
     read_only: Annotated[bool, typer.Option("--read-only", help="No orders from any browser.")] = False,
     recordings: Annotated[Path, typer.Option(help="The directory of recordings.")] = Path("recordings"),
@@ -41,16 +45,19 @@ def page(
 ) -> None:
     """Show the machine live in the browser: state, errors, gauges, the last hour.
 
-    It runs until Ctrl-C, beside the daemon, and prints the address to open.
+    It runs until Ctrl-C, beside the daemon, and prints the address to open; on a terminal, one for other devices is a QR code too.
     """
     from compd.cli.options import unix_address
     from compd.page.guard import Token, hashed
     from compd.page.guard import new_token as make_token
-    from compd.page.run import run_page
+    from compd.page.run import origin, run_page
     from compd.page.token_file import add_token, read_tokens
 
     if new_token is not None:
-        typer.echo(add_token(_needed(tokens, "--new-token"), new_token))
+        token = add_token(_needed(tokens, "--new-token"), new_token)
+        typer.echo(token)
+        if listen is not None or behind is not None:
+            _print_address(f"{_origin(behind) or origin(str(listen), port)}/?token={token}")
         return
     own = make_token()
     alone = listen is None and behind is None
@@ -62,8 +69,12 @@ def page(
             for token in read_tokens(_needed(tokens, "--behind" if listen is None else "--listen", f"; {_TLS}"))
         ]
 
-    def started(origin: str) -> None:
-        typer.echo(f"open {origin}/?token={own if alone else 'YOUR-TOKEN'}")
+    def started(reached: str) -> None:
+        if alone:
+            typer.echo(f"open {reached}/?token={own}")
+        else:
+            typer.echo(f"open {reached}/?token=YOUR-TOKEN")
+            _print_qr_code(f"{reached}/")
         if listen is not None and behind is None:
             typer.echo(_TLS, err=True)
 
@@ -74,6 +85,19 @@ def page(
     offered = None if models is None else models.absolute()
     host = listen or "127.0.0.1"
     run_page(unix_socket, recordings.absolute(), host, port, known, started, offered, _origin(behind), machine)
+
+
+def _print_address(address: str) -> None:
+    typer.echo(f"open {address}")
+    _print_qr_code(address)
+
+
+def _print_qr_code(address: str) -> None:
+    """On a terminal, for a tablet beside it; never into a file or a log."""
+    from compd.page.qr_code import print_qr_code
+
+    if sys.stdout.isatty():
+        print_qr_code(address, sys.stdout)
 
 
 def _origin(behind: str | None) -> str | None:
