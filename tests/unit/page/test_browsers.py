@@ -8,7 +8,6 @@ from compd.page.browsers import ARMED_S, Browsers
 from compd.page.guard import Token, hashed
 from tests.support.hand_clock import HandClock
 
-
 ANNA, BERT = (Token(name, "operate", hashed(name)) for name in ("Anna", "Bert"))
 SCREEN = Token("screen", "view", hashed("screen"))
 

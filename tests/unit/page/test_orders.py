@@ -18,6 +18,9 @@ SETPOINT = {
 }
 
 
+BY = "anna (operate) from 10.0.0.5"
+
+
 @pytest.fixture
 def link():
     link = DaemonLink("/run/compd/compd.sock", connected=True, reason="")
@@ -109,11 +112,11 @@ def test_no_other_name_reaches_the_daemon(link, tmp_path, subject):
     orders = Orders(link, ModelFiles(tmp_path / "models"))
     assert not orders.consequence("adopt", subject).possible
     with pytest.raises(DaemonError, match="none of the model files"):
-        asyncio.run(orders.do("adopt", subject))
+        asyncio.run(orders.do("adopt", subject, BY))
     if subject:
         assert not orders.consequence("shadow", subject).possible
         with pytest.raises(DaemonError, match="none of the model files"):
-            asyncio.run(orders.do("shadow", subject))
+            asyncio.run(orders.do("shadow", subject, BY))
 
 
 def test_without_the_daemon_nothing_is_possible(link):
