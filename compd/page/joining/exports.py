@@ -77,6 +77,8 @@ class Exports:
 
     def delete(self, name: str) -> bool:
         """Delete the export of that name; False where there is none. Raises RecordingError where the disk refuses."""
+        if not EXPORT_NAME.fullmatch(name):
+            return False
         with self._opened() as directory:
             try:
                 if not _is_export(name, os.stat(name, dir_fd=directory, follow_symlinks=False)):
@@ -84,8 +86,8 @@ class Exports:
                 os.unlink(name, dir_fd=directory)
             except FileNotFoundError:
                 return False
-            except (OSError, ValueError) as error:
-                raise _refused(ascii(name[:_LONGEST_STEM]), f"cannot be deleted: {error}") from error
+            except OSError as error:
+                raise _refused(name, f"cannot be deleted: {error.strerror}") from error
         return True
 
     async def keep(self, file_name: str, pieces: AsyncIterator[bytes]) -> dict[str, Any]:
