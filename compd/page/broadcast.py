@@ -86,7 +86,7 @@ class Broadcast:
     async def events(self, browser: Browser) -> AsyncIterator[bytes]:
         """The events of one browser, until it goes. Each is the newest: a browser that is slow gets fewer."""
         try:
-            hello = {"id": browser.id, "role": browser.role, "machine": self._machine}
+            hello = {"id": browser.id, "role": browser.token.role, "machine": self._machine}
             yield encoded("hello", plain(hello))
             machine, slow_count = self._machine, -1
             while not self._ended:

@@ -6,6 +6,7 @@ import secrets
 from dataclasses import dataclass, field
 
 from compd.clock import Clock
+from compd.page.guard import Token
 
 # An armed browser stays so for this long, s, and no longer than its connection.
 ARMED_S = 60.0
@@ -15,12 +16,12 @@ ARMED_S = 60.0
 class Browser:
     """One connection of a browser.
 
-    id : known to this browser alone. role : "view" or "operate". since_s, armed_until_s : monotonic time, s.
+    token : with which it came; orders with its id and another token are another person's. id : known to this browser
+    alone. since_s, armed_until_s : monotonic time, s.
     """
 
-    name: str
+    token: Token
     address: str
-    role: str
     since_s: float
     armed_until_s: float = 0.0
     id: str = field(default_factory=lambda: secrets.token_urlsafe(16), repr=False)
@@ -33,9 +34,9 @@ class Browsers:
         self._clock = clock
         self._connected: dict[str, Browser] = {}
 
-    def connect(self, name: str, address: str, role: str) -> Browser:
+    def connect(self, token: Token, address: str) -> Browser:
         """A browser has come."""
-        browser = Browser(name, address, role, self._clock.monotonic())
+        browser = Browser(token, address, self._clock.monotonic())
         self._connected[browser.id] = browser
         return browser
 
@@ -43,32 +44,44 @@ class Browsers:
         """It has gone; it is not armed any more."""
         self._connected.pop(browser.id, None)
 
-    def arm(self, id: str) -> Browser | None:
-        """Arm the browser for `ARMED_S`; None where it is not connected, or its role is to look only."""
+    def why_not(self, id: str, token: Token) -> str:
+        """Why who asks with this token cannot arm the browser of this id, nor end it; "" where it can."""
         browser = self._connected.get(id)
-        if browser is None or browser.role != "operate":
+        if browser is None:
+            return "this browser is not connected"
+        return "" if browser.token == token else "this browser is connected with another token"
+
+    def arm(self, id: str, token: Token) -> Browser | None:
+        """Arm the browser for `ARMED_S`; None where it is not connected with this token, or may look only."""
+        if self.why_not(id, token) or token.role != "operate":
             return None
+        browser = self._connected[id]
         browser.armed_until_s = self._clock.monotonic() + ARMED_S
         return browser
 
-    def disarm(self, id: str) -> None:
-        """End it at once."""
-        if (browser := self._connected.get(id)) is not None:
-            browser.armed_until_s = 0.0
+    def disarm(self, id: str, token: Token) -> bool:
+        """End it at once; False where the browser is not connected with this token."""
+        if self.why_not(id, token):
+            return False
+        self._connected[id].armed_until_s = 0.0
+        return True
 
-    def armed(self, id: str) -> Browser | None:
-        """The browser of this id, if it is connected and armed."""
+    def armed(self, id: str, token: Token) -> Browser | None:
+        """The browser of this id, if it is connected with this token, and armed."""
         browser = self._connected.get(id)
-        return browser if browser is not None and browser.armed_until_s > self._clock.monotonic() else None
+        return None if browser is None or self.why_not(id, token) or not self._is_armed(browser) else browser
+
+    def _is_armed(self, browser: Browser) -> bool:
+        return browser.armed_until_s > self._clock.monotonic()
 
     def summary(self) -> list[dict[str, object]]:
         """Everybody, the longest connected first; the ids stay here."""
         now_s = self._clock.monotonic()
         return [
             {
-                "name": browser.name,
+                "name": browser.token.name,
                 "address": browser.address,
-                "role": browser.role,
+                "role": browser.token.role,
                 "connected_s": round(now_s - browser.since_s, 1),
                 "armed_s": round(max(browser.armed_until_s - now_s, 0.0), 1),
             }

@@ -2,13 +2,17 @@
 
 On this computer the token is made anew at every start and stands in the address that `compd page` prints. For other
 computers tokens are kept in a file, each with a name and a role, as SHA-256. A foreign site cannot use the browser of a
-person who has the page open: requests must name this server (`Host`), and orders come from its own pages (`Origin`).
+person who has the page open: requests must name this server (`Host`), orders come from its own pages (`Origin`), and
+nothing of it is loaded into a foreign page (`Sec-Fetch-Site`).
+
+Nothing that has no token is read further than its head, but for the form that takes a token.
 """
 
 from __future__ import annotations
 
 import hashlib
 import hmac
+import re
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,9 +20,14 @@ from typing import Literal
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
-from starlette.requests import HTTPConnection
+from starlette.requests import ClientDisconnect, HTTPConnection, Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from compd.clock import Clock, MonotonicClock
+from compd.page.limited_protocol import LimitedProtocol
+from compd.page.token_form import FORM_FILES, FORM_PATH, posted_token, token_form
+from compd.page.wrong_tokens import WrongTokens
 
 Role = Literal["view", "operate"]
 
@@ -30,9 +39,17 @@ CONTENT_SECURITY_POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 
 _HEADERS = {
     "Content-Security-Policy": CONTENT_SECURITY_POLICY,
     "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
+    # "no-referrer" would take the origin from a form that is sent without a script
+    "Referrer-Policy": "same-origin",
     "Cache-Control": "no-store",
+    # Another port of this computer is another origin: its pages load nothing from here, and have no hold of a window.
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
 }
+LEAVE_PATH = "/leave"
+# Browsers send some twenty.
+MOST_HEADERS = 64
+_OWN_PATH = re.compile(r"(/[A-Za-z0-9_.-]+)*/?")
 _NEEDS_TOKEN = "This page needs the address that `compd page` printed, with its token, or a token of your own."
 
 
@@ -47,7 +64,7 @@ class Token:
 
 def hashed(token: str) -> str:
     """SHA-256 of a token, hexadecimal."""
-    return hashlib.sha256(token.encode()).hexdigest()
+    return hashlib.sha256(token.encode(errors="surrogatepass")).hexdigest()
 
 
 def new_token() -> str:
@@ -58,54 +75,111 @@ def new_token() -> str:
 class Guard:
     """ASGI middleware: lets through who has a token, and adds the headers that bind the browser to this server."""
 
-    def __init__(self, app: ASGIApp, tokens: Sequence[Token], origins: Sequence[str], port: int) -> None:
-        """`origins`: by which browsers reach this server, as "http://127.0.0.1:7760". `port`: where it listens."""
+    def __init__(
+        self, app: ASGIApp, tokens: Sequence[Token], origins: Sequence[str], port: int, clock: Clock | None = None
+    ) -> None:
+        """`origins`: by which browsers reach this server, as "http://127.0.0.1:7760". `port`: where it listens.
+        `clock`: by which somebody who has shown a wrong token waits."""
         self._app = app
         self._tokens = tuple(tokens)
         self._origins = frozenset(origins)
         self._hosts = frozenset(urlsplit(origin).netloc for origin in origins)
         self._cookie = f"{COOKIE}{port}"
+        self._wrong = WrongTokens(clock or MonotonicClock())
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        refusal = self._refusal(HTTPConnection(scope))
-        if refusal is not None:
-            await refusal(scope, receive, _with_headers(send))
-            return
-        await self._app(scope, receive, _with_headers(send))
+        request = Request(scope, receive)
+        try:
+            refusal = self._foreign(request) or await self._of_token(request) or self._without_token(request)
+            if refusal is not None:
+                refusal.headers["Connection"] = "close"  # what else comes on it is not read
+            await (refusal or self._app)(scope, receive, _with_headers(send))
+        except ClientDisconnect:
+            return  # in the middle of what it sent: there is nobody to answer
 
-    def _refusal(self, connection: HTTPConnection) -> Response | None:
-        """Why a request is not followed; None where it is. The scope then has the token's name and role."""
+    def _foreign(self, connection: HTTPConnection) -> Response | None:
+        """Why a request is not of this server's own pages; None where it is."""
         headers: Headers = connection.headers
+        if len(headers) > MOST_HEADERS:
+            return PlainTextResponse(f"a request has {MOST_HEADERS} headers at most", 431)
         host = headers.get("host", "")
         if host not in self._hosts:
             return PlainTextResponse(f"this server is not {host!r}; it is {', '.join(sorted(self._hosts))}", 400)
         looks = connection.scope["method"] in ("GET", "HEAD")
         origin = headers.get("origin", "")
         own = origin in self._origins and urlsplit(origin).netloc == host
-        if not own and (not looks or "origin" in headers):
+        if (not own and (not looks or "origin" in headers)) or _is_loaded_elsewhere(headers, looks):
             return PlainTextResponse("requests come from this server's own pages only", 403)
-        token_text = connection.query_params.get("token")
-        if token_text is not None:
-            if self._known(token_text) is None:
-                return PlainTextResponse(_NEEDS_TOKEN, 403)
-            response = RedirectResponse(connection.url.path, 303)
-            secure = f"https://{host}" in self._origins
-            response.set_cookie(self._cookie, token_text, httponly=True, samesite="strict", secure=secure)
+        return None
+
+    async def _of_token(self, request: Request) -> Response | None:
+        """The answer to who shows a token, or lets it go; None for every other request."""
+        path, posts = request.url.path, request.method == "POST"
+        if posts and path == LEAVE_PATH:
+            response = RedirectResponse("/", 303)
+            response.delete_cookie(self._cookie, httponly=True, samesite="strict", secure=self._is_secure(request))
             return response
+        by_form = posts and path == FORM_PATH
+        if not by_form and "token" not in request.query_params:
+            return None
+        address = request.client.host if request.client else ""
+        if not self._wrong.may_try(address):
+            return _not_now(by_form)
+        token_text = await posted_token(request) if by_form else request.query_params["token"]
+        if token_text is None or self._known(token_text) is None:
+            self._wrong.note(address)
+            if (connection := LimitedProtocol.of(request.scope)) is not None:
+                connection.note("wrong_token")
+            return token_form("This token is not known here.") if by_form else PlainTextResponse(_NEEDS_TOKEN, 403)
+        response = RedirectResponse("/" if by_form else _own_path(path), 303)
+        secure = self._is_secure(request)
+        response.set_cookie(self._cookie, token_text, httponly=True, samesite="strict", secure=secure)
+        return response
+
+    def _without_token(self, connection: HTTPConnection) -> Response | None:
+        """Why a request is not followed; None where it is. The scope then has the token's name and role."""
         token = self._known(connection.cookies.get(self._cookie, ""))
         if token is None:
-            return PlainTextResponse(_NEEDS_TOKEN, 403)
+            looks = connection.scope["method"] in ("GET", "HEAD")
+            if looks and connection.url.path in FORM_FILES:
+                return None
+            reads_html = looks and "text/html" in connection.headers.get("accept", "")
+            return token_form() if reads_html else PlainTextResponse(_NEEDS_TOKEN, 403)
+        limited = LimitedProtocol.of(connection.scope)
+        if limited is not None and not limited.admit(token.name):
+            return PlainTextResponse("there are too many connections with this token", 503)
         connection.scope["token"] = token
         return None
+
+    def _is_secure(self, connection: HTTPConnection) -> bool:
+        return f"https://{connection.headers.get('host', '')}" in self._origins
 
     def _known(self, token_text: str) -> Token | None:
         """The token of that text; each is compared in the same time."""
         digest = hashed(token_text)
         known = [token for token in self._tokens if hmac.compare_digest(token.sha256, digest)]
         return known[0] if known else None
+
+
+def _is_loaded_elsewhere(headers: Headers, looks: bool) -> bool:
+    """Whether a page of another site, or port, loads something from here, other than to show it by itself."""
+    if headers.get("sec-fetch-site", "none") in ("none", "same-origin"):
+        return False
+    shown = (headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")) == ("navigate", "document")
+    return not (looks and shown)
+
+
+def _own_path(path: str) -> str:
+    """A path to which a browser is sent; "/" for what a browser might take for another server's address."""
+    return path if _OWN_PATH.fullmatch(path) else "/"
+
+
+def _not_now(by_form: bool) -> Response:
+    text = "A wrong token came from there a moment ago. Try again in a second."
+    return token_form(text, 429) if by_form else PlainTextResponse(text, 429)
 
 
 def _with_headers(send: Send) -> Send:

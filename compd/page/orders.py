@@ -72,8 +72,9 @@ class Orders:
             return Consequence(False, f"The daemon is not there: {self._link.reason}.", "")
         return self._consequences[name](subject)
 
-    async def do(self, name: str, subject: str, by: str = "") -> Mapping[str, Any]:
+    async def do(self, name: str, subject: str, by: str) -> Mapping[str, Any]:
         """Give the order to the daemon; its answer.
+
 
         subject : of `adopt` the hash of the shadow, as its consequence says it. by : for whom, for the daemon's log.
         Raises DaemonError, also for a model file that is not offered; the daemon is not asked then.

@@ -15,11 +15,14 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
+from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK
 from compd.recording.open_part import ARROW
 from compd.recording.table_file import SUFFIXES
 
 # Of a recording: letters and digits, so that it is a file's name on every system and never a path.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+# What belongs to a recording, and is downloaded with its table, beside `CYCLES_SUFFIX` and copies of models.
+SIDECAR = ".yaml"
 _END_WITHIN_S = 10.0
 _PIECE_BYTES = 1 << 16
 
@@ -57,7 +60,7 @@ class Recordings:
                     "name": path.stem,
                     "bytes": stat.st_size,
                     "changed": datetime.fromtimestamp(stat.st_mtime, UTC).isoformat(timespec="seconds"),
-                    "sidecar": path.with_suffix(".yaml").is_file(),
+                    "sidecar": path.with_suffix(SIDECAR).is_file(),
                     "command": f"cp {shlex.quote(str(path.with_suffix('')))}.* .",
                 }
             )
@@ -113,7 +116,9 @@ class Recordings:
     def _files_of(self, name: str) -> Sequence[Path]:
         if not NAME.fullmatch(name) or name not in recording_tables(self.directory):
             return []
-        return sorted(filter(is_own, self.directory.glob(f"{name}.*")))
+        named = [self.directory / f"{name}{ending}" for ending in (*SUFFIXES, SIDECAR, CYCLES_SUFFIX)]
+        models = self.directory.glob(f"{name}{MODEL_MARK}*{SIDECAR}")
+        return sorted(filter(is_own, [*named, *models]))
 
     async def _watch(self, running: Running) -> None:
         _, errors = await running.process.communicate()

@@ -1,4 +1,4 @@
-"""What every request to the page has in common: a JSON object as its body, who may change files, and the answers."""
+"""What requests to the page have in common: a JSON object as the body, who asks, what is logged, and the answers."""
 
 from __future__ import annotations
 
@@ -9,11 +9,17 @@ from typing import Any
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.types import Scope
 
 from compd.text.json_text import nan_to_null
 
 LONGEST_BODY_BYTES = 8192
 LOOKS_ONLY = "this browser may look only"
+LONGEST_LINE = 200
+# Of a person's name in a line, so that role and address follow it.
+_LONGEST_NAME = 100
+# Keys of a request's scope: its JSON object, and whether it asks for a change, which is logged.
+KEYS, CHANGE = "keys", "change"
 
 
 async def keys_of(request: Request, longest_bytes: int = LONGEST_BODY_BYTES) -> Mapping[str, Any]:
@@ -29,12 +35,30 @@ async def keys_of(request: Request, longest_bytes: int = LONGEST_BODY_BYTES) -> 
         keys = None
     if not isinstance(keys, dict):
         raise HTTPException(400, "the body is one JSON object")
+    request.scope[KEYS] = keys
     return keys
 
 
+def note_change(request: Request) -> None:
+    """Have the page's log tell who made this request, and what came of it: it asks for a change, allowed or not."""
+    request.scope[CHANGE] = True
+
+
 def may_change(request: Request) -> bool:
-    """Whether the browser's token allows to write files."""
+    """Whether the browser's token allows to write files; the page's log tells of the request, see `note_change`."""
+    note_change(request)
     return bool(request.scope["token"].role == "operate")
+
+
+def asked_by(scope: Scope) -> str:
+    """For whom a request is made, in one line: "anna (operate) from 10.0.0.5"."""
+    token, client = scope["token"], scope.get("client")
+    return one_line(f"{token.name[:_LONGEST_NAME]} ({token.role}) from {client[0] if client else 'an unknown address'}")
+
+
+def one_line(text: str) -> str:
+    """The text in one line of at most LONGEST_LINE printable characters."""
+    return "".join(character if character.isprintable() else "?" for character in text[:LONGEST_LINE])
 
 
 def answer(data: Any) -> Response:

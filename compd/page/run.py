@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import FrameType
+from typing import Any, cast
 
 import uvicorn
 
 from compd.errors import DaemonError, Problem
+from compd.page.connections import ConnectionLimits, Connections, raised_descriptor_limit
+from compd.page.counted_log import CountedLog
 from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Guard, Token
+from compd.page.limited_protocol import ACCEPTED_AT_ONCE, LARGEST_HEAD_BYTES, WAITING, LimitedProtocol
 from compd.page.recordings import Recordings
 from compd.page.server import Server
 
@@ -46,11 +52,33 @@ def run_page(
     origins = (
         [behind] if behind else [origin(name, port) for name in (LOOPBACK_NAMES if host in LOOPBACK_NAMES else [host])]
     )
-    server = Server(DaemonLink(unix_socket), Recordings(recordings, unix_socket), models, machine=machine)
+    server = Server(
+        DaemonLink(unix_socket), Recordings(recordings, unix_socket), models, machine=machine, origin=origins[0]
+    )
     guarded = Guard(server.app(), tokens, origins, port)
-    config = uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1, lifespan="on")
+    log = CountedLog()
+    config = limited_config(guarded, Connections(ConnectionLimits.for_descriptors(raised_descriptor_limit()), log))
+    config.proxy_headers = behind is not None  # nobody else says for whom a request is made
     started(origins[0])
-    _Uvicorn(config, server.end).run(sockets=[listener])
+    _Uvicorn(config, server.end, log).run(sockets=[listener])
+
+
+def limited_config(app: Guard, connections: Connections) -> uvicorn.Config:
+    """Of a server with these connections. It logs errors only: anybody can send what is no HTTP."""
+    return uvicorn.Config(
+        app,
+        loop="asyncio",
+        http=cast("type[asyncio.Protocol]", partial(LimitedProtocol, connections)),
+        ws="none",
+        lifespan="on",
+        log_config=None,
+        log_level="error",
+        access_log=False,
+        backlog=ACCEPTED_AT_ONCE,
+        timeout_graceful_shutdown=1,
+        h11_max_incomplete_event_size=LARGEST_HEAD_BYTES,
+        server_header=False,
+    )
 
 
 def origin(host: str, port: int) -> str:
@@ -62,9 +90,24 @@ def origin(host: str, port: int) -> str:
 class _Uvicorn(uvicorn.Server):
     """Ends the streams of events before it waits for its connections."""
 
-    def __init__(self, config: uvicorn.Config, end: Callable[[], None]) -> None:
+    def __init__(self, config: uvicorn.Config, end: Callable[[], None], log: CountedLog) -> None:
         super().__init__(config)
         self._end = end
+        self._log = log
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to listen."""
+        asyncio.get_running_loop().set_exception_handler(self._loop_failed)
+        await super().startup(sockets)
+        for listener in sockets or []:
+            listener.listen(WAITING)  # asyncio has one number for those who wait, and those who are taken at once
+
+    def _loop_failed(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Something in the event loop failed. asyncio tries again where no connection could be taken."""
+        if "accept" in context.get("message", "") and isinstance(context.get("exception"), OSError):
+            self._log.note("not_accepted")
+        else:
+            loop.default_exception_handler(context)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """At SIGTERM or SIGINT."""

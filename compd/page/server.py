@@ -13,6 +13,7 @@ from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
@@ -26,10 +27,12 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Token
 from compd.page.history import History
 from compd.page.joining.routes import JoinRoutes
+from compd.page.logbook import Logbook
 from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders, explained
+from compd.page.qr_code import svg_qr_code
 from compd.page.recordings import Recordings
-from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
+from compd.page.requests import LOOKS_ONLY, asked_by, keys_of, may_change, note_change, refused
 from compd.page.workbench.routes import WorkbenchRoutes
 
 STATIC = Path(__file__).parent / "static"
@@ -50,11 +53,14 @@ class Server:
         models: Path | None = None,
         clock: Clock | None = None,
         machine: Path | None = None,
+        origin: str = "",
     ) -> None:
         """`models`: the directory whose model files are offered. `clock`: by which arming ends.
 
-        `machine`: the daemon's configuration, by which recordings of this machine are opened.
+        `machine`: the daemon's configuration, by which recordings of this machine are opened. `origin`: by which
+        browsers reach this server.
         """
+        self._origin = origin
         self._link = link
         self._recordings = recordings
         self._models = ModelFiles(models or recordings.directory)
@@ -68,6 +74,7 @@ class Server:
         """The ASGI application."""
         routes = [
             Route("/", self._index),
+            Route("/address.svg", self._address),
             Route("/live", self._live),
             Route("/history", self._history),
             Route("/moment", self._moment),
@@ -83,7 +90,7 @@ class Server:
             *self._join.routes(),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
-        return Starlette(routes=routes, lifespan=self._lifespan)
+        return Starlette(routes=routes, lifespan=self._lifespan, middleware=[Middleware(Logbook)])
 
     def end(self) -> None:
         """Let the browsers' streams end."""
@@ -99,9 +106,15 @@ class Server:
     async def _index(self, request: Request) -> Response:
         return FileResponse(STATIC / "index.html")
 
+    async def _address(self, request: Request) -> Response:
+        """The address of this server, without a token, as a QR code for another device."""
+        if not self._origin:
+            return refused("this server does not know its address", 404)
+        return Response(svg_qr_code(self._origin), media_type="image/svg+xml")
+
     async def _live(self, request: Request) -> Response:
         token: Token = request.scope["token"]
-        browser = self._browsers.connect(token.name, request.client.host if request.client else "", token.role)
+        browser = self._browsers.connect(token, request.client.host if request.client else "")
         unbuffered = {"X-Accel-Buffering": "no"}  # asks a proxy to pass events on at once
         return StreamingResponse(self._broadcast.events(browser), headers=unbuffered, media_type="text/event-stream")
 
@@ -118,12 +131,16 @@ class Server:
         return JSONResponse(self._broadcast.traces.minute(_unix_s(request)))
 
     async def _arm(self, request: Request) -> Response:
-        keys = await keys_of(request)
+        note_change(request)
+        keys, token = await keys_of(request), request.scope["token"]
+        id = str(keys.get("id"))
+        if why_not := self._browsers.why_not(id, token):
+            return refused(why_not, 403)
         if not keys.get("arm", True):
-            self._browsers.disarm(str(keys.get("id")))
+            self._browsers.disarm(id, token)
             return JSONResponse({"armed_s": 0})
-        if self._browsers.arm(str(keys.get("id"))) is None:
-            return refused(f"{LOOKS_ONLY}, or is not connected", 403)
+        if self._browsers.arm(id, token) is None:
+            return refused(LOOKS_ONLY, 403)
         return JSONResponse({"armed_s": ARMED_S})
 
     async def _consequence(self, request: Request) -> Response:
@@ -134,13 +151,15 @@ class Server:
         return JSONResponse(asdict(consequence))
 
     async def _order(self, request: Request) -> Response:
+        note_change(request)
         name, keys = request.path_params["name"], await keys_of(request)
         if name not in self._orders:
             return refused("there is no such order", 404)
-        if self._browsers.armed(str(keys.get("id"))) is None:
-            return refused("this browser is not armed", 403)
+        id, token = str(keys.get("id")), request.scope["token"]
+        if self._browsers.armed(id, token) is None:
+            return refused(self._browsers.why_not(id, token) or "this browser is not armed", 403)
         try:
-            answer = await self._orders.do(name, str(keys.get("subject", "")))
+            answer = await self._orders.do(name, str(keys.get("subject", "")), asked_by(request.scope))
         except DaemonError as error:
             return refused(explained(error), 409, error.problems[0].value)
         return JSONResponse({"answer": answer})

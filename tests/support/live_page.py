@@ -99,6 +99,12 @@ def page_process(unix_socket: Path, recordings: Path, *options: str) -> Iterator
         process.communicate(timeout=10.0)
 
 
+def memory_mb(pid: int) -> float:
+    """What a process has in memory, MB."""
+    fields = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
+    return int(fields["VmRSS"].split()[0]) / 1e3
+
+
 @contextmanager
 def browser() -> Iterator[Any]:
     """Chromium, driven by Playwright.

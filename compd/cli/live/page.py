@@ -32,7 +32,10 @@ def page(
     ] = None,
     new_token: Annotated[
         str | None,
-        typer.Option(metavar="ROLE:NAME", help="Add a token, role view or operate, to --tokens; print it; end."),
+        typer.Option(
+            metavar="ROLE:NAME",
+            help="Add a token, role view or operate, to --tokens; print it (with --listen or --behind: as an address); end.",
+        ),
     ] = None,
     read_only: Annotated[bool, typer.Option("--read-only", help="No orders from any browser.")] = False,
     recordings: Annotated[Path, typer.Option(help="The directory of recordings.")] = Path("recordings"),
@@ -42,17 +45,21 @@ def page(
 ) -> None:
     """Show the machine live in the browser: state, errors, gauges, the last hour.
 
-    It runs until Ctrl-C, beside the daemon, and prints the address to open.
+    It runs until Ctrl-C, beside the daemon, and prints the address to open; on a terminal, as a
+    QR code too where other devices may open it.
     """
     from compd.cli.options import unix_address
     from compd.log import hide_secrets_of_libraries, is_journal, log_to_stderr
     from compd.page.guard import Token, hashed
     from compd.page.guard import new_token as make_token
-    from compd.page.run import run_page
+    from compd.page.run import origin, run_page
     from compd.page.token_file import add_token, read_tokens
 
     if new_token is not None:
-        typer.echo(add_token(_needed(tokens, "--new-token"), new_token))
+        token = add_token(_needed(tokens, "--new-token"), new_token)
+        typer.echo(token)
+        if listen is not None or behind is not None:
+            _print_address(f"{_origin(behind) or origin(str(listen), port)}/?token={token}")
         return
     own = make_token()
     alone = listen is None and behind is None
@@ -69,9 +76,11 @@ def page(
     log_to_stderr()
     hide_secrets_of_libraries()
 
-    def started(origin: str) -> None:
-        typer.echo(f"open {origin}/?token={own if shown else 'YOUR-TOKEN'}")
-        if alone and not shown:
+    def started(reached: str) -> None:
+        typer.echo(f"open {reached}/?token={own if shown else 'YOUR-TOKEN'}")
+        if not alone:
+            _print_qr_code(f"{reached}/")
+        elif not shown:
             typer.echo("its token would be in the journal, for others to read: give --tokens and --listen", err=True)
         if listen is not None and behind is None:
             typer.echo(_TLS, err=True)
@@ -83,6 +92,19 @@ def page(
     offered = None if models is None else models.absolute()
     host = listen or "127.0.0.1"
     run_page(unix_socket, recordings.absolute(), host, port, known, started, offered, _origin(behind), machine)
+
+
+def _print_address(address: str) -> None:
+    typer.echo(f"open {address}")
+    _print_qr_code(address)
+
+
+def _print_qr_code(address: str) -> None:
+    """On a terminal, for a tablet beside it; never into a file or a log."""
+    from compd.page.qr_code import print_qr_code
+
+    if sys.stdout.isatty():
+        print_qr_code(address, sys.stdout)
 
 
 def _origin(behind: str | None) -> str | None:

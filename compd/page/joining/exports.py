@@ -1,4 +1,8 @@
-"""Exports of instruments in the directory `exports/` beside the recordings: listed, and brought by a browser."""
+"""Exports of instruments in the directory `exports/` beside the recordings: listed, brought by a browser, and deleted.
+
+What a browser brings is kept under its name and SUFFIX: nothing imports, runs or reads a file of that suffix by itself,
+whatever its content is.
+"""
 
 from __future__ import annotations
 
@@ -7,41 +11,84 @@ import filecmp
 import os
 import re
 import secrets
-from collections.abc import AsyncIterator
+import stat
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from compd.errors import Problem, RecordingError
 
-# NAME or NAME.ext: a file's name on every system and never a path.
-EXPORT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9]{1,8})?")
-# Some million rows.
+SUFFIX = ".export"
+# NAME or NAME.ext, and SUFFIX where this release has brought it: a file's name on every system and never a path.
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9]{1,8})?")
+EXPORT_NAME = re.compile(rf"{_NAME.pattern}({re.escape(SUFFIX)})?")
+# Of one file: some million rows.
 MOST_BYTES = 64 * 2**20
+# Of all files in the directory, those that are just being brought among them.
+MOST_FILES = 200
+MOST_BYTES_OF_ALL = 16 * MOST_BYTES
+# The page's group may read it, for backups; nobody runs it.
+_MODE = 0o640
+_TEMPORARY = re.compile(r"\.[0-9a-f]{16}")
+# A file that nobody has added to for so long, s, is of a process that has ended meanwhile.
+_LEFT_AFTER_S = 3600.0
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _LONGEST_STEM = 64
+_DIRECTORY = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+_NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+
+
+class Usage(NamedTuple):
+    """What the directory holds."""
+
+    files: int
+    bytes: int
+
+    def as_json(self) -> dict[str, int]:
+        """It, beside what is allowed."""
+        return {**self._asdict(), "most_files": MOST_FILES, "most_bytes": MOST_BYTES_OF_ALL}
 
 
 class Exports:
-    """Those in `directory`, which need not be there yet."""
+    """Those in `directory`, which need not be there yet; used by the event loop's thread alone."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
+        # Temporary name -> bytes that are written of it.
+        self._arriving: dict[str, int] = {}
 
     def listed(self) -> list[str]:
         """Their names, the newest first."""
-        by_age = []
-        for path in self.directory.glob("*"):
-            try:
-                if EXPORT_NAME.fullmatch(path.name) and path.is_file() and not path.is_symlink():
-                    by_age.append((-path.stat().st_mtime, path.name))
-            except FileNotFoundError:  # somebody has just removed it
-                continue
+        by_age = [(-status.st_mtime, name) for name, status in self._entries() if _is_export(name, status)]
         return [name for _, name in sorted(by_age)]
 
     def path_of(self, name: str) -> Path | None:
-        """The file of that name; None where there is none."""
+        """The file of that name; None where there is none, and where it or the directory is a link."""
         path = self.directory / name
-        return path if EXPORT_NAME.fullmatch(name) and path.is_file() and not path.is_symlink() else None
+        is_file = EXPORT_NAME.fullmatch(name) and path.is_file() and not path.is_symlink()
+        return path if is_file and not self.directory.is_symlink() else None
+
+    def usage(self) -> Usage:
+        """Of everything in the directory, whatever its name."""
+        sizes = [status.st_size for _, status in self._entries()]
+        return Usage(len(sizes), sum(sizes))
+
+    def delete(self, name: str) -> bool:
+        """Delete the export of that name; False where there is none. Raises RecordingError where the disk refuses."""
+        if not EXPORT_NAME.fullmatch(name):
+            return False
+        with self._opened() as directory:
+            try:
+                if not _is_export(name, os.stat(name, dir_fd=directory, follow_symlinks=False)):
+                    return False
+                os.unlink(name, dir_fd=directory)
+            except FileNotFoundError:
+                return False
+            except OSError as error:
+                raise _refused(name, f"cannot be deleted: {error.strerror}") from error
+        return True
 
     async def keep(self, file_name: str, pieces: AsyncIterator[bytes]) -> dict[str, Any]:
         """Write what a browser brings, and tell its `name` here and its `bytes`.
@@ -49,58 +96,126 @@ class Exports:
         file_name : the file's name on the person's computer; what cannot stand in a name here becomes "-".
 
         Raises RecordingError for a name that is none, for a file that is empty, larger than MOST_BYTES, or another than
-        the one that has its name already; and where the disk refuses.
+        the one that has its name already; where all files would be more than MOST_FILES or MOST_BYTES_OF_ALL; and where
+        the disk refuses.
         """
         name = kept_name(file_name)
         self.directory.mkdir(parents=True, exist_ok=True)
-        temporary = self.directory / f".{secrets.token_hex(8)}"
-        try:
-            count = await _written(temporary, pieces)
-            if not count:
-                raise _refused(name, "is empty", allowed="an instrument's export")
-            await asyncio.to_thread(self._name, temporary, name)
-        except OSError as error:
-            raise _refused(str(self.directory), f"cannot be written to: {error.strerror}") from error
-        finally:
-            temporary.unlink(missing_ok=True)
+        temporary = f".{secrets.token_hex(8)}"
+        with self._opened() as directory:
+            try:
+                self._remove_left(directory)
+                count = await self._written(directory, temporary, pieces)
+                if not count:
+                    raise _refused(name, "is empty", allowed="an instrument's export")
+                await asyncio.to_thread(self._name, directory, temporary, name)
+            except OSError as error:
+                raise _refused(str(self.directory), f"cannot be written to: {error.strerror}") from error
+            finally:
+                self._arriving.pop(temporary, None)
+                _removed(directory, temporary)
         return {"name": name, "bytes": count}
 
-    def _name(self, temporary: Path, name: str) -> None:
+    async def _written(self, directory: int, temporary: str, pieces: AsyncIterator[bytes]) -> int:
+        """Number of bytes that are in the new file now."""
+        kept = self._kept_before()
+        if kept.files + len(self._arriving) >= MOST_FILES:
+            raise _full(kept)
+        self._arriving[temporary] = 0
+        with os.fdopen(os.open(temporary, _NEW_FILE, _MODE, dir_fd=directory), "wb") as file:
+            os.fchmod(file.fileno(), _MODE)  # whatever the umask is
+            async for piece in pieces:
+                count = self._arriving[temporary] + len(piece)
+                if count > MOST_BYTES:
+                    raise _refused("export", "is too large", allowed=f"{MOST_BYTES >> 20} MB", next_step="split it")
+                self._arriving[temporary] = count
+                # one that came meanwhile is in the directory and no longer arriving: looked up again near the end
+                if kept.bytes + sum(self._arriving.values()) > MOST_BYTES_OF_ALL:
+                    raise _full(kept)
+                file.write(piece)
+        if self._kept_before().bytes + sum(self._arriving.values()) > MOST_BYTES_OF_ALL:
+            raise _full(self._kept_before())
+        return self._arriving[temporary]
+
+    def _kept_before(self) -> Usage:
+        """What the directory holds beside what is just arriving."""
+        sizes = [status.st_size for name, status in self._entries() if name not in self._arriving]
+        return Usage(len(sizes), sum(sizes))
+
+    def _name(self, directory: int, temporary: str, name: str) -> None:
         """Give a file its name. Nothing is ever replaced: the same bytes may come again, others need another name."""
-        path = self.directory / name
         try:
-            os.link(temporary, path)
+            os.link(temporary, name, src_dir_fd=directory, dst_dir_fd=directory, follow_symlinks=False)
         except FileExistsError:
-            if self.path_of(name) is None or not filecmp.cmp(temporary, path, shallow=False):
+            path = self.path_of(name)
+            if path is None or not filecmp.cmp(self.directory / temporary, path, shallow=False):
                 raise _refused(
                     name, "is there already, with other content", next_step="rename the file, then bring it again"
                 ) from None
 
+    def _remove_left(self, directory: int) -> None:
+        """Remove temporary files of processes that have ended in the middle of one."""
+        for name, status in self._entries():
+            left = name not in self._arriving and time.time() - status.st_mtime > _LEFT_AFTER_S
+            if left and _TEMPORARY.fullmatch(name):
+                _removed(directory, name)
+
+    def _entries(self) -> Iterator[tuple[str, os.stat_result]]:
+        """Name and status of all that is in the directory; a link is itself, not what it leads to."""
+        if self.directory.is_symlink() or not self.directory.is_dir():
+            return
+        with os.scandir(self.directory) as entries:
+            for entry in entries:
+                try:
+                    yield entry.name, entry.stat(follow_symlinks=False)
+                except FileNotFoundError:  # somebody has just removed it
+                    continue
+
+    @contextmanager
+    def _opened(self) -> Iterator[int]:
+        """The directory's descriptor. Raises RecordingError where there is none, or it is a link."""
+        try:
+            descriptor = os.open(self.directory, _DIRECTORY)
+        except OSError as error:
+            raise _refused(str(self.directory), f"is no directory here: {error.strerror}") from error
+        try:
+            yield descriptor
+        finally:
+            os.close(descriptor)
+
 
 def kept_name(file_name: str) -> str:
     """The name under which a file is kept. Raises RecordingError for what is a path, or has no letter or digit."""
-    stem, dot, ending = file_name.rpartition(".")
+    stem, dot, ending = file_name.removesuffix(SUFFIX).rpartition(".")
     if not dot:
         stem, ending = ending, ""
     stem = _NOT_IN_A_NAME.sub("-", stem).strip("-_")[:_LONGEST_STEM]
     name = f"{stem}.{ending}" if ending else stem
-    if "/" in file_name or "\\" in file_name or not EXPORT_NAME.fullmatch(name):
+    if "/" in file_name or "\\" in file_name or not _NAME.fullmatch(name):
         allowed = "letters, digits, - and _, such as run-1.txt"
         raise _refused("export", "is no name of a file", ascii(file_name[:_LONGEST_STEM]), allowed)
-    return name
+    return f"{name}{SUFFIX}"
 
 
-async def _written(path: Path, pieces: AsyncIterator[bytes]) -> int:
-    """Number of bytes that are in the new file `path` now."""
-    count = 0
-    with path.open("xb") as file:
-        async for piece in pieces:
-            count += len(piece)
-            if count > MOST_BYTES:
-                raise _refused("export", "is too large", allowed=f"{MOST_BYTES >> 20} MB", next_step="split it")
-            file.write(piece)
-    path.chmod(0o644)
-    return count
+def _is_export(name: str, status: os.stat_result) -> bool:
+    return bool(EXPORT_NAME.fullmatch(name)) and stat.S_ISREG(status.st_mode)
+
+
+def _removed(directory: int, name: str) -> None:
+    try:
+        os.unlink(name, dir_fd=directory)
+    except FileNotFoundError:
+        return
+
+
+def _full(kept: Usage) -> RecordingError:
+    return _refused(
+        "exports",
+        "has no room for another file",
+        f"{kept.files} files with {kept.bytes / 2**20:.1f} MB",
+        f"{MOST_FILES} files with {MOST_BYTES_OF_ALL >> 20} MB",
+        "delete exports that are not needed any more",
+    )
 
 
 def _refused(where: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> RecordingError:

@@ -17,6 +17,7 @@ from compd.instruments.export import InstrumentExport
 from compd.joining.join import match_export
 from compd.joining.summary import summary_lines
 from compd.page.joining.choices import Choices, read_choices
+from compd.page.joining.export_routes import export_routes
 from compd.page.joining.export_table import ExportReader, table_contents
 from compd.page.joining.exports import MOST_BYTES, Exports
 from compd.page.joining.trial import tried
@@ -64,6 +65,7 @@ class JoinRoutes:
             Route("/join", self._index),
             Route("/join/sources", self._sources),
             Route("/join/exports", self._bring, methods=["POST"]),
+            *export_routes(self._exports),
             Route("/join/table", self._table, methods=["POST"]),
             Route("/join/trial", self._try, methods=["POST"]),
             Route("/join/recording", self._write, methods=["POST"]),

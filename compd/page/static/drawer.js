@@ -4,6 +4,13 @@ import { ModelList } from "./model_list.js";
 import { Orders, nameOf } from "./orders.js";
 import { Recordings } from "./recordings.js";
 
+// The address as a picture for the camera of another device, which then asks for a token of its own.
+function elsewhere() {
+  if (["127.0.0.1", "localhost"].includes(location.hostname)) return []; // nobody else reaches it
+  const code = element("img", { src: "/address.svg", alt: `QR code of ${location.origin}`, loading: "lazy", width: 180 });
+  return [element("p", {}, "Open it on another device, with a token of its own: ", element("b", {}, location.origin)), code];
+}
+
 export class Drawer {
   constructor(place, page) {
     Object.assign(this, { place, page, orders: new Orders(page) });
@@ -49,6 +56,9 @@ export class Drawer {
       this.looking,
       element("h2", {}, "Recordings"),
       ...this.recordings.parts,
+      element("h2", {}, "This browser"),
+      ...elsewhere(),
+      element("form", { method: "post", action: "/leave", class: "row" }, element("button", { id: "leave" }, "Leave this page"), element("span", { class: "note" }, "This browser then needs a token again.")),
     );
   }
 

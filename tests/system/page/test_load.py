@@ -13,7 +13,7 @@ import pytest
 
 from compd.page.broadcast import LIVE_HZ
 from tests.support.event_stream import EventStream, cookie_of, host_of, request
-from tests.support.live_page import page_process
+from tests.support.live_page import memory_mb, page_process
 from tests.support.scripted_page import LOOKS, ORDERS
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
@@ -27,11 +27,6 @@ GROWTH_MB = 4.0
 # The age guard calls an event late from half a second on.
 LATE_S = 0.6
 SECRET = "nothing that a browser may have"
-
-
-def memory_mb(pid):
-    fields = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
-    return int(fields["VmRSS"].split()[0]) / 1e3
 
 
 class Reader(threading.Thread):

@@ -19,6 +19,9 @@ SETPOINT = {
 }
 
 
+BY = "anna (operate) from 10.0.0.5"
+
+
 @pytest.fixture
 def link():
     link = DaemonLink("/run/compd/compd.sock", connected=True, reason="")
@@ -129,11 +132,11 @@ def test_no_other_name_reaches_the_daemon(link, tmp_path, subject, monkeypatch):
     orders = Orders(link, ModelFiles(models))
     assert not orders.consequence("adopt", subject).possible
     with pytest.raises(DaemonError, match="named by its hash"):
-        asyncio.run(orders.do("adopt", subject))
+        asyncio.run(orders.do("adopt", subject, BY))
     if subject:
         assert not orders.consequence("shadow", subject).possible
         with pytest.raises(DaemonError, match="none of the model files"):
-            asyncio.run(orders.do("shadow", subject))
+            asyncio.run(orders.do("shadow", subject, BY))
 
 
 def test_without_the_daemon_nothing_is_possible(link):

@@ -33,6 +33,17 @@ def test_a_part_is_downloaded_with_what_belongs_to_it_in_pieces(tmp_path):
     assert recordings.archive("../day") is None
 
 
+def test_a_download_has_what_belongs_to_the_recording_and_never_the_sealed_answer(tmp_path):
+    own = ["run.csv", "run.cycles.jsonl", "run.model-0a1b2c.yaml", "run.yaml"]
+    for name in (*own, "run.answer.json", "run.key", "run.model.yaml.py", "run.py", "run.csv.old", "run.secret.yaml"):
+        (tmp_path / name).write_text(name)
+    (tmp_path / "run.model-ffff.yaml").symlink_to("/etc/hostname")
+    pieces = Recordings(tmp_path, "/no/socket").archive("run")
+    assert pieces is not None
+    with zipfile.ZipFile(io.BytesIO(b"".join(pieces))) as archive:
+        assert archive.namelist() == own
+
+
 def test_a_recording_is_listed_once_whatever_its_tables(tmp_path):
     for name in ("day.csv", "day.parquet", "day.yaml", "night.parquet", "late-0001.arrow"):
         (tmp_path / name).write_text(name)

@@ -54,6 +54,23 @@ export class Wizard extends Session {
     await this.choose(answer.name);
   }
 
+  // What is kept of exports, beside what is allowed.
+  async usage() {
+    const response = await fetch("join/exports");
+    if (!response.ok) throw new Error("what is kept of exports cannot be told");
+    return response.json();
+  }
+
+  // An export that is not needed any more; there is no way back.
+  async remove(name) {
+    const response = await fetch(`join/exports/${encodeURIComponent(name)}`, { method: "DELETE" });
+    const answer = await response.json().catch(() => ({}));
+    if (!response.ok) throw new Error(answer.reason ?? `${name} could not be deleted`);
+    Object.assign(this, { table: null, trial: null, command: "" });
+    Object.assign(this.choices, { export: null, columns: null, group: null, sheet: null });
+    await this.list();
+  }
+
   // Another export begins with nothing said about its columns.
   choose(name) {
     this.table = null;

@@ -241,8 +241,8 @@ def test_what_is_no_order_is_refused(client, body):
 def test_an_export_is_brought_once(client, recordings):
     content = b"time_s,x_mm\n" + b"0.5,1.0\n" * 100_000
     answer = client.post("/join/exports", params={"name": "Messung 12.03 (neu).TXT"}, content=content)
-    assert answer.json() == {"name": "Messung-12-03-neu.TXT", "bytes": len(content)}
-    path = recordings / "exports" / "Messung-12-03-neu.TXT"
+    assert answer.json() == {"name": "Messung-12-03-neu.TXT.export", "bytes": len(content)}
+    path = recordings / "exports" / "Messung-12-03-neu.TXT.export"
     assert path.read_bytes() == content
     assert client.post("/join/exports", params={"name": path.name}, content=content).status_code == 200
     other = client.post("/join/exports", params={"name": path.name}, content=content + b"1")
@@ -272,7 +272,7 @@ def test_an_export_that_is_empty_or_too_large_leaves_nothing(client, recordings,
 
 
 def test_an_export_never_goes_through_a_link(client, recordings, tmp_path):
-    link = recordings / "exports" / "linked.txt"
+    link = recordings / "exports" / "linked.txt.export"
     link.symlink_to(tmp_path / "elsewhere.txt")
     assert client.post("/join/exports", params={"name": "linked.txt"}, content=b"1\n").status_code == 409
     assert not Path(tmp_path / "elsewhere.txt").exists()

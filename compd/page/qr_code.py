@@ -1,0 +1,24 @@
+"""An address as a QR code: in a terminal, or as a picture."""
+
+from __future__ import annotations
+
+import io
+from typing import TextIO
+
+import segno
+
+# Light modules around the code, ISO/IEC 18004.
+_BORDER = 4
+_SCALE = 4
+
+
+def print_qr_code(text: str, out: TextIO) -> None:
+    """Draw it on a terminal."""
+    segno.make_qr(text).terminal(out, border=_BORDER, compact=True)
+
+
+def svg_qr_code(text: str) -> bytes:
+    """It as an SVG document, dark on white whatever is behind it."""
+    out = io.BytesIO()
+    segno.make_qr(text).save(out, kind="svg", scale=_SCALE, border=_BORDER, light="#fff", dark="#000", title="QR code")
+    return out.getvalue()
