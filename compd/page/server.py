@@ -31,6 +31,7 @@ from compd.page.orders import Orders, explained
 from compd.page.recordings import Recordings
 from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
 from compd.page.workbench.routes import WorkbenchRoutes
+from compd.page.workers.workers import Workers
 
 STATIC = Path(__file__).parent / "static"
 # At 1 kHz an hour is some gigabytes.
@@ -38,6 +39,13 @@ LONGEST_BURST_S = 3600.0
 # Of the page's button.
 BURST_S = 5.0
 _CANCEL_EVERY_S = 0.5
+# What its workers need and this process does not.
+PRELOADED = (
+    "compd.page.joining.joiner",
+    "compd.page.workbench.diagnosing",
+    "compd.page.workbench.formula_questions",
+    "compd.page.workbench.plan_questions",
+)
 
 
 class Server:
@@ -61,8 +69,9 @@ class Server:
         self._orders = Orders(link, self._models)
         self._browsers = Browsers(clock or MonotonicClock())
         self._broadcast = Broadcast(link, self._browsers, recordings)
-        self._workbench = WorkbenchRoutes(recordings, models, machine, STATIC / "workbench.html")
-        self._join = JoinRoutes(recordings, machine, STATIC / "join.html")
+        self._workers = Workers(PRELOADED)
+        self._workbench = WorkbenchRoutes(recordings, models, machine, STATIC / "workbench.html", self._workers)
+        self._join = JoinRoutes(recordings, machine, STATIC / "join.html", self._workers)
 
     def app(self) -> Starlette:
         """The ASGI application."""
@@ -92,7 +101,9 @@ class Server:
     @asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
         tasks = [asyncio.create_task(self._link.run()), asyncio.create_task(self._broadcast.run())]
+        self._workers.prepare()
         yield
+        self._workers.end()
         await _ended(tasks)
         await self._recordings.stop()
 
