@@ -39,13 +39,6 @@ LONGEST_BURST_S = 3600.0
 # Of the page's button.
 BURST_S = 5.0
 _CANCEL_EVERY_S = 0.5
-# What its workers need and this process does not.
-PRELOADED = (
-    "compd.page.joining.joiner",
-    "compd.page.workbench.diagnosing",
-    "compd.page.workbench.formula_questions",
-    "compd.page.workbench.plan_questions",
-)
 
 
 class Server:
@@ -69,7 +62,7 @@ class Server:
         self._orders = Orders(link, self._models)
         self._browsers = Browsers(clock or MonotonicClock())
         self._broadcast = Broadcast(link, self._browsers, recordings)
-        self._workers = Workers(PRELOADED)
+        self._workers = Workers()
         self._workbench = WorkbenchRoutes(recordings, models, machine, STATIC / "workbench.html", self._workers)
         self._join = JoinRoutes(recordings, machine, STATIC / "join.html", self._workers)
 

@@ -17,16 +17,23 @@ from compd.page.workers.worker_process import serve
 
 # Processes with their states in memory. The daemon runs on the same computer.
 MOST_PROCESSES = 8
-_FIRST = "compd.page.workers.single_thread"
+# What they need, and the server's own process does not; in this order.
+PRELOADED = [
+    "compd.page.workers.single_thread",
+    "compd.page.joining.joiner",
+    "compd.page.workbench.diagnosing",
+    "compd.page.workbench.formula_questions",
+    "compd.page.workbench.plan_questions",
+]
 
 
 class Workers:
     """Those that there are."""
 
-    def __init__(self, preloaded: Sequence[str] = (), most: int = MOST_PROCESSES) -> None:
-        """preloaded : names of modules that workers need. most : processes at once."""
+    def __init__(self, most: int = MOST_PROCESSES) -> None:
+        """most : processes at once."""
         self._context = multiprocessing.get_context("forkserver")
-        self._preloaded, self._most = [_FIRST, *preloaded], most
+        self._most = most
         self._workers: WeakSet[Worker] = WeakSet()
         self._lock = threading.Lock()
         self._starting = threading.Lock()  # the first start waits for what is imported
@@ -34,7 +41,7 @@ class Workers:
     def prepare(self) -> None:
         """Start the process that workers are forked from. It imports what they need, which takes seconds; this does
         not wait for it."""
-        self._context.set_forkserver_preload(self._preloaded)
+        self._context.set_forkserver_preload(PRELOADED)
         forkserver.ensure_running()
 
     def worker(self, name: str, opening: str, arguments: Sequence[Any], limits: WorkerLimits) -> Worker:

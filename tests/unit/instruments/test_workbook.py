@@ -15,6 +15,7 @@ from openpyxl import Workbook
 from compd.errors import RecordingError
 from compd.instruments.export import ReadOptions
 from compd.instruments.raw_table import RawTable
+from compd.instruments.read_limits import ReadLimits
 from compd.instruments.workbook import read_workbook
 from compd.instruments.workbook_cells import cell_name
 
