@@ -73,6 +73,6 @@ def end_with_the_parent() -> None:
 
 def _step_back() -> None:
     """Let the daemon and the page have the processor and the memory first."""
-    os.nice(_NICE)
+    os.setpriority(os.PRIO_PROCESS, 0, max(_NICE, os.getpriority(os.PRIO_PROCESS, 0)))
     os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     Path("/proc/self/oom_score_adj").write_text(_KILLED_FIRST, encoding="ascii")
