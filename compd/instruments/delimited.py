@@ -15,6 +15,7 @@ from compd.instruments.delimiter import BLANKS, NAMES, WIDE_BLANKS, find_delimit
 from compd.instruments.export import ReadOptions
 from compd.instruments.export_problems import ExportProblems
 from compd.instruments.raw_table import RawTable
+from compd.instruments.read_limits import ReadLimits
 from compd.instruments.text_file import TextFile
 from compd.instruments.time_stamps import is_stamp
 from compd.units import unit_named
@@ -50,6 +51,7 @@ def read_delimited(text: TextFile, options: ReadOptions, shape: str | None = Non
         file_rows.rows = [row.rstrip(" ").removesuffix(delimiter) for row in file_rows.rows]
     count, above = _count_cells(file_rows, delimiter, problems)
     problems.check()
+    _check_size(file_rows, count, options.limits, problems)
     columns, line = _split(file_rows, delimiter, count, above)
     header = _take_header(file_rows, columns, line, delimiter, count, above, problems)
     columns, line, left_out = _drop_headers(columns, line, header, problems)
@@ -164,6 +166,19 @@ def _count_cells(file_rows: _Rows, delimiter: str, problems: ExportProblems) -> 
             "mend or delete the line",
         )
     return count, above
+
+
+def _check_size(file_rows: _Rows, count: int, limits: ReadLimits, problems: ExportProblems) -> None:
+    """Raise RecordingError for more than a list may have, before it is split into cells."""
+    rows = len(file_rows.rows)
+    if count > limits.columns:
+        step = "export one row of the table in a line, with the columns that are needed"
+        problems.add(file_rows.number[0], "has too many columns", str(count), f"{limits.columns} in a line", step)
+    elif rows * count > limits.cells:
+        value = f"{rows} rows of {_cells(count)}, {rows * count} together"
+        step = "leave out columns or samples, or split the file"
+        problems.add(0, "has too many cells", value, f"{limits.cells} cells", step)
+    problems.check()
 
 
 def _cells(count: int) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from compd.arrays import FloatArray, IntArray
+from compd.instruments.read_limits import GENEROUS, ReadLimits
 
 POSITION_AXES = ("x", "y", "z")
 ATTITUDE_AXES = ("rx", "ry", "rz")
@@ -28,6 +29,7 @@ class ReadOptions:
     unit : of the lengths (`--unit`). angle_unit : of the attitude (`--angle-unit`). decimal : "." or "," (`--decimal`).
     dates : "dmy", "mdy" or "ymd" (`--dates`). rate_hz : samples per second where rows have no time (`--rate-hz`).
     group : which group of points (`--group`). sheet : of a workbook (`--sheet`).
+    limits : how much the file may hold.
     """
 
     shape: str | None = None
@@ -40,6 +42,7 @@ class ReadOptions:
     rate_hz: float | None = None
     group: str | None = None
     sheet: str | None = None
+    limits: ReadLimits = GENEROUS
 
 
 @dataclass(frozen=True)

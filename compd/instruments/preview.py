@@ -13,6 +13,7 @@ from compd.instruments.columns import group_labels, to_export
 from compd.instruments.export import InstrumentExport, ReadOptions
 from compd.instruments.export_problems import ExportProblems
 from compd.instruments.read import read_table
+from compd.instruments.read_limits import ReadLimits
 from compd.instruments.text_file import decode_text, read_content
 
 SHOWN_ROWS = 20
@@ -53,8 +54,9 @@ def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
     try:
         table = read_table(path, options)
     except RecordingError as error:
-        line, rows = _lines_at_top(path)
-        return ExportPreview(None, line=line, rows=rows, sheets=_sheets(path), problems=error.problems)
+        line, rows = _lines_at_top(path, options.limits)
+        sheets = _sheets(path, options.limits)
+        return ExportPreview(None, line=line, rows=rows, sheets=sheets, problems=error.problems)
     if isinstance(table, InstrumentExport):
         return _of_samples(table)
     roles = find_roles(table, options, ExportProblems(path))
@@ -74,7 +76,7 @@ def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
         roles=[role_of.get(k, "-") for k in range(len(columns))],
         assumed=table.assumed if export is None else export.taken,
         groups=list(dict.fromkeys(group_labels(table, roles) or ()))[:_MOST_GROUPS],
-        sheets=_sheets(path) if table.shape == "xlsx" else (),
+        sheets=_sheets(path, options.limits) if table.shape == "xlsx" else (),
         problems=problems,
     )
 
@@ -95,21 +97,21 @@ def _of_samples(export: InstrumentExport) -> ExportPreview:
     )
 
 
-def _lines_at_top(path: Path) -> tuple[list[int], list[list[str]]]:
+def _lines_at_top(path: Path, limits: ReadLimits) -> tuple[list[int], list[list[str]]]:
     """The first lines of a text, whatever they are; none of another file."""
     try:
-        lines = decode_text(path, read_content(path)).lines[:SHOWN_ROWS]
+        lines = decode_text(path, read_content(path), limits).lines[:SHOWN_ROWS]
     except RecordingError:
         return [], []
     return list(range(1, len(lines) + 1)), _cut([line] for line in lines)
 
 
-def _sheets(path: Path) -> tuple[str, ...]:
+def _sheets(path: Path, limits: ReadLimits) -> tuple[str, ...]:
     """Of a workbook; empty for any other file."""
     from compd.instruments.workbook import sheet_names
 
     try:
-        return sheet_names(path)
+        return sheet_names(path, limits)
     except RecordingError:
         return ()
 

@@ -71,7 +71,7 @@ def _shape_of_bytes(path: Path, content: bytes) -> str | None:
 
 
 def _read_text(path: Path, content: bytes, options: ReadOptions) -> RawTable:
-    text = decode_text(path, content)
+    text = decode_text(path, content, options.limits)
     try:
         if options.shape == "sa" or (options.shape is None and is_spatial_analyzer(text)):
             return read_spatial_analyzer(text, options)

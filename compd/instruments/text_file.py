@@ -9,6 +9,7 @@ from pathlib import Path
 from compd.errors import RecordingError
 from compd.files.atomic_files import read_small_file
 from compd.instruments.export_problems import ExportProblems
+from compd.instruments.read_limits import ReadLimits
 
 # Some four million rows; a tracker with 50 samples a second writes them in a day.
 MOST_BYTES = 256 * 2**20
@@ -47,10 +48,10 @@ def read_content(path: Path) -> bytes:
     return content
 
 
-def decode_text(path: Path, content: bytes) -> TextFile:
+def decode_text(path: Path, content: bytes, limits: ReadLimits) -> TextFile:
     """Text in UTF-8, in UTF-16 with a byte order mark, or else in Windows-1252.
 
-    Raises RecordingError, with the line, for what is no text.
+    Raises RecordingError, with the line, for what is no text, has more lines than `limits` allow, or a longer line.
     """
     problems = ExportProblems(path)
     if content.startswith(_UTF16_MARKS):
@@ -77,9 +78,27 @@ def decode_text(path: Path, content: bytes) -> TextFile:
     problems.check()
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
+    count = text.count("\n")
+    if count > limits.lines:
+        problems.add(0, "has too many lines", str(count), f"{limits.lines}", "split the file, or leave out samples")
+        problems.check()
     lines = text.split("\n")
+    _check_length(lines, limits, problems)
     complete = not lines[-1]
     return TextFile(path, lines[:-1] if complete else lines, encoding, complete)
+
+
+def _check_length(lines: list[str], limits: ReadLimits, problems: ExportProblems) -> None:
+    longest = max(range(len(lines)), key=lambda k: len(lines[k]))
+    if len(lines[longest]) > limits.line_characters:
+        problems.add(
+            longest + 1,
+            "is too long for a row of measurements",
+            f"{len(lines[longest])} characters",
+            f"{limits.line_characters} in a line",
+            "export one row of the table in a line",
+        )
+    problems.check()
 
 
 def _decoded(content: bytes, encoding: str, problems: ExportProblems) -> str:

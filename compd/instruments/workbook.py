@@ -11,10 +11,12 @@ import numpy as np
 from compd.errors import Problem, RecordingError
 from compd.instruments.export import ReadOptions
 from compd.instruments.raw_table import RawTable
+from compd.instruments.read_limits import ReadLimits
 from compd.instruments.workbook_cells import VALUES, Row, SheetReader, cell_name
 from compd.instruments.workbook_parts import (
     BROKEN,
     SheetPart,
+    check_cells,
     check_workbook_file,
     read_sheet_part,
     unreadable,
@@ -41,7 +43,7 @@ def read_workbook(path: Path, options: ReadOptions) -> RawTable:
         For what is no .xlsx, several sheets with numbers, a cell with an error or a formula without a value, another
         header in the middle, merged cells in the list; with every problem that was found.
     """
-    check_workbook_file(path)
+    check_workbook_file(path, options.limits)
     with warnings.catch_warnings():
         # of what a list does not need: styles, validation, extensions
         warnings.simplefilter("ignore", UserWarning)
@@ -51,11 +53,11 @@ def read_workbook(path: Path, options: ReadOptions) -> RawTable:
             raise RecordingError(unreadable(path, why_broken(error))) from error
 
 
-def sheet_names(path: Path) -> tuple[str, ...]:
+def sheet_names(path: Path, limits: ReadLimits) -> tuple[str, ...]:
     """The names of a workbook's sheets, in their order. Raises RecordingError for what is no .xlsx."""
     from openpyxl import load_workbook
 
-    check_workbook_file(path)
+    check_workbook_file(path, limits)
     try:
         book = load_workbook(path, read_only=True)
     except BROKEN as error:
@@ -71,6 +73,8 @@ def _read(path: Path, options: ReadOptions) -> RawTable:
 
     book = load_workbook(path, read_only=True, data_only=True)
     try:
+        for each in book.worksheets:
+            check_cells(path, cast(Any, each)._worksheet_path, options.limits)
         sheet = _choose_sheet(path, book, options.sheet)
         part = read_sheet_part(path, cast(Any, sheet)._worksheet_path)
         reader = SheetReader(path, sheet.title)

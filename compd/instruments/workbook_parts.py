@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from compd.errors import Problem, RecordingError
+from compd.instruments.read_limits import ReadLimits
 
-# Of the file on the disk, and unpacked: a full sheet of a million rows has 300 MB.
+# Of the file on the disk.
 MOST_BYTES = 200_000_000
-MOST_UNPACKED_BYTES = 1_000_000_000
 # What the reading of a damaged file ends with; a SyntaxError is XML that is not well formed.
 BROKEN = (
     *(ValueError, KeyError, IndexError, TypeError, AttributeError, SyntaxError, EOFError, OSError, OverflowError),
@@ -23,6 +23,8 @@ _CHUNK = 1 << 20
 # Longer than what is looked for, which may lie across two chunks.
 _OVERLAP = 100
 _FORMULA = re.compile(rb"<(?:\w+:)?f[ >/]")
+_CELL = re.compile(rb"<(?:\w+:)?c[ >/]")
+_TEXT = re.compile(rb"<(?:\w+:)?si[ >/]")
 _MERGED = re.compile(rb"<(?:\w+:)?mergeCell [^>]*?ref=\"(([A-Z]{1,3})(\d{1,7}):([A-Z]{1,3})(\d{1,7}))\"")
 _SAVE_AS = "open it in a spreadsheet and save it as .xlsx, without a password"
 
@@ -44,8 +46,11 @@ class SheetPart:
     merged: tuple[MergedArea, ...]
 
 
-def check_workbook_file(path: Path) -> None:
-    """Raise RecordingError for what is no .xlsx file, cannot be read, or unpacks to more than a list can have."""
+def check_workbook_file(path: Path, limits: ReadLimits) -> None:
+    """Raise RecordingError for what is no .xlsx file, cannot be read, or unpacks to more than a list can have.
+
+    The table of texts, which a reader loads as a whole, is counted.
+    """
     try:
         if not path.is_file():
             raise FileNotFoundError(2, "no such file")
@@ -65,13 +70,13 @@ def check_workbook_file(path: Path) -> None:
             names = archive.namelist()
     except BROKEN as error:
         raise RecordingError(unreadable(path, why_broken(error))) from error
-    if size > MOST_BYTES or unpacked > MOST_UNPACKED_BYTES:
+    if size > MOST_BYTES or unpacked > limits.unpacked_bytes:
         raise RecordingError(
             Problem(
                 where=str(path),
                 what="is too large for a list of measurements",
                 value=f"{size} bytes, unpacked {unpacked}",
-                allowed=f"{MOST_BYTES} bytes, unpacked {MOST_UNPACKED_BYTES}",
+                allowed=f"{MOST_BYTES} bytes, unpacked {limits.unpacked_bytes}",
                 next_step="save the sheet as CSV",
             )
         )
@@ -81,6 +86,35 @@ def check_workbook_file(path: Path) -> None:
         raise RecordingError(
             Problem(where=str(path), what="is a binary workbook (.xlsb)", allowed=".xlsx", next_step=_SAVE_AS)
         )
+    for name in names:
+        if name.lower().endswith("sharedstrings.xml"):
+            _check_count(path, name, _TEXT, "texts", limits)
+
+
+def check_cells(path: Path, name: str, limits: ReadLimits) -> None:
+    """Raise RecordingError where a sheet has too many cells, whatever it says of its size. name : of its part."""
+    _check_count(path, name, _CELL, "cells", limits)
+
+
+def _check_count(path: Path, name: str, pattern: re.Pattern[bytes], what: str, limits: ReadLimits) -> None:
+    count, rest = 0, b""
+    with zipfile.ZipFile(path) as archive, archive.open(name.lstrip("/")) as file:
+        while chunk := file.read(_CHUNK):
+            text = rest + chunk
+            # what is cut by the chunk's end is counted with the next one
+            end = max(text.rfind(b"<"), 0)
+            count += len(pattern.findall(text, 0, end))
+            rest = text[end:][:_OVERLAP]
+            if count > limits.sheet_cells:
+                raise RecordingError(
+                    Problem(
+                        where=str(path),
+                        what=f"has too many {what} for a list of measurements in a workbook",
+                        value=f"more than {count - 1}",
+                        allowed=f"{limits.sheet_cells} {what} in a sheet",
+                        next_step="save the sheet as CSV, which is read much faster",
+                    )
+                )
 
 
 def why_broken(error: Exception) -> str:

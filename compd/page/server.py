@@ -34,6 +34,7 @@ from compd.page.qr_code import svg_qr_code
 from compd.page.recordings import Recordings
 from compd.page.requests import LOOKS_ONLY, asked_by, keys_of, may_change, note_change, refused
 from compd.page.workbench.routes import WorkbenchRoutes
+from compd.page.workers.workers import Workers
 
 STATIC = Path(__file__).parent / "static"
 # At 1 kHz an hour is some gigabytes.
@@ -67,8 +68,9 @@ class Server:
         self._orders = Orders(link, self._models)
         self._browsers = Browsers(clock or MonotonicClock())
         self._broadcast = Broadcast(link, self._browsers, recordings)
-        self._workbench = WorkbenchRoutes(recordings, models, machine, STATIC / "workbench.html")
-        self._join = JoinRoutes(recordings, machine, STATIC / "join.html")
+        self._workers = Workers()
+        self._workbench = WorkbenchRoutes(recordings, models, machine, STATIC / "workbench.html", self._workers)
+        self._join = JoinRoutes(recordings, machine, STATIC / "join.html", self._workers)
 
     def app(self) -> Starlette:
         """The ASGI application."""
@@ -99,7 +101,9 @@ class Server:
     @asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
         tasks = [asyncio.create_task(self._link.run()), asyncio.create_task(self._broadcast.run())]
+        self._workers.prepare()
         yield
+        self._workers.end()
         await _ended(tasks)
         await self._recordings.stop()
 

@@ -34,7 +34,7 @@ def page(
         str | None,
         typer.Option(
             metavar="ROLE:NAME",
-            help="Add a token, role view or operate, to --tokens; print it (with --listen or --behind: as an address); end.",
+            help="Add a token, role view or operate, to --tokens; print it (with --listen, its address too); end.",
         ),
     ] = None,
     read_only: Annotated[bool, typer.Option("--read-only", help="No orders from any browser.")] = False,

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import resource
 import threading
 import traceback
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 from compd.clock import Clock
@@ -16,6 +14,7 @@ from compd.live.acquisition.votes.votes import LOOK_EVERY_S
 from compd.live.memory.shared_message import SharedMessage
 from compd.live.processes.child_process import OUT_OF_MEMORY
 from compd.live.processes.control import Control, Phase
+from compd.live.processes.memory_limit import limit_memory
 from compd.live.realtime import LARGEST_SHARE, RationedPriority
 
 # A driver in the middle of a poll may take so long to let go of its line.
@@ -23,7 +22,6 @@ _STOP_WITHIN_S = 0.5
 # Processor time of a line that polls as fast as it goes, with a margin: 115200 baud takes 0.04 (benchmarks/).
 _SHARE_OF_A_FAST_LINE = 0.1
 _STATUS_BYTES = 1024 * 1024
-_BYTES_PER_MB = 1_000_000
 
 
 class AcquisitionProcess:
@@ -73,7 +71,7 @@ class AcquisitionProcess:
         threading.excepthook = _end_with_thread
         acquisition = self._make()
         acquisition.start()
-        _limit_memory(self._memory_mb)
+        limit_memory(self._memory_mb)
         priorities = self._priorities(acquisition)
         never = threading.Event()
         while self._control.phase != Phase.STOPPING:
@@ -90,15 +88,6 @@ class AcquisitionProcess:
         share = max(LARGEST_SHARE / max(1, len(threads)), _SHARE_OF_A_FAST_LINE)
         own = RationedPriority(self._priority, self._clock)
         return [own, *(RationedPriority(self._priority, self._clock, thread, share) for thread in threads)]
-
-
-def _limit_memory(memory_mb: float) -> None:
-    """Let the process grow by so much (MB) from what it has now; beyond, it ends."""
-    status = Path("/proc/self/status").read_text(encoding="ascii")
-    now_kb = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmData"))
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    limit = now_kb * 1024 + int(memory_mb * _BYTES_PER_MB)
-    resource.setrlimit(resource.RLIMIT_DATA, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
 
 
 def _end_with_thread(arguments: threading.ExceptHookArgs) -> None:

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from compd.errors import CompdError, Problem
 from compd.instruments.export import SHAPES, ReadOptions
+from compd.instruments.read_limits import ReadLimits
 from compd.joining.by_time import Instrument
 from compd.joining.join import JOIN_BY, JoinOptions
 
@@ -19,6 +20,8 @@ Value = TypeVar("Value", str, float, int)
 
 _LONGEST_TEXT = 200
 _MOST_COLUMNS = 500
+# Of an export in the page: an answer comes within a minute or two.
+LIMITS = ReadLimits(lines=2_000_000, cells=8_000_000, sheet_cells=1_000_000, unpacked_bytes=150_000_000)
 # Control characters, and halves of a character.
 _NO_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")
 _DATES = ("dmy", "mdy", "ymd")
@@ -100,6 +103,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
         rate_hz=choice("rate_hz", float, "a number, Hz"),
         group=text("group"),
         sheet=text("sheet"),
+        limits=LIMITS,
     )
     instrument = Instrument(
         frame="machine" if text("frame", _FRAMES) == "machine" else "instrument",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,18 +29,16 @@ class ExportReader:
 
     def __init__(self) -> None:
         self._kept: list[_Read] = []
-        self._lock = threading.Lock()
 
     def read(self, path: Path, options: ReadOptions) -> ExportPreview:
         """As `preview_export`."""
-        with self._lock:
-            stamp = file_stamp(path)
-            for known in self._kept:
-                if (known.path, known.stamp, known.options) == (path, stamp, options):
-                    return known.preview
-            preview = preview_export(path, options)
-            self._kept = [_Read(path, stamp, options, preview), *self._kept][:_KEPT]
-            return preview
+        stamp = file_stamp(path)
+        for known in self._kept:
+            if (known.path, known.stamp, known.options) == (path, stamp, options):
+                return known.preview
+        preview = preview_export(path, options)
+        self._kept = [_Read(path, stamp, options, preview), *self._kept][:_KEPT]
+        return preview
 
 
 def table_contents(preview: ExportPreview) -> dict[str, Any]:

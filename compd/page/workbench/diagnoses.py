@@ -5,10 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from compd.configuration.shipped import Machine
 from compd.errors import Problem, StateError
 from compd.page.workbench.diagnosis_job import DiagnosisJob
+from compd.page.workers.workers import Workers
+
+if TYPE_CHECKING:
+    from compd.configuration.shipped import Machine
 
 # Each takes a processor, and the memory of a process of its own; the daemon runs on the same computer.
 MOST_RUNNING = 2
@@ -17,7 +21,9 @@ MOST_RUNNING = 2
 class Diagnoses:
     """Those that run."""
 
-    def __init__(self) -> None:
+    def __init__(self, workers: Workers | None = None) -> None:
+        """workers : of the same server."""
+        self._workers = workers or Workers()
         self._lock = threading.Lock()
         self._running: list[DiagnosisJob] = []
 
@@ -37,6 +43,6 @@ class Diagnoses:
                         next_step="wait for one of them to end, or cancel it where it was begun",
                     )
                 )
-            job = DiagnosisJob(path, model_path, machine, revision=revision, effects=effects)
+            job = DiagnosisJob(path, model_path, machine, revision=revision, effects=effects, workers=self._workers)
             self._running.append(job)
             return job

@@ -9,7 +9,7 @@ from starlette.responses import JSONResponse, Response
 
 from compd.page.requests import keys_of, refused
 from compd.page.workbench.handlers import Handler
-from compd.page.workbench.workbench import Workbench
+from compd.page.workbench.open_workbench import OpenWorkbench
 
 # The page of a diagnosis is one file with its scripts and styles inside. In its sandbox it has no cookie of this
 # server, and it asks nothing of this server nor of any other.
@@ -19,23 +19,23 @@ _PAGE_POLICY = (
 )
 
 
-async def _diagnosis(request: Request, workbench: Workbench) -> Response:
+async def _diagnosis(request: Request, workbench: OpenWorkbench) -> Response:
     """How far the newest is; with what it has found, unless the browser names it as that which it shows."""
     return JSONResponse(workbench.diagnosis_summary(request.query_params.get("shown", "")))
 
 
-async def _diagnose(request: Request, workbench: Workbench) -> Response:
+async def _diagnose(request: Request, workbench: OpenWorkbench) -> Response:
     """`cancel`: end the one that runs; else begin one. It changes nothing, so that everybody may."""
     keys = await keys_of(request)
     if keys.get("cancel"):
         if workbench.diagnosis is not None:
             workbench.diagnosis.cancel()
     else:
-        await asyncio.to_thread(workbench.diagnose)
+        await workbench.diagnose()
     return JSONResponse(workbench.diagnosis_summary())
 
 
-async def _page(request: Request, workbench: Workbench) -> Response:
+async def _page(request: Request, workbench: OpenWorkbench) -> Response:
     job = workbench.diagnosis
     page = b"" if job is None else await asyncio.to_thread(lambda: job.page)
     if not page:

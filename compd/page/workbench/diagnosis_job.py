@@ -1,35 +1,36 @@
-"""A diagnosis in a process of its own: its steps as they begin, its result, and an end whenever a person wants it."""
+"""A diagnosis in a worker of its own: its steps as they begin, its result, and an end whenever a person wants it."""
 
 from __future__ import annotations
 
 import gzip
-import io
-import multiprocessing
-import os
+import json
 import secrets
 import threading
 from collections.abc import Sequence
-from multiprocessing.connection import Connection, wait
+from concurrent.futures import Future
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 from compd.clock import Clock, MonotonicClock
-from compd.configuration.shipped import Machine
 from compd.diagnosis.stages import ONLY_WHERE_NEEDED, STAGES
-from compd.errors import CompdError
+from compd.page.workers.limits import WorkerLimits
+from compd.page.workers.workers import Workers
 
 if TYPE_CHECKING:
-    from compd.diagnosis.verdict import Diagnosis
+    from compd.configuration.shipped import Machine
 
-# Columns of the text, as on a terminal of usual width.
-_WIDTH = 100
+_STATE = "compd.page.workbench.diagnosing:Diagnosing"
+# It ends as soon as its page is drawn.
+LIMITS = WorkerLimits(memory_mb=2000, idle_s=1.0)
+# The longest that was seen took some minutes.
+DIAGNOSIS_S = 1800.0
+PAGE_S = 120.0
 
 State = Literal["running", "done", "cancelled", "failed"]
 
 
 class DiagnosisJob:
-    """`compd diagnose` of one recording; its attributes are read by other threads.
+    """`compd diagnose` of one recording; its attributes are written by the worker's thread.
 
     Attributes
     ----------
@@ -49,9 +50,10 @@ class DiagnosisJob:
         clock: Clock | None = None,
         revision: int = 0,
         effects: Sequence[str] = (),
+        workers: Workers | None = None,
     ) -> None:
         """model_path : of a model file that is there; None for no model. effects : files of effects, or names of
-        those that come with compd, that are tried beside the library's."""
+        those that come with compd, that are tried beside the library's. workers : of the same server."""
         self._clock = clock or MonotonicClock()
         self._start_s = self._clock.monotonic()
         self.id = secrets.token_hex(8)
@@ -63,20 +65,16 @@ class DiagnosisJob:
         self.evidence: dict[str, Any] = {}
         self._page = b""
         self._seconds: float | None = None
-        context = multiprocessing.get_context("spawn")
-        self._messages, theirs = context.Pipe(duplex=False)
-        self._process = context.Process(
-            target=_diagnose, args=(theirs, path, model_path, machine, effects), daemon=True
-        )
-        self._process.start()
-        theirs.close()
-        self._thread = threading.Thread(target=self._listen, name="diagnosis", daemon=True)
-        self._thread.start()
+        self._ended = threading.Event()
+        arguments = (path, model_path, machine, tuple(effects))
+        self._worker = (workers or Workers()).worker(f"diagnosis of {path.stem}", _STATE, arguments, LIMITS)
+        asked = self._worker.submit(f"{_STATE}.outcome", seconds=DIAGNOSIS_S, progress=self._note_step)
+        asked.answer.add_done_callback(self._note_outcome)
 
     @property
     def has_ended(self) -> bool:
-        """Whether its process has, and nothing more comes."""
-        return not self._thread.is_alive()
+        """Whether nothing more comes."""
+        return self._ended.is_set()
 
     @property
     def page(self) -> bytes:
@@ -87,11 +85,11 @@ class DiagnosisJob:
         """End it, or the drawing of its pictures; without effect after its end."""
         if self.state == "running":
             self.state = "cancelled"
-        self._process.terminate()
+        self._worker.end()
 
     def join(self, timeout_s: float | None = None) -> None:
         """Wait for its end."""
-        self._thread.join(timeout_s)
+        self._ended.wait(timeout_s)
 
     def summary(self) -> dict[str, Any]:
         """As plain data, without the result.
@@ -113,69 +111,23 @@ class DiagnosisJob:
         """What it has found, as plain data."""
         return {"text": self.text, "result": self.result, "evidence": self.evidence}
 
-    def _listen(self) -> None:
-        try:
-            while True:
-                kind, content = self._messages.recv()
-                if kind == "step":
-                    self.steps.append((content, self._clock.monotonic() - self._start_s))
-                elif kind == "page":
-                    self._page = content
-                elif self.state == "running":
-                    self.text, self.result, self.evidence = content
-                    self._seconds = self._clock.monotonic() - self._start_s
-                    self.state = kind
-        except (EOFError, OSError):
+    def _note_step(self, text: str) -> None:
+        self.steps.append((text, self._clock.monotonic() - self._start_s))
+
+    def _note_outcome(self, answer: Future[bytes]) -> None:
+        self._seconds = self._clock.monotonic() - self._start_s
+        failure = None if answer.cancelled() else answer.exception()
+        if self.state != "running" or answer.cancelled() or failure is not None:
             if self.state == "running":
-                self.text, self.state = "the process of the diagnosis has ended without a result", "failed"
-        if self._seconds is None:
-            self._seconds = self._clock.monotonic() - self._start_s
-        self._process.join()
-        self._messages.close()
+                self.text, self.state = str(failure), "failed"
+            self._ended.set()
+            return
+        outcome = json.loads(answer.result())
+        self.text, self.result, self.evidence = outcome["text"], outcome["result"], outcome["evidence"]
+        self.state = "done"
+        self._worker.submit(f"{_STATE}.page", seconds=PAGE_S).answer.add_done_callback(self._note_page)
 
-
-def _diagnose(
-    messages: Connection, path: Path, model_path: Path | None, machine: Machine | None, effects: Sequence[str]
-) -> None:
-    """In the process of its own."""
-    threading.Thread(target=_end_with_the_parent, daemon=True).start()
-    from compd.api.diagnosis import diagnose
-    from compd.api.long_recordings import open_whole_or_sample
-    from compd.page.workbench.evidence import evidence
-
-    try:
-        aligned, recorded_rows = open_whole_or_sample(path, machine)
-        diagnosis = diagnose(aligned, model_path, effects=effects, progress=lambda text: messages.send(("step", text)))
-    except CompdError as error:
-        messages.send(("failed", (str(error), {}, {})))
-        return
-    messages.send(("done", (_text(diagnosis), diagnosis.as_json(), evidence(diagnosis))))
-    messages.send(("page", _page(diagnosis, recorded_rows if aligned.recording.rows < recorded_rows else 0)))
-
-
-def _end_with_the_parent() -> None:
-    """The page's server may be killed, and then ends nobody."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
-
-
-def _text(diagnosis: Diagnosis) -> str:
-    from rich.console import Console
-
-    from compd.report.diagnosis_text import print_diagnosis
-
-    text = io.StringIO()
-    print_diagnosis(Console(file=text, width=_WIDTH, highlight=False), diagnosis, [])
-    return text.getvalue()
-
-
-def _page(diagnosis: Diagnosis, recorded_rows: int) -> bytes:
-    """The page, compressed: the script for its figures is some megabytes."""
-    from compd.report.diagnosis_page import write_diagnosis_page
-
-    with TemporaryDirectory() as directory:
-        path = Path(directory) / "diagnosis.html"
-        write_diagnosis_page(path, diagnosis, [], recorded_rows=recorded_rows)
-        return gzip.compress(path.read_bytes())
+    def _note_page(self, answer: Future[bytes]) -> None:
+        if not answer.cancelled() and answer.exception() is None:
+            self._page = answer.result()
+        self._ended.set()

@@ -9,6 +9,8 @@ from pathlib import Path
 from compd.configuration.shipped import shipped_effects
 from compd.errors import Problem, StateError
 
+# Of the file of one's own effects, beside the model files.
+OWN_NAME = "own.effects.yaml"
 # Of a file of effects beside the model files.
 FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}[.-]effects\.yaml")
 
@@ -27,13 +29,13 @@ class EffectLibraries:
         )
         return [*shipped_effects(), *sorted(name for name in files if FILE_NAME.fullmatch(name) and name != self._but)]
 
-    def sources(self, names: Iterable[object]) -> list[str]:
+    def sources(self, names: Iterable[str]) -> list[str]:
         """Each as `--effects` takes it. Raises StateError for a name that is none of them."""
         known = self.names()
         chosen = list(dict.fromkeys(names))
         for name in chosen:
             if name not in known:
                 raise StateError(
-                    Problem(where="library of effects", what="is not there", value=str(name), allowed=", ".join(known))
+                    Problem(where="library of effects", what="is not there", value=name, allowed=", ".join(known))
                 )
-        return [str(name) if name in shipped_effects() else str(self._directory / str(name)) for name in chosen]
+        return [name if name in shipped_effects() else str(self._directory / name) for name in chosen]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
 from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
-from compd.page.workbench.workbench import Workbench
+from compd.page.workbench.open_workbench import OpenWorkbench
 
 # Numbers of some 100,000 rows.
 LONGEST_ROWS_BYTES = 1_000_000
@@ -20,49 +19,45 @@ class Handler(NamedTuple):
     """What answers at an address below that of an open recording."""
 
     path: str
-    answer: Callable[[Request, Workbench], Awaitable[Response]]
+    answer: Callable[[Request, OpenWorkbench], Awaitable[Response]]
     method: str = "GET"
 
 
-async def _summary(request: Request, workbench: Workbench) -> Response:
-    return JSONResponse(await workbench.ask(workbench.summary))
+async def _summary(request: Request, workbench: OpenWorkbench) -> Response:
+    return plain(await workbench.ask("summary"))
 
 
-async def _rows(request: Request, workbench: Workbench) -> Response:
+async def _rows(request: Request, workbench: OpenWorkbench) -> Response:
     """Those that pictures show; `all`: every row, to choose from."""
-    return _numbers(await workbench.ask(partial(workbench.opened.rows, every="all" in request.query_params)))
+    return _numbers(await workbench.ask("rows", "all" in request.query_params))
 
 
-async def _effects(request: Request, workbench: Workbench) -> Response:
-    return JSONResponse(await workbench.ask(workbench.effects))
+async def _effects(request: Request, workbench: OpenWorkbench) -> Response:
+    return plain(await workbench.ask("effects"))
 
 
-async def _card(request: Request, workbench: Workbench) -> Response:
-    return JSONResponse(await workbench.ask(partial(workbench.card, request.path_params["effect"])))
+async def _card(request: Request, workbench: OpenWorkbench) -> Response:
+    return plain(await workbench.ask("card", request.path_params["effect"]))
 
 
-async def _trial(request: Request, workbench: Workbench) -> Response:
-    def tried() -> bytes:
-        trial = workbench.trial(request.path_params["effect"], request.path_params["variant"])
-        return trial.pack(workbench.opened.pictured, {"revision": workbench.revision})
-
-    return _numbers(await workbench.ask(tried))
+async def _trial(request: Request, workbench: OpenWorkbench) -> Response:
+    return _numbers(await workbench.ask("tried", request.path_params["effect"], request.path_params["variant"]))
 
 
-async def _step(request: Request, workbench: Workbench) -> Response:
+async def _step(request: Request, workbench: OpenWorkbench) -> Response:
     """`dry_run`: what it would do. Else it is done, and the answer is the summary."""
     keys: Any = await keys_of(request)
     kind, effect, revision = str(keys.get("kind")), str(keys.get("effect", "")), keys.get("revision")
     if keys.get("dry_run"):
-        return JSONResponse(await workbench.ask(partial(workbench.propose, kind, effect)))
+        return plain(await workbench.ask("propose", kind, effect))
     if not may_change(request):
         return refused(LOOKS_ONLY, 403)
     if kind == "undo":
-        return JSONResponse(await workbench.ask(partial(workbench.undo, revision)))
-    return JSONResponse(await workbench.ask(partial(workbench.make, kind, effect, revision)))
+        return plain(await workbench.ask("undo", revision))
+    return plain(await workbench.ask("make", kind, effect, revision))
 
 
-async def _exclude(request: Request, workbench: Workbench) -> Response:
+async def _exclude(request: Request, workbench: OpenWorkbench) -> Response:
     """`rows` with a `reason` are left out; without one they count again."""
     keys: Any = await keys_of(request, LONGEST_ROWS_BYTES)
     rows, reason, revision = keys.get("rows"), keys.get("reason"), keys.get("revision")
@@ -71,8 +66,13 @@ async def _exclude(request: Request, workbench: Workbench) -> Response:
     if not isinstance(rows, list) or not rows or not all(type(row) is int for row in rows):
         return refused("rows is a list of numbers of rows", 400)
     if reason is None:
-        return JSONResponse(await workbench.ask(partial(workbench.include, rows, revision)))
-    return JSONResponse(await workbench.ask(partial(workbench.exclude, rows, str(reason), revision)))
+        return plain(await workbench.ask("include", rows, revision))
+    return plain(await workbench.ask("exclude", rows, str(reason), revision))
+
+
+def plain(json_text: bytes) -> Response:
+    """JSON as a worker made it."""
+    return Response(json_text, media_type="application/json")
 
 
 def _numbers(data: bytes) -> Response:

@@ -16,7 +16,6 @@ from compd.model.library import load_library
 from compd.model.library.effects_file import gather_effects
 from compd.page.workbench.effects_text import Declaration, entries_of, with_entry, without_entry
 
-NAME = "own.effects.yaml"
 # An effect that is searched in more combinations of its constants, or has more numbers, takes a page's time.
 MOST_COMBINATIONS = 100
 MOST_NUMBERS = 36

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
 from collections.abc import Awaitable, Callable
-from functools import partial
 from pathlib import Path
 
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
 from compd.errors import CompdError
-from compd.page.recording_machine import machine_of
-from compd.page.recordings import NAME, Recordings, recording_tables
+from compd.page.recordings import NAME, Recordings, is_own, recording_tables
 from compd.page.requests import keys_of, refused
 from compd.page.workbench.diagnoses import Diagnoses
 from compd.page.workbench.diagnosis_handlers import DIAGNOSIS_HANDLERS
-from compd.page.workbench.effect_libraries import EffectLibraries
+from compd.page.workbench.effect_libraries import OWN_NAME, EffectLibraries
 from compd.page.workbench.formula_handlers import FORMULA_HANDLERS
-from compd.page.workbench.handlers import HANDLERS, Handler
-from compd.page.workbench.own_effects import NAME as OWN_NAME
+from compd.page.workbench.handlers import HANDLERS, Handler, plain
+from compd.page.workbench.open_workbench import OpenWorkbench
 from compd.page.workbench.plan_handlers import PLAN_HANDLERS
-from compd.page.workbench.workbench import Workbench
+from compd.page.workers.answering import CLIENT_GONE, BrowserGone
+from compd.page.workers.workers import Workers
 
 # A model file that the page may begin.
 MODEL_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\.model\.yaml")
@@ -35,15 +34,23 @@ _BASE = "/workbench/{recording}/{model}"
 class WorkbenchRoutes:
     """What is open, by recording and model file; used by the event loop's thread alone."""
 
-    def __init__(self, recordings: Recordings, models: Path | None, machine: Path | None, page: Path) -> None:
+    def __init__(
+        self,
+        recordings: Recordings,
+        models: Path | None,
+        machine: Path | None,
+        page: Path,
+        workers: Workers | None = None,
+    ) -> None:
         """models : directory of model files, None for that of the recordings. machine : the page's configuration.
-        page : the HTML file."""
+        page : the HTML file. workers : of the page's server."""
+        self._workers = workers or Workers()
         self._recordings = recordings
         self._models = models or recordings.directory
         self._machine = machine
         self._page = page
-        self._open: dict[str, Workbench] = {}
-        self._diagnoses = Diagnoses()
+        self._open: dict[str, OpenWorkbench] = {}
+        self._diagnoses = Diagnoses(self._workers)
         self._libraries = EffectLibraries(self._models, OWN_NAME)
 
     def routes(self) -> list[Route]:
@@ -72,28 +79,38 @@ class WorkbenchRoutes:
             return refused("there is no such recording", 404)
         if not MODEL_NAME.fullmatch(model):
             return refused("a model file is NAME.model.yaml, with letters, digits, - and _", 400)
+        model_path = self._models / model
+        if model_path.is_symlink() or (model_path.exists() and not is_own(model_path)):
+            return refused(f"{model} is a link or no file, which the page does not open", 409)
         key = f"{recording}/{model}"
-        if key not in self._open:
-            try:
-                opened = await asyncio.to_thread(self._opened, path, self._models / model)
-            except CompdError as error:
-                return refused(str(error), 409)
-            self._open.setdefault(key, opened)
-        workbench = self._open[key]
         try:
-            await workbench.ask(workbench.refresh)
-            if isinstance(libraries := keys.get("libraries"), list):
-                await workbench.ask(partial(workbench.use_libraries, self._libraries.sources(libraries)))
+            libraries = self._named_libraries(keys.get("libraries"))
+            return await self._opened(key, path, model_path, libraries)
         except CompdError as error:
             return refused(str(error), 409)
-        return JSONResponse({"key": key, **await workbench.ask(workbench.summary)})
 
-    def _opened(self, path: Path, model_path: Path) -> Workbench:
-        """Open them, by the page's configuration where it is of the recording's machine.
+    def _named_libraries(self, names: object) -> list[str] | None:
+        """Files of effects by their names; None where nothing is said of them. Raises HTTPException, StateError."""
+        if names is None:
+            return None
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise HTTPException(400, "libraries is a list of names")
+        return self._libraries.sources(names)
 
-        Raises CompdError with every problem of the recording, its machine and the model.
+    async def _opened(self, key: str, path: Path, model_path: Path, libraries: list[str] | None) -> Response:
+        """The summary of what is open by that key now.
+
+        Raises CompdError with every problem of the recording, its machine, the model and the libraries.
         """
-        return Workbench(path, model_path, machine_of(path, self._machine), self._diagnoses)
+        workbench = self._open.get(key)
+        if workbench is None:
+            workbench = OpenWorkbench(self._workers, self._diagnoses, path, model_path, self._machine)
+            self._open[key] = workbench
+        try:
+            return plain(await workbench.ask("open_again", key, libraries))
+        finally:
+            if workbench.worker.kept is None:  # it could not be opened
+                self._open.pop(key, None)
 
     def _of_open(self, handler: Handler) -> Callable[[Request], Awaitable[Response]]:
         """The handler with the workbench that the address names."""
@@ -104,6 +121,8 @@ class WorkbenchRoutes:
                 return refused(_NOT_OPEN, 404)
             try:
                 return await handler.answer(request, workbench)
+            except BrowserGone:
+                return refused("the browser has gone", CLIENT_GONE)
             except CompdError as error:
                 return refused(str(error), 409)
             except (KeyError, IndexError):

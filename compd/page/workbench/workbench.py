@@ -1,34 +1,29 @@
-"""One recording and one model file in the page, for every browser that has them open: one change at a time."""
+"""One recording and one model file in the page, for every browser that has them open. It lives in a worker."""
 
 from __future__ import annotations
 
-import asyncio
 import shlex
-import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from compd.configuration.shipped import Machine
 from compd.diagnosis.planning.measurement_plan import MeasurementPlan
 from compd.errors import CompdError, Problem, RecordingError, StateError
 from compd.files.atomic_files import file_stamp, write_files
 from compd.live.loop.model_loader import ModelText
 from compd.model.effect_needs import can_concern
 from compd.model.library import load_library
+from compd.page.recording_machine import machine_of
 from compd.page.workbench.candidates import Candidates
 from compd.page.workbench.command_lines import CommandLines
-from compd.page.workbench.diagnoses import Diagnoses
-from compd.page.workbench.diagnosis_job import DiagnosisJob
 from compd.page.workbench.drafts import Drafts
+from compd.page.workbench.effect_libraries import OWN_NAME
 from compd.page.workbench.effect_sources import EffectSources
 from compd.page.workbench.model_changes import proposed, step_summary, undone, write
 from compd.page.workbench.opened_recording import OpenedRecording, open_for_page
-from compd.page.workbench.own_effects import NAME, OwnEffects
+from compd.page.workbench.own_effects import OwnEffects
 from compd.page.workbench.trial import Trial
 from compd.recording.exclusions import exclude_rows, include_rows
-
-Result = TypeVar("Result")
 
 
 class Workbench:
@@ -37,7 +32,6 @@ class Workbench:
     Attributes
     ----------
     revision : counts changes of the model and of the rows that count.
-    diagnosis : the newest, which may run; None before the first.
     sources : files of effects that are tried beside compd's.
     candidates : the effects that may be tried.
     drafts : effects that are being written.
@@ -46,19 +40,33 @@ class Workbench:
     """
 
     def __init__(
-        self, path: Path, model_path: Path, machine: Machine | None, diagnoses: Diagnoses | None = None
+        self, path: Path, model_path: Path, machine: Path | None, kept: Mapping[str, Any] | None = None
     ) -> None:
-        """diagnoses : those that run in the same server."""
-        self._path, self._model_path, self._machine = path, model_path, machine
+        """machine : the page's configuration, which counts where the recording is of it. kept : of a workbench of the
+        same files that has ended, in whose place this one comes."""
+        self._path, self._model_path, self._machine = path, model_path, machine_of(path, machine)
         self.revision = 0
-        self._lock = threading.Lock()  # numpy works in threads of its own
-        self._diagnoses = diagnoses or Diagnoses()
-        self._begin_lock = threading.Lock()
-        self.diagnosis: DiagnosisJob | None = None
-        self.sources = EffectSources(OwnEffects(model_path.parent / NAME))
-        self.commands = CommandLines(path, model_path, machine)
+        self.sources = EffectSources(OwnEffects(model_path.parent / OWN_NAME))
+        self.commands = CommandLines(path, model_path, self._machine)
         self.plans: dict[str, MeasurementPlan] = {}
         self._open()
+        if kept is not None:
+            self._go_on(kept)
+
+    def _go_on(self, kept: Mapping[str, Any]) -> None:
+        """Let browsers go on with the revision that they know, where nothing has changed since."""
+        is_same = kept["stamps"] == self._read
+        try:
+            if self.sources.use(kept["libraries"]):
+                self._set_candidates()
+        except CompdError:  # a library has got a mistake meanwhile
+            is_same = False
+        self.revision = kept["revision"] + (not is_same)
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        """From which another goes on: `revision`, `stamps` of the files, `libraries`."""
+        return {"revision": self.revision, "stamps": self._read, "libraries": self.sources.libraries}
 
     def _open(self) -> None:
         self._read = self._stamps()
@@ -94,14 +102,18 @@ class Workbench:
             self._proposal = None
             self.revision += 1
 
-    async def ask(self, question: Callable[[], Result]) -> Result:
-        """The answer to a question that takes long, while the server goes on; one after another."""
+    def look_again(self, libraries: Sequence[str] | None) -> None:
+        """`refresh`, and `use_libraries` unless they are None. Raises as both."""
+        self.refresh()
+        if libraries is not None:
+            self.use_libraries(libraries)
+        if self.sources.refresh():
+            self._set_candidates()
 
-        def answered() -> Result:
-            with self._lock:
-                return question()
-
-        return await asyncio.to_thread(answered)
+    def open_again(self, key: str, libraries: Sequence[str] | None) -> dict[str, Any]:
+        """For a browser that opens it: the summary, with the `key` of its address. Raises as `look_again`."""
+        self.look_again(libraries)
+        return {"key": key, **self.summary()}
 
     def summary(self) -> dict[str, Any]:
         """See `OpenedRecording.summary`; with the revision, and the hash of the model file as a daemon tells it."""
@@ -116,28 +128,17 @@ class Workbench:
             "commands": self.commands.all(self.sources.paths),
         }
 
-    def diagnose(self) -> None:
-        """Begin a diagnosis, unless one runs. Raises StateError where too many run in the server."""
-        with self._begin_lock:
-            last = self.diagnosis
-            if last is not None and last.state == "running":
-                return
-            if last is not None:
-                last.cancel()  # its pictures may still be drawn
-                last.join()
-            model = self._model_path if self._model_path.exists() else None
-            self.diagnosis = self._diagnoses.begin(self._path, model, self._machine, self.revision, self.sources.paths)
+    def diagnosed(self) -> dict[str, Any]:
+        """What a diagnosis is of: files `model` and `machine`, None for none; `effects`, files of effects."""
+        return {
+            "model": str(self._model_path) if self._model_path.exists() else None,
+            "machine": None if self._machine is None else str(self._machine),
+            "effects": self.sources.paths,
+        }
 
-    def diagnosis_summary(self, shown: str = "") -> dict[str, Any]:
-        """The newest: how many changes it is `behind`, and what it has found; `state` is "none" before the first.
-
-        shown : id of that whose outcome the browser has already, which is left out.
-        """
-        job = self.diagnosis
-        if job is None:
-            return {"state": "none"}
-        summary = {**job.summary(), "behind": self.revision - job.revision}
-        return summary if shown == job.id else summary | job.outcome()
+    def rows(self, every: bool) -> bytes:
+        """See `OpenedRecording.rows`."""
+        return self.opened.rows(every=every)
 
     def effects(self) -> dict[str, Any]:
         """See `Candidates.summary`; `own` says which effects are not of the library."""
@@ -164,6 +165,10 @@ class Workbench:
         """See `Candidates.trial`. name : as of `card`."""
         candidates, effect = self.drafts.find(name)
         return candidates.trial(effect, variant)
+
+    def tried(self, name: str, variant: int) -> bytes:
+        """`trial`, for a browser."""
+        return self.trial(name, variant).pack(self.opened.pictured, {"revision": self.revision})
 
     def propose(self, kind: str, effect: str) -> dict[str, Any]:
         """What a step would do; nothing is written. Raises CompdError where it cannot be made."""

@@ -15,6 +15,7 @@ from openpyxl import Workbook
 from compd.errors import RecordingError
 from compd.instruments.export import ReadOptions
 from compd.instruments.raw_table import RawTable
+from compd.instruments.read_limits import ReadLimits
 from compd.instruments.workbook import read_workbook
 from compd.instruments.workbook_cells import cell_name
 
@@ -211,10 +212,17 @@ def test_damaged_xml_and_entities_that_grow(tmp_path: Path) -> None:
     assert "cannot be read as .xlsx" in refused(path)
 
 
-def test_a_file_that_unpacks_to_more_than_a_list_is_not_unpacked(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_file_that_unpacks_to_more_than_a_list_is_not_unpacked(tmp_path: Path) -> None:
     path = book(tmp_path, LIST)
-    monkeypatch.setattr("compd.instruments.workbook_parts.MOST_UNPACKED_BYTES", 1000)
-    assert "is too large for a list of measurements" in refused(path)
+    assert "is too large for a list of measurements" in refused(path, limits=ReadLimits(unpacked_bytes=1000))
+
+
+def test_more_cells_than_are_allowed_are_refused_before_they_are_read(tmp_path: Path) -> None:
+    path = book(tmp_path, LIST)
+    message = refused(path, limits=ReadLimits(sheet_cells=5))
+    assert "has too many" in message
+    assert "5 cells in a sheet" in message or "5 texts in a sheet" in message
+    assert "save the sheet as CSV" in message
 
 
 def test_a_cell_far_away_is_refused_and_no_memory_filled(tmp_path: Path) -> None:

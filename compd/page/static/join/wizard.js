@@ -1,18 +1,44 @@
 // What is chosen in the join wizard, what the server reads of it, and what was tried.
+import { element } from "../format.js";
 import { post } from "../post.js";
 import { Session } from "../session.js";
+
+// Why a question is given up: what is chosen now is another.
+const REPLACED = new Error("replaced");
 
 export class Wizard extends Session {
   constructor(status) {
     super(status);
-    Object.assign(this, { panels: [], choices: {}, sources: null, table: null, command: "", trial: null, asked: 0 });
+    Object.assign(this, { panels: [], choices: {}, sources: null, table: null, command: "", trial: null, asked: 0, running: new Set() });
+    this.cancelButton = element("button", { type: "button", id: "cancel", hidden: true, onclick: () => this.giveUp(new Error("It was cancelled.")) }, "Cancel");
+    status.after(this.cancelButton);
+  }
+
+  // The server ends what nobody waits for.
+  giveUp(reason) {
+    for (const asking of this.running) asking.abort(reason);
   }
 
   // An order to the server with all that is chosen. Throws its reason.
-  async ask(path) {
-    const answer = await post(`join/${path}`, this.choices);
+  async ask(path, signal) {
+    const answer = await post(`join/${path}`, this.choices, signal);
     if (!answer.ok) throw new Error(answer.reason ?? "the page's server does not answer");
     return answer;
+  }
+
+  // As `ask`, with a button that cancels it; nothing is answered where other choices have taken its place.
+  async askPatiently(path) {
+    const asking = new AbortController();
+    this.running.add(asking);
+    this.cancelButton.hidden = false;
+    try {
+      return await this.ask(path, asking.signal);
+    } catch (error) {
+      if (error !== REPLACED) throw error;
+    } finally {
+      this.running.delete(asking);
+      this.cancelButton.hidden = !this.running.size;
+    }
   }
 
   async list() {
@@ -27,9 +53,10 @@ export class Wizard extends Session {
     Object.assign(this.choices, choices);
     if (Object.keys(choices).some((key) => key !== "name")) this.trial = null;
     const asked = ++this.asked;
+    this.giveUp(REPLACED);
     this.show();
     if (!this.choices.export) return;
-    const answer = await this.attempt(() => this.ask("table"));
+    const answer = await this.attempt(() => this.askPatiently("table"));
     if (asked !== this.asked) return; // somebody has gone on choosing
     Object.assign(this, answer ? { table: answer, command: answer.command } : { command: "" });
     this.show();
@@ -38,7 +65,7 @@ export class Wizard extends Session {
   async try() {
     const asked = this.asked;
     this.say("trying …");
-    const trial = await this.attempt(() => this.ask("trial"));
+    const trial = await this.attempt(() => this.askPatiently("trial"));
     if (asked !== this.asked) return;
     this.trial = trial ?? null;
     this.show();

@@ -22,8 +22,8 @@ export class Bench extends Session {
   }
 
   // An order for the open recording. Throws the server's reason.
-  async post(path, keys) {
-    const answer = await post(`workbench/${this.key}/${path}`, keys);
+  async post(path, keys, signal) {
+    const answer = await post(`workbench/${this.key}/${path}`, keys, signal);
     if (!answer.ok) throw new Error(answer.reason);
     return answer;
   }

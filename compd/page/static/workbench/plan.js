@@ -45,7 +45,7 @@ export class Plan {
     this.beside = new EffectChoices("Found as well, not in the model", 0, () => {});
     this.count = textField("Rows at most", { value: "40", id: "plan-rows", inputmode: "numeric" });
     this.limits = element("div", { class: "limits" });
-    this.button = element("button", { type: "button", id: "plan-button", onclick: () => this.plan() }, "Plan");
+    this.button = element("button", { type: "button", id: "plan-button", onclick: () => this.planOrCancel() }, "Plan");
     this.general = element("div", { class: "problem", role: "status" });
     this.picture = new PlanPicture();
     this.words = element("div", {});
@@ -117,19 +117,24 @@ export class Plan {
     return keys;
   }
 
+  planOrCancel() {
+    if (this.planning) this.planning.abort(new Error("The plan was cancelled."));
+    else this.plan();
+  }
+
   plan() {
     if (!this.bench) return;
-    this.button.disabled = true;
-    this.button.textContent = "planning …";
+    this.planning = new AbortController();
+    this.button.textContent = "Cancel the plan";
     this.bench.attempt(async () => {
       const { key } = this.bench;
-      const answer = await this.bench.post("plan", this.order);
+      const answer = await this.bench.post("plan", this.order, this.planning.signal);
       if (key !== this.bench.key) return; // another recording is open meanwhile
       this.showProblems(answer.problems ?? []);
       this.result.hidden = Boolean(answer.problems);
       if (!answer.problems) this.showPlan(answer);
     }).finally(() => {
-      this.button.disabled = false;
+      this.planning = null;
       this.button.textContent = "Plan";
     });
   }

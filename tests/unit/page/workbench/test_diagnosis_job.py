@@ -90,8 +90,8 @@ def test_more_than_a_few_at_once_are_refused_and_there_is_room_after_an_end(path
 
 PARENT = """
 import multiprocessing, time
-from compd.page.workbench.diagnosis_job import _end_with_the_parent
-child = multiprocessing.get_context("spawn").Process(target=_end_with_the_parent, daemon=True)
+from compd.page.workers.worker_process import end_with_the_parent
+child = multiprocessing.get_context("spawn").Process(target=end_with_the_parent, daemon=True)
 child.start()
 print(child.pid, flush=True)
 time.sleep(60)

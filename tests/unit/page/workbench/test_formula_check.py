@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from compd.page.workbench.formula_check import check
-from compd.page.workbench.formula_handlers import offered
+from compd.page.workbench.formula_questions import offered
 from compd.page.workbench.workbench import Workbench
 from tests.support.measured import gauges, hidden, record
 

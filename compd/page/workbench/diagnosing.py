@@ -1,0 +1,68 @@
+"""A diagnosis in a worker: the state that its questions are asked of."""
+
+from __future__ import annotations
+
+import gzip
+import io
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from compd.api.diagnosis import diagnose
+from compd.api.long_recordings import open_whole_or_sample
+from compd.configuration.shipped import Machine
+from compd.diagnosis.verdict import Diagnosis
+from compd.page.workbench.evidence import evidence
+
+# Columns of the text, as on a terminal of usual width.
+_WIDTH = 100
+
+
+class Diagnosing:
+    """`compd diagnose` of one recording."""
+
+    kept = None
+
+    def __init__(
+        self,
+        path: Path,
+        model_path: Path | None,
+        machine: Machine | None,
+        effects: Sequence[str] = (),
+        kept: None = None,
+    ) -> None:
+        """Arguments as of `DiagnosisJob`. Raises CompdError where the recording cannot be opened."""
+        self._aligned, self._recorded_rows = open_whole_or_sample(path, machine)
+        self._model_path, self._effects = model_path, effects
+        self._diagnosis: Diagnosis | None = None
+
+    def outcome(self, progress: Callable[[str], None]) -> dict[str, Any]:
+        """What it finds: `text`, `result` and `evidence`. progress : called with each step as it begins."""
+        self._diagnosis = diagnose(self._aligned, self._model_path, effects=self._effects, progress=progress)
+        return {
+            "text": _text(self._diagnosis),
+            "result": self._diagnosis.as_json(),
+            "evidence": evidence(self._diagnosis),
+        }
+
+    def page(self) -> bytes:
+        """The page of what was found, compressed: the script for its figures is some megabytes."""
+        from compd.report.diagnosis_page import write_diagnosis_page
+
+        assert self._diagnosis is not None
+        is_sample = self._aligned.recording.rows < self._recorded_rows
+        with TemporaryDirectory() as directory:
+            path = Path(directory) / "diagnosis.html"
+            write_diagnosis_page(path, self._diagnosis, [], recorded_rows=self._recorded_rows if is_sample else 0)
+            return gzip.compress(path.read_bytes())
+
+
+def _text(diagnosis: Diagnosis) -> str:
+    from rich.console import Console
+
+    from compd.report.diagnosis_text import print_diagnosis
+
+    text = io.StringIO()
+    print_diagnosis(Console(file=text, width=_WIDTH, highlight=False), diagnosis, [])
+    return text.getvalue()

@@ -1,0 +1,101 @@
+"""Effects as a person writes them, asked of a workbench in its worker: what a formula may name, what is wrong in it."""
+
+from __future__ import annotations
+
+from typing import Any, get_args
+
+from compd.errors import Problem
+from compd.model.effect import PORTS
+from compd.model.effect_basis import port_size
+from compd.model.effect_needs import external_ports
+from compd.model.formula.basis import AXES, VECTORS
+from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK, column_needs, link_column
+from compd.model.formula.functions import FUNCTIONS, LAG, NUMBERS
+from compd.model.formula.keys import FormulaDeclaration
+from compd.model.formula.parser import LONGEST
+from compd.model.observations import Observations
+from compd.page.workbench.formula_check import check
+from compd.page.workbench.workbench import Workbench
+
+_NUMBERS = {"pi": "3.14159...", "deg": "radians in a degree"}
+
+
+def offered(rows: Observations) -> dict[str, Any]:
+    """What a formula on this recording may consist of: ports, columns by port, functions; as plain data."""
+    known = "kinematics" in rows.available
+    ports = [
+        port
+        for port in get_args(FormulaDeclaration.model_fields["port"].annotation)
+        if (port_size(port, rows) > 0 if known else port in external_ports(rows.links))
+    ]
+    return {
+        "ports": [
+            {
+                "port": port,
+                "meaning": PORTS[port],
+                "axes": AXES if port in VECTORS else [],
+                "per_link": port in PER_LINK,
+                "columns": _columns(rows, port),
+            }
+            for port in ports
+        ],
+        "functions": [
+            *({"name": function.call, "meaning": function.meaning} for function in FUNCTIONS.values()),
+            {"name": LAG[0], "meaning": LAG[1]},
+            *({"name": name, "meaning": _NUMBERS[name]} for name in NUMBERS),
+        ],
+        "longest": LONGEST,
+    }
+
+
+def _columns(rows: Observations, port: Any) -> list[dict[str, str]]:
+    """The columns that a formula at this port may name on these rows."""
+    meanings = {**ANYWHERE, **OF_READING, **OF_LINK}
+    meanings["temperature_link"] = meanings["temperature_link"].partition(";")[0]
+    names = dict.fromkeys([*meanings, *map(link_column, rows.quantities), *rows.quantities])
+    return [
+        {"name": name, "meaning": meanings.get(name, "as measured")}
+        for name in names
+        if not isinstance(needs := column_needs(name, port), Problem) and all(_is_met(need, rows) for need in needs)
+    ]
+
+
+def _is_met(need: str, rows: Observations) -> bool:
+    if need == "force":
+        return all(f"force_{axis}_N" in rows.quantities for axis in AXES)
+    return all(need.format(link=i + 1) in rows.available for i in range(rows.links or 1))
+
+
+def form(workbench: Workbench) -> dict[str, Any]:
+    """What a formula may consist of, and the effects that are kept."""
+    own = workbench.sources.own
+    return {
+        **offered(workbench.opened.aligned.rows),
+        "file": str(own.path),
+        "saved": list(own.declarations.values()),
+        "problems": [str(problem) for problem in own.problems],
+    }
+
+
+def checked(workbench: Workbench, declaration: dict[str, Any]) -> dict[str, Any]:
+    """What is wrong with an effect; one without mistake is tried, under the name of a draft."""
+    opened = workbench.opened
+    present = [fitted.effect.id for fitted in opened.model.fitted]
+    result = check(declaration, opened.aligned.rows, present)
+    if result.effect is None or result.problems:
+        return result.as_json()
+    name = workbench.drafts.add(result.effect)
+    (ranked,) = workbench.drafts.find(name)[0].ranked()
+    return {**result.as_json(), "draft": {**ranked, "effect": name}}
+
+
+def saved(workbench: Workbench, declaration: dict[str, Any], replace: bool) -> dict[str, Any]:
+    """Keep an effect; the summary. Raises as `OwnEffects.save`."""
+    workbench.sources.own.save(declaration, replace)
+    return workbench.summary()
+
+
+def deleted(workbench: Workbench, effect: str) -> dict[str, Any]:
+    """Take a kept effect out; the summary. Raises as `OwnEffects.delete`."""
+    workbench.sources.own.delete(effect)
+    return workbench.summary()

@@ -1,0 +1,88 @@
+"""What is open in the page: a workbench in a worker, a second one that plans, and the newest diagnosis."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+from compd.page.workbench.diagnoses import Diagnoses
+from compd.page.workbench.diagnosis_job import DiagnosisJob
+from compd.page.workers.limits import WorkerLimits
+from compd.page.workers.worker import Worker
+from compd.page.workers.workers import Workers
+
+_WORKBENCH = "compd.page.workbench.workbench:Workbench"
+# Opening of 500,000 rows took 7 s on two busy processors.
+LIMITS = WorkerLimits(memory_mb=2000, opening_s=120.0, idle_s=600.0)
+PLANNER_LIMITS = WorkerLimits(memory_mb=2000, opening_s=120.0, idle_s=300.0)
+# For a comparison, candidates, a card, a trial or a step, and for a plan.
+ANSWER_S, PLAN_S = 60.0, 300.0
+
+
+class OpenWorkbench:
+    """Used by the event loop's thread alone.
+
+    diagnosis : the newest, which may run; None before the first.
+    """
+
+    def __init__(
+        self, workers: Workers, diagnoses: Diagnoses, path: Path, model_path: Path, machine: Path | None
+    ) -> None:
+        """diagnoses : those that run in the same server. machine : the page's configuration."""
+        self._path = path
+        self._diagnoses = diagnoses
+        self.diagnosis: DiagnosisJob | None = None
+        arguments = (path, model_path, machine)
+        self.worker: Worker = workers.worker(f"workbench of {path.stem}", _WORKBENCH, arguments, LIMITS)
+        self.planner = workers.worker(f"plan for {path.stem}", _WORKBENCH, arguments, PLANNER_LIMITS)
+
+    @property
+    def libraries(self) -> list[str]:
+        """Files of effects that were chosen."""
+        return [] if self.worker.kept is None else list(self.worker.kept["libraries"])
+
+    async def ask(self, question: str, *given: Any, seconds: float = ANSWER_S) -> bytes:
+        """The answer of the workbench. question : a method of `Workbench`, or the full name of a function.
+
+        Raises as `Worker.ask`.
+        """
+        return await self.worker.ask(_full_name(question), *given, seconds=seconds)
+
+    async def ask_planner(self, question: str, *given: Any, seconds: float = ANSWER_S) -> bytes:
+        """As `ask`, of a workbench of its own: plans take minutes, and are cancelled."""
+        return await self.planner.ask(_full_name(question), *given, seconds=seconds)
+
+    async def diagnose(self) -> None:
+        """Begin a diagnosis, unless one runs. Raises StateError where too many run in the server."""
+        last = self.diagnosis
+        if last is not None and last.state == "running":
+            return
+        diagnosed = json.loads(await self.ask("diagnosed"))
+        if last is not None:
+            last.cancel()  # its pictures may still be drawn
+            await asyncio.to_thread(last.join)
+        if self.diagnosis is not last:
+            return  # another browser was quicker
+        model, machine = (name and Path(name) for name in (diagnosed["model"], diagnosed["machine"]))
+        self.diagnosis = self._diagnoses.begin(self._path, model, machine, self._revision, diagnosed["effects"])
+
+    def diagnosis_summary(self, shown: str = "") -> dict[str, Any]:
+        """The newest: how many changes it is `behind`, and what it has found; `state` is "none" before the first.
+
+        shown : id of that whose outcome the browser has already, which is left out.
+        """
+        job = self.diagnosis
+        if job is None:
+            return {"state": "none"}
+        summary = {**job.summary(), "behind": self._revision - job.revision}
+        return summary if shown == job.id else summary | job.outcome()
+
+    @property
+    def _revision(self) -> int:
+        return 0 if self.worker.kept is None else int(self.worker.kept["revision"])
+
+
+def _full_name(question: str) -> str:
+    return question if ":" in question else f"{_WORKBENCH}.{question}"

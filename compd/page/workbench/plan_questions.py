@@ -1,0 +1,111 @@
+"""The next measurement, asked of a workbench in its worker: what there is to choose, the plan, and its files."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from typing import Any, get_args
+
+import numpy as np
+
+from compd.api.measurements import plan_measurement
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.diagnosis.planning.measurement_plan import MeasurementPlan
+from compd.diagnosis.planning.measurement_programmes import recorded_limits
+from compd.diagnosis.planning.plan_formats import DWELL_S, PlanFormat
+from compd.diagnosis.planning.setting_programmes import recorded_settings
+from compd.errors import CompdError
+from compd.model.effect import Effect
+from compd.page.workbench.formula_check import words
+from compd.page.workbench.plan_endings import ENDINGS
+from compd.page.workbench.plan_request import PlanRequest, field_of, read_request
+from compd.page.workbench.workbench import Workbench
+from compd.recording.plan_file import TIP_COLUMNS
+
+# Plans whose files can still be downloaded.
+_MOST_KEPT = 8
+
+
+def form(workbench: Workbench, names: Sequence[str]) -> dict[str, Any]:
+    """Effects to choose from, and limits. names : ids of rivals, of which those of an external model depend."""
+    library = workbench.candidates.library
+    effects = [entry["effect"] for entry in workbench.candidates.ranked() if entry["status"] != "not_testable"]
+    chosen = [library[name] for name in names if name in effects]
+    return {"effects": effects, "limits": limits_of(workbench.opened.aligned, chosen)}
+
+
+def limits_of(aligned: AlignedRecording, effects: list[Effect]) -> dict[str, Any]:
+    """Within what the recording stayed, by the fields of the form; of an external model by column."""
+    if aligned.model is None:
+        columns = recorded_settings(aligned, effects) if effects else {}
+        return {"columns": {name: [float(np.nanmin(v)), float(np.nanmax(v))] for name, v in columns.items()}}
+    limits = recorded_limits(aligned)
+    return {
+        "workspace": np.stack([limits.tip_low_M_mm, limits.tip_high_M_mm], axis=1).tolist(),
+        "force": limits.force_N,
+        "temperature": list(limits.temperature_degC),
+        "speed": limits.speed_mm_per_s,
+    }
+
+
+def planned(workbench: Workbench, libraries: Sequence[str], keys: dict[str, Any]) -> dict[str, Any]:
+    """The plan, or what is wrong with each field. libraries : that are chosen. keys : what a browser asks for."""
+    workbench.look_again(libraries)
+    try:
+        asked = read_request(keys, workbench.candidates.library)
+        plan = plan_measurement(
+            workbench.opened.aligned,
+            asked.rivals,
+            rows=asked.rows,
+            model=workbench.opened.model,
+            effects=workbench.sources.effects,
+            beside=asked.beside,
+            workspace_M_mm=asked.workspace_M_mm,
+            force_N=asked.force_N,
+            temperature_degC=asked.temperature_degC,
+            speed_mm_per_s=asked.speed_mm_per_s,
+            limits=asked.limits,
+        )
+    except CompdError as error:
+        problems = [{"field": field_of(problem), "text": words(problem)} for problem in error.problems]
+        return {"problems": problems}
+    return _plan_contents(plan, workbench, asked)
+
+
+def _plan_contents(plan: MeasurementPlan, workbench: Workbench, asked: PlanRequest) -> dict[str, Any]:
+    """The plan as plain data; its files can be had under `key`."""
+    columns = list(plan.rows[0]) if plan.rows else []
+    key = hashlib.sha256(repr((plan.rivals, plan.rows)).encode()).hexdigest()[:16]
+    workbench.plans.pop(key, None)
+    workbench.plans[key] = plan
+    for oldest in list(workbench.plans)[:-_MOST_KEPT]:
+        del workbench.plans[oldest]
+    placed = all(name in columns for name in TIP_COLUMNS)
+    return {
+        "key": key,
+        "rivals": plan.rivals,
+        "summary": plan.summary,
+        "instructions": plan.instructions,
+        "before": plan.before,
+        "separation": plan.separation,
+        "tells_apart": plan.tells_apart,
+        "alike": plan.alike,
+        "columns": columns,
+        "rows": [[row[name] for name in columns] for row in plan.rows],
+        "place": [[row[name] for name in TIP_COLUMNS] for row in plan.rows] if placed else [],
+        "difference_um": [list(row) for row in plan.difference_um],
+        "files": {
+            shape: f"{workbench.opened.path.stem}-{ENDINGS[shape]}"
+            for shape in get_args(PlanFormat)
+            if plan.rows and (placed or shape in ("plan", "csv"))
+        },
+        "command": workbench.commands.plan(workbench.sources.paths_of([*asked.rivals, *asked.beside]), asked.options()),
+    }
+
+
+def file(workbench: Workbench, key: str, shape: PlanFormat, feed: float | None, dwell_s: float | None) -> bytes:
+    """A plan as a file. feed : mm/min, and dwell_s : s, of G-code. Raises KeyError where it is not kept any more."""
+    plan = workbench.plans[key]
+    if not plan.rows:
+        raise KeyError(key)
+    return plan.text(shape, feed, DWELL_S if dwell_s is None else dwell_s).encode()

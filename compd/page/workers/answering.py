@@ -1,0 +1,34 @@
+"""A request that waits for a worker: it ends when its browser goes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable
+
+from starlette.requests import Request
+
+# nginx's for a client that closed the connection; nobody reads it.
+CLIENT_GONE = 499
+
+
+class BrowserGone(Exception):
+    """Nobody waits for the answer any more."""
+
+
+async def while_asked(request: Request, answer: Awaitable[bytes]) -> bytes:
+    """The answer; the request's body must have been read. Raises BrowserGone where the browser goes before."""
+    answering = asyncio.ensure_future(answer)
+    going = asyncio.ensure_future(_gone(request))
+    try:
+        await asyncio.wait({answering, going}, return_when=asyncio.FIRST_COMPLETED)
+        if not answering.done():
+            raise BrowserGone
+        return answering.result()
+    finally:
+        for task in (answering, going):
+            task.cancel()
+
+
+async def _gone(request: Request) -> None:
+    while (await request.receive())["type"] != "http.disconnect":
+        pass

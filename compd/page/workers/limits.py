@@ -1,0 +1,52 @@
+"""What one worker may take: memory, and time for an answer; and what a person is told who asked for more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from compd.errors import Problem, StateError
+
+_ELSEWHERE = "take less at once; or use the command line, which has no such limit"
+
+
+@dataclass(frozen=True)
+class WorkerLimits:
+    """Of one worker.
+
+    memory_mb : beyond what a new process has, MB. opening_s : to open its state, beside the time of the question.
+    idle_s : without a question after which its process ends, so that its memory returns.
+    """
+
+    memory_mb: float
+    opening_s: float = 60.0
+    idle_s: float = 120.0
+
+
+def too_long(where: str, allowed_s: float) -> StateError:
+    """Of a question that was ended. allowed_s : for its answer, s."""
+    what = "it took longer than it may, and was ended"
+    return StateError(Problem(where=where, what=what, allowed=f"{allowed_s:g} s", next_step=_ELSEWHERE))
+
+
+def too_large(where: str, memory_mb: float) -> StateError:
+    """Of a process that ran out of memory."""
+    what = f"it needs more than {memory_mb:g} MB, and was ended"
+    return StateError(Problem(where=where, what=what, allowed=f"{memory_mb:g} MB", next_step=_ELSEWHERE))
+
+
+def killed(where: str, memory_mb: float) -> StateError:
+    """Of a process that has ended without a word."""
+    what = f"its process was killed, as the system does where memory is short; it may use {memory_mb:g} MB"
+    return StateError(Problem(where=where, what=what, next_step="try it again"))
+
+
+def cancelled(where: str) -> StateError:
+    """Of a question that nobody waits for any more."""
+    return StateError(Problem(where=where, what="it was cancelled"))
+
+
+def too_many(where: str, most: int) -> StateError:
+    """Where every process that may run is busy."""
+    what = "the page computes as much as it may already"
+    step = "wait until something has ended, or cancel it where it was begun"
+    return StateError(Problem(where=where, what=what, allowed=f"{most} processes at once", next_step=step))

@@ -1,0 +1,210 @@
+"""A worker: a process that holds a state, and answers questions about it one after another, within limits."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerProcess
+from typing import TYPE_CHECKING, Any
+
+from compd.errors import CompdError
+from compd.page.workers import limits as limited
+from compd.page.workers.asked import Asked
+from compd.page.workers.limits import WorkerLimits
+
+if TYPE_CHECKING:
+    from compd.page.workers.workers import Workers
+
+# A process closes its connection just before its end.
+_ENDS_WITHIN_S = 5.0
+# Code with which a process ends on an exception that nobody expected.
+_FAULT = 1
+
+
+class Worker:
+    """Its process starts with the first question. Where it was ended - idle, killed, beyond a limit - the next question
+    starts another, which opens the state again.
+
+    Attributes
+    ----------
+    name : of what it works on, for people.
+    kept : plain data that the state told last, from which another goes on in its place; None before the first answer.
+    used_s : when it was used last, on a monotonic clock.
+    """
+
+    def __init__(
+        self, workers: Workers, name: str, opening: str, arguments: Sequence[Any], limits: WorkerLimits
+    ) -> None:
+        """workers : that this one belongs to. opening, arguments : see `worker_process.serve`."""
+        self._workers, self._limits = workers, limits
+        self._opening, self._arguments = opening, arguments
+        self.name = name
+        self.kept: Any = None
+        self.used_s = time.monotonic()
+        self._changed = threading.Condition()
+        self._waiting: deque[Asked] = deque()
+        self._current: Asked | None = None
+        self._thread: threading.Thread | None = None
+        self._process: ForkServerProcess | None = None
+        self._messages: Connection | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Of its process; None where there is none."""
+        process = self._process
+        return None if process is None else process.pid
+
+    @property
+    def questions(self) -> int:
+        """How many are asked and not answered."""
+        with self._changed:
+            return len(self._waiting) + (self._current is not None)
+
+    async def ask(self, question: str, *given: Any, seconds: float) -> bytes:
+        """The answer. When the caller is cancelled, the question is, too.
+
+        Raises what the state raises of CompdError, KeyError, IndexError and FileNotFoundError; StateError where a limit
+        is met, or the process was killed.
+        """
+        asked = self.submit(question, *given, seconds=seconds)
+        try:
+            return await asyncio.wrap_future(asked.answer)
+        except asyncio.CancelledError:
+            self.cancel(asked)
+            raise
+
+    def submit(
+        self, question: str, *given: Any, seconds: float, progress: Callable[[str], None] | None = None
+    ) -> Asked:
+        """As `ask`, without waiting; `progress` is called with each step that the state tells."""
+        asked = Asked(question, given, seconds, progress)
+        with self._changed:
+            self._waiting.append(asked)
+            self._changed.notify_all()
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._answer_all, name=f"worker {self.name}", daemon=True)
+                self._thread.start()
+        return asked
+
+    def cancel(self, asked: Asked) -> None:
+        """End a question, and the process with it where it works on it; without effect once there is an answer."""
+        asked.answer.cancel()
+        with self._changed:
+            asked.is_cancelled = True
+            if self._current is asked and self._process is not None:
+                self._process.kill()
+
+    def end(self) -> None:
+        """Cancel every question, and end the process."""
+        with self._changed:
+            every = [*self._waiting, *([] if self._current is None else [self._current])]
+        for asked in every:
+            self.cancel(asked)
+        self.rest()
+
+    def rest(self) -> bool:
+        """End the process unless it works on a question; whether there is none now."""
+        with self._changed:
+            if self._current is None and self._process is not None:
+                self._end_process(self._process)
+            return self._process is None
+
+    def _answer_all(self) -> None:
+        """In the worker's own thread: until nothing was asked for a while."""
+        while (asked := self._next()) is not None:
+            # a question that was cancelled while it waited is not begun
+            if asked.answer.set_running_or_notify_cancel():
+                try:
+                    answer = self._answer(asked)
+                except (CompdError, KeyError, IndexError, OSError, RuntimeError) as error:
+                    asked.answer.set_exception(error)
+                else:
+                    asked.answer.set_result(answer)
+
+    def _next(self) -> Asked | None:
+        with self._changed:
+            self._current = None
+            self.used_s = time.monotonic()
+            if not self._changed.wait_for(lambda: self._waiting, timeout=self._limits.idle_s):
+                self.rest()
+                self._thread = None
+                return None
+            self._current = self._waiting.popleft()
+            return self._current
+
+    def _answer(self, asked: Asked) -> bytes:
+        messages, is_new = self._started(asked)
+        allowed_s = asked.seconds + (self._limits.opening_s if is_new else 0.0)
+        try:
+            kind, content, kept = _reply(messages, asked, allowed_s)
+        except TimeoutError:
+            raise self._ended(limited.too_long(self.name, allowed_s)) from None
+        except (EOFError, OSError) as error:
+            if asked.is_cancelled:
+                raise self._ended(limited.cancelled(self.name)) from None
+            raise self._ended(self._without_a_word(asked)) from error
+        self.kept = self.kept if kept is None else kept
+        if kind == "memory":
+            raise self._ended(limited.too_large(self.name, self._limits.memory_mb))
+        if kind == "error":
+            raise content
+        answer: bytes = content
+        return answer
+
+    def _without_a_word(self, asked: Asked) -> CompdError:
+        """Why the process has ended. Raises RuntimeError for a fault of compd, which the log has."""
+        with self._changed:
+            process = self._process
+        if process is not None:
+            process.join(_ENDS_WITHIN_S)
+            if process.exitcode == _FAULT:
+                self._ended(limited.cancelled(self.name))
+                raise RuntimeError(f"{asked.question} failed; its process wrote why")
+        return limited.killed(self.name, self._limits.memory_mb)
+
+    def _ended(self, error: CompdError) -> CompdError:
+        """`error`, with the process ended."""
+        with self._changed:
+            if self._process is not None:
+                self._end_process(self._process)
+        return error
+
+    def _started(self, asked: Asked) -> tuple[Connection, bool]:
+        """The connection to the process, and whether it is a new one. Raises StateError where too many run."""
+        with self._changed:
+            if self._process is not None and not self._process.is_alive():
+                self._end_process(self._process)
+            if self._messages is not None:
+                return self._messages, False
+        self._workers.make_room(self)
+        arguments = (self._opening, self._arguments, self.kept, self._limits.memory_mb)
+        process, messages = self._workers.start(arguments)
+        with self._changed:
+            self._process, self._messages = process, messages
+            if asked.is_cancelled:
+                process.kill()
+        return messages, True
+
+    def _end_process(self, process: ForkServerProcess) -> None:
+        process.kill()
+        process.join()
+        if self._messages is not None:
+            self._messages.close()
+        self._process = self._messages = None
+
+
+def _reply(messages: Connection, asked: Asked, allowed_s: float) -> tuple[str, Any, Any]:
+    """The message that ends a question: kind, content, kept. Raises TimeoutError; EOFError or OSError at its end."""
+    messages.send((asked.question, asked.given, asked.progress is not None))
+    until_s = time.monotonic() + allowed_s
+    while messages.poll(max(0.0, until_s - time.monotonic())):
+        kind, content, kept = messages.recv()
+        if kind != "step":
+            return kind, content, kept
+        if asked.progress is not None:
+            asked.progress(content)
+    raise TimeoutError

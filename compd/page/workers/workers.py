@@ -1,0 +1,81 @@
+"""The workers of one page's server: only so many processes at once, forked from one which has their imports."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+from collections.abc import Sequence
+from multiprocessing import forkserver
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerProcess
+from typing import Any
+from weakref import WeakSet
+
+from compd.page.workers.limits import WorkerLimits, too_many
+from compd.page.workers.worker import Worker
+from compd.page.workers.worker_process import serve
+
+# Processes with their states in memory. The daemon runs on the same computer.
+MOST_PROCESSES = 8
+# What they need, and the server's own process does not; in this order.
+PRELOADED = [
+    "compd.page.workers.single_thread",
+    "compd.page.joining.joiner",
+    "compd.page.workbench.diagnosing",
+    "compd.page.workbench.formula_questions",
+    "compd.page.workbench.plan_questions",
+]
+
+
+class Workers:
+    """Those that there are."""
+
+    def __init__(self, most: int = MOST_PROCESSES) -> None:
+        """most : processes at once."""
+        self._context = multiprocessing.get_context("forkserver")
+        self._most = most
+        self._workers: WeakSet[Worker] = WeakSet()
+        self._lock = threading.Lock()
+        self._starting = threading.Lock()  # the first start waits for what is imported
+
+    def prepare(self) -> None:
+        """Start the process that workers are forked from. It imports what they need, which takes seconds; this does
+        not wait for it."""
+        self._context.set_forkserver_preload(PRELOADED)
+        forkserver.ensure_running()
+
+    def worker(self, name: str, opening: str, arguments: Sequence[Any], limits: WorkerLimits) -> Worker:
+        """A new one; see `Worker`. Its process starts with the first question."""
+        worker = Worker(self, name, opening, arguments, limits)
+        with self._lock:
+            self._workers.add(worker)
+        return worker
+
+    def make_room(self, wanting: Worker) -> None:
+        """End the idle process that was used longest ago where as many run as may. Raises StateError if all work."""
+        with self._lock:
+            running = [worker for worker in self._workers if worker.pid is not None and worker is not wanting]
+            excess = len(running) + 1 - self._most
+            for worker in sorted(running, key=lambda worker: worker.used_s):
+                if excess <= 0:
+                    return
+                excess -= worker.rest()
+            if excess > 0:
+                raise too_many(wanting.name, self._most)
+
+    def start(self, arguments: tuple[Any, ...]) -> tuple[ForkServerProcess, Connection]:
+        """A new process and the connection to it. arguments : of `serve`, after the connection."""
+        with self._starting:
+            self.prepare()
+            ours, theirs = self._context.Pipe()
+            process = self._context.Process(target=serve, args=(theirs, *arguments), daemon=True)
+            process.start()
+            theirs.close()
+            return process, ours
+
+    def end(self) -> None:
+        """End every process."""
+        with self._lock:
+            workers = list(self._workers)
+        for worker in workers:
+            worker.end()
