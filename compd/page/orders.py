@@ -170,6 +170,8 @@ class Orders:
             return "No model runs as a shadow: let one run first, so that its effect is known."
         if subject in ("", hash_):
             return ""
+        if _HASH.fullmatch(subject):
+            return f"Another model runs as a shadow ({hash_}): let this one run first."
         if (path := self._files.path_of(subject)) is None:
             return f"{_NOT_OFFERED}: {_NAME_IT}."
         try:

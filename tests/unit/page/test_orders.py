@@ -89,6 +89,7 @@ def test_no_model_is_adopted_but_the_one_whose_change_is_told(link, tmp_path):
     assert "does not run as a shadow" in orders.consequence("adopt", "b.model.yaml").text
     (tmp_path / "a.model.yaml").write_bytes(b"changed")
     assert not orders.consequence("adopt", "a.model.yaml").possible
+    assert "Another model runs" in orders.consequence("adopt", HASH).text
     assert not orders.consequence("adopt", HASH).possible
 
 
