@@ -1,7 +1,7 @@
 """Whether a file can be trusted: who could have put something else in its place.
 
-Code that a file holds runs as whoever loads it, and a model file changes what a machine does. Such a file must belong
-to somebody who may do that anyway, and nobody else may be able to write it, or any directory above it.
+Code that a file holds runs as whoever loads it. Such a file must belong to somebody who may do that anyway, and nobody
+else may be able to write it, or any directory above it.
 """
 
 from __future__ import annotations

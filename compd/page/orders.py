@@ -151,7 +151,7 @@ class Orders:
         running = (self._link.models or {}).get("shadow", {})
         file, hash_ = str(running.get("file", "")), str(running.get("model", ""))
         command = self._command("adopt", file or "FILE", "--daemon", self._link.path)
-        if why := self._is_another(subject, hash_):
+        if why := self._is_another(subject, file, hash_):
             return Consequence(False, why, command)
         setpoint = (self._link.readings or {}).get("setpoint", {})
         shadow = setpoint.get("shadow", {})
@@ -162,8 +162,8 @@ class Orders:
         text = f"{file} ({hash_}): {self._change(asked_mm, shadow['correction_mm'])}"
         return Consequence(True, text, command, hash_)
 
-    def _is_another(self, subject: str, hash_: str) -> str:
-        """Why `subject` is not the model that runs as a shadow and has this hash; "" where it is.
+    def _is_another(self, subject: str, file: str, hash_: str) -> str:
+        """Why `subject` is not the model that runs as a shadow, called `file`, with this hash; "" where it is.
 
         Only of the shadow it has been seen what it does.
         """
@@ -171,13 +171,15 @@ class Orders:
             return "No model runs as a shadow: let one run first, so that its effect is known."
         if subject in ("", hash_):
             return ""
+        if _HASH.fullmatch(subject):
+            return f"Another model runs as a shadow ({hash_}): let this one run first."
         if (path := self._files.path_of(subject)) is None:
             return f"{_NOT_OFFERED}: {_NAME_IT}."
         try:
             same = hash_of_file(path) == hash_
         except OSError as error:
             return f"{path} cannot be read: {error.strerror or error}."
-        return "" if same else f"{path}, as it is now, does not run as a shadow: let it run first."
+        return "" if same else f"{file} runs as a shadow, not {path} as it is now: let it run first."
 
     def _no_model(self, subject: str) -> Consequence:
         command = self._command("adopt", "--none", "--daemon", self._link.path)

@@ -78,7 +78,8 @@ before them: who asks without end waits for the answers, and delays nobody else'
 **Show the token first** where one is [configured](#configuration-sockets-tcp): a TCP client is then greeted by `AUTH`
 in place of `VERSION`.
 
-**Answers come in the order of the questions**, except `ZERO`, `MODEL` that changes models, and setpoints, which come when they
+**Answers come in the order of the questions**, except `ZERO`, `MODEL` that changes models, and setpoints, which come
+when they
 are there. A message that cannot be followed is answered by [`ERROR`](#protocol-error), and the connection stays.
 """
 PACKET = f"""\

@@ -142,6 +142,8 @@ class Recorder:
             if first_messages is not self._first_messages:
                 self._first_messages, last_seq = first_messages, None
             if message.get("class") == ORDER:
+                if len(self._waiting) >= _MAX_WAITING:
+                    continue
                 self._waiting.append(FeedItem(first_messages, line, message))
                 continue
             if last_seq is not None and self._every_cycle:

@@ -17,8 +17,15 @@ from compd.live.service.messages import line
 from compd.live.service.request import Request
 
 LONGEST_BY = 200
+# Characters: a path.
+LONGEST_SUBJECT = 1000
 
 _log = structlog.get_logger()
+
+
+def _shown(subject: str) -> str:
+    """A subject as the log and recordings have it: a client may have written anything."""
+    return "".join(letter if letter.isprintable() else "?" for letter in subject[:LONGEST_SUBJECT])
 
 
 def _one_line(by: str) -> str:
@@ -73,7 +80,7 @@ class OrderBook:
         """`reply`: the answer's line, by which the order is done, or an ERROR; called from any thread."""
         answer = json.loads(reply)
         done = answer["class"] != "ERROR"
-        order, subject, by = request.wire_name, request.subject, request.by
+        order, subject, by = request.wire_name, _shown(request.subject), request.by
         if done:
             _log.info("order done", order=order, subject=subject, client=client.name, by=by)
         else:

@@ -63,20 +63,22 @@ def test_a_model_is_chosen_tried_adopted_and_left(with_models, live, tmp_path):
     until(tab, "compd.live.setpoint.sources_mm && !compd.live.setpoint.sources_mm.link_zero")
 
 
-def test_a_name_that_is_not_in_the_list_is_refused_and_an_absolute_path_is_the_daemons_affair(with_models):
+def test_a_name_that_is_not_in_the_list_is_refused_and_so_is_a_path(with_models, tmp_path):
     tab = with_models
     tab.keyboard.press("o")
     tab.locator("#arm").click()
     until(tab, "document.getElementById('role').classList.contains('armed')")
-    tab.locator("input[aria-label^='Model file']").fill("../two.model.yaml")
-    tab.locator("#order-shadow").click()
-    until(tab, "document.querySelector('#confirm')?.disabled")
-    assert "none of the model files" in tab.locator(".consequence").inner_text()
-    tab.locator("input[aria-label^='Model file']").fill("/etc/hostname")
-    tab.locator("#order-shadow").click()
-    until(tab, "document.querySelector('#confirm')?.disabled === false")
-    tab.locator("#confirm").click()
-    until(tab, "document.querySelector('.order-answer').textContent.startsWith('Refused')")
+    for name in ("../two.model.yaml", "/etc/hostname", str(tmp_path / "two.model.yaml")):
+        tab.locator("input[aria-label^='Model file']").fill(name)
+        tab.locator("#order-shadow").click()
+        until(tab, "document.querySelector('#confirm')?.disabled")
+        assert "none of the model files" in tab.locator(".consequence").inner_text()
+        answer = tab.evaluate(
+            "(subject) => fetch('orders/shadow', {method: 'POST', body: JSON.stringify({id: compd.id, subject})})"
+            ".then((response) => response.status)",
+            name,
+        )
+        assert answer == 409
 
 
 def test_an_answer_that_comes_after_another_question_is_not_shown(with_models):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import json
 import os
@@ -18,6 +19,9 @@ from compd.client import connect
 from compd.configuration.effect_files import EffectFile
 from compd.errors import CompdError, DaemonError
 from compd.live.daemon import Daemon
+from compd.page.daemon_link import DaemonLink
+from compd.page.model_files import ModelFiles
+from compd.page.orders import Orders
 from tests.support.live_models import file_with
 from tests.unit.live.test_daemon import configuration, first, running, still
 
@@ -209,3 +213,44 @@ def test_a_running_daemon_tells_a_recorder_who_ordered_what(tmp_path):
         order = next(message for _, message in messages if message["class"] == "ORDER")
         assert (order["order"], order["subject"], order["done"]) == ("MODEL", "apply none", True)
         assert (order["client"], order["by"]) == (f"unix, user {os.getuid()}", "anna (operate) from 10.0.0.5")
+
+
+@pytest.mark.usefixtures("still")
+def test_a_browser_that_brings_code_and_a_model_gets_neither_run(tmp_path, own):
+    """An export is written as evil.py, another as evil.yaml which names it, and the page is to run the model."""
+    exports = tmp_path / "exports"
+    exports.mkdir()
+    evil = exports / "evil.yaml"
+    evil.write_bytes(own.model.read_bytes())
+    good = file_with(tmp_path / "good.model.yaml", "link_zero")
+    configured = configuration(tmp_path)
+    orders = Orders(DaemonLink(configured.sockets.unix.path), ModelFiles(tmp_path))
+    by = "mallory (operate) from 10.0.0.9"
+
+    def do(name, subject):
+        return asyncio.run(orders.do(name, subject, by))
+
+    with running(configured) as (_, client), connect(configured.sockets.unix.path) as recorder:
+        client.zero()
+        messages = recorder.readings()
+        next(messages)
+        for subject in (str(evil), "exports/evil.yaml", "../exports/evil.yaml", "evil.yaml", "/etc/shadow"):
+            for name in ("shadow", "adopt"):
+                with pytest.raises(DaemonError) as caught:
+                    do(name, subject)
+                assert caught.value.problems[0].where == "page", "the daemon has not been asked"
+        with pytest.raises(DaemonError, match="does not list"):
+            do("shadow", own.model.name)  # in the directory of models, as if somebody had put it there
+        assert not own.was_executed()
+        hash_ = do("shadow", good.name)["shadow"]["model"]
+        good.write_bytes(own.model.read_bytes())  # what was looked at is what is adopted
+        assert do("adopt", hash_)["applied"]["effects"] == ["link_zero"]
+        given = []
+        while len(given) < 3:
+            given += [message for _, message in [next(messages)] if message["class"] == "ORDER"]
+        assert [(order["subject"], order["done"], order["by"]) for order in given] == [
+            (f"run as the shadow {own.model}", False, by),
+            (f"run as the shadow {good}", True, by),
+            (f"apply the shadow {hash_}", True, by),
+        ]
+    assert not own.was_executed()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -356,3 +357,19 @@ def test_orders_are_kept_as_they_came_and_change_no_replay(tmp_path):
     path = tmp_path / "run-0001.cycles.jsonl"
     path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
     assert list(RecordedCycles(tmp_path / "run").rows_without_cycle().values()) == [1], "orders are no cycles"
+
+
+def test_a_path_that_some_client_has_told_is_neither_waited_for_nor_copied(tmp_path):
+    """The daemon tells what a client called its model file: the recorder may read more than that client."""
+    run, cycles, files = with_models(tmp_path)
+    secret = b"the recording person's own"
+    for file, replaced in zip(files, (os.mkfifo, lambda path: path.write_bytes(secret)), strict=True):
+        file.unlink()
+        replaced(file)
+    reports = []
+    with run.recorder(tmp_path / "run", reports=reports) as recorder:
+        for line, message, _ in cycles:
+            recorder.put(line, message)
+    assert f"{files[0]} cannot be read: it is not a regular file" in "\n".join(reports)
+    assert f"{files[1]} has changed since the daemon read it" in "\n".join(reports)
+    assert not list(tmp_path.glob("run*.model-*"))

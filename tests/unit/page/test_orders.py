@@ -89,9 +89,10 @@ def test_no_model_is_adopted_but_the_one_whose_change_is_told(link, tmp_path):
     orders = Orders(link, ModelFiles(tmp_path))
     assert orders.consequence("adopt", "a.model.yaml").subject == hash_
     (tmp_path / "b.model.yaml").write_bytes(b"another")
-    assert "does not run as a shadow" in orders.consequence("adopt", "b.model.yaml").text
+    assert "a.model.yaml runs as a shadow, not" in orders.consequence("adopt", "b.model.yaml").text
     (tmp_path / "a.model.yaml").write_bytes(b"changed")
     assert not orders.consequence("adopt", "a.model.yaml").possible
+    assert "Another model runs" in orders.consequence("adopt", HASH).text
     assert not orders.consequence("adopt", HASH).possible
 
 

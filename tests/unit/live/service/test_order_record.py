@@ -95,6 +95,12 @@ def test_a_model_order_names_its_file_and_what_it_is_for(service, recorder):
     ]
 
 
+def test_what_a_client_writes_disturbs_neither_log_nor_recording(service, recorder, log):
+    assert service.unix().ask({"class": "ACCEPT", "gauge": "a\nb\x1b" + "x" * 2000})["code"] == "bad_message"
+    assert recorder.read()["subject"] == "a?b?" + "x" * 996
+    assert orders(log)[0][2].isprintable()
+
+
 def test_a_question_is_no_order(service, log):
     peer = service.unix()
     for request in ({"class": "MODEL"}, {"class": "MODEL", "by": BY}, {"class": "STATUS"}, {"class": "VERSION"}):
