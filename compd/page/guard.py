@@ -79,7 +79,7 @@ class Guard:
         self, app: ASGIApp, tokens: Sequence[Token], origins: Sequence[str], port: int, clock: Clock | None = None
     ) -> None:
         """`origins`: by which browsers reach this server, as "http://127.0.0.1:7760". `port`: where it listens.
-        `clock`: by which somebody who has shown a wrong token waits."""
+        `clock`: by which somebody who has shown a wrong token in the form waits."""
         self._app = app
         self._tokens = tuple(tokens)
         self._origins = frozenset(origins)
@@ -126,11 +126,12 @@ class Guard:
         if not by_form and "token" not in request.query_params:
             return None
         address = request.client.host if request.client else ""
-        if not self._wrong.may_try(address):
-            return _not_now(by_form)
+        if by_form and not self._wrong.may_try(address):
+            return token_form("A wrong token came from there a moment ago. Try again in a second.", 429)
         token_text = await posted_token(request) if by_form else request.query_params["token"]
         if token_text is None or self._known(token_text) is None:
-            self._wrong.note(address)
+            if by_form:
+                self._wrong.note(address)
             if (connection := LimitedProtocol.of(request.scope)) is not None:
                 connection.note("wrong_token")
             return token_form("This token is not known here.") if by_form else PlainTextResponse(_NEEDS_TOKEN, 403)
@@ -175,11 +176,6 @@ def _is_loaded_elsewhere(headers: Headers, looks: bool) -> bool:
 def _own_path(path: str) -> str:
     """A path to which a browser is sent; "/" for what a browser might take for another server's address."""
     return path if _OWN_PATH.fullmatch(path) else "/"
-
-
-def _not_now(by_form: bool) -> Response:
-    text = "A wrong token came from there a moment ago. Try again in a second."
-    return token_form(text, 429) if by_form else PlainTextResponse(text, 429)
 
 
 def _with_headers(send: Send) -> Send:

@@ -7,6 +7,8 @@ that has shown no token is closed at the end of it, and after its answer.
 from __future__ import annotations
 
 import asyncio
+import socket
+import struct
 from enum import Enum, auto
 from typing import Any
 
@@ -34,6 +36,8 @@ ACCEPTED_AT_ONCE = 8
 # Connections that wait in the system meanwhile, listen(2).
 WAITING = 1024
 _STATE_KEY = "connection"
+# struct linger of socket(7): on, 0 s.
+_NO_LINGER = struct.pack("ii", 1, 0)
 
 
 class Stage(Enum):
@@ -85,7 +89,10 @@ class LimitedProtocol(H11Protocol):
         return self.cycle is None or self.cycle.response_complete
 
     def drop(self) -> None:
-        """Close the connection at once; what is still to be sent is lost."""
+        """Close the connection at once; what is still to be sent is lost, in the system's buffers, too."""
+        own = self.transport.get_extra_info("socket")
+        if own.fileno() >= 0:
+            own.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
         self.transport.abort()
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]

@@ -34,7 +34,7 @@ def page(
         str | None,
         typer.Option(
             metavar="ROLE:NAME",
-            help="Add a token, role view or operate, to --tokens; print it (with --listen, its address too); end.",
+            help="Add a token, role view or operate, to --tokens; print it, with --listen or --behind an address too.",
         ),
     ] = None,
     read_only: Annotated[bool, typer.Option("--read-only", help="No orders from any browser.")] = False,
@@ -45,8 +45,8 @@ def page(
 ) -> None:
     """Show the machine live in the browser: state, errors, gauges, the last hour.
 
-    It runs until Ctrl-C, beside the daemon, and prints the address to open; on a terminal, as a
-    QR code too where other devices may open it.
+    It runs until Ctrl-C, beside the daemon, and prints the address to open. On a terminal an address for other devices
+    is drawn as a QR code too.
     """
     from compd.cli.options import unix_address
     from compd.log import hide_secrets_of_libraries, is_journal, log_to_stderr

@@ -161,8 +161,8 @@ def test_an_export_is_brought_from_this_computer(tab, recordings, tmp_path):
     own = tmp_path / "My points (2).csv"
     own.write_bytes((recordings / "exports" / POINTS).read_bytes())
     tab.locator("#file").set_input_files(own)
-    until(tab, "wizard.choices.export === 'My-points-2.csv' && wizard.table")
-    assert (recordings / "exports" / "My-points-2.csv").read_bytes() == own.read_bytes()
+    until(tab, "wizard.choices.export === 'My-points-2.csv.export' && wizard.table")
+    assert (recordings / "exports" / "My-points-2.csv.export").read_bytes() == own.read_bytes()
     own.write_text("something else 1 2 3\n")
     tab.locator("#file").set_input_files(own)
     until(tab, "document.getElementById('problem-line').textContent.includes('other content')")
@@ -176,6 +176,51 @@ def test_an_export_is_brought_from_this_computer(tab, recordings, tmp_path):
     tab.evaluate("wizard.sources.most_bytes = 100")
     tab.locator("#file").set_input_files(binary)
     until(tab, "document.getElementById('problem-line').textContent.includes('too large')")
+
+
+def test_an_export_is_deleted_by_keyboard_after_one_question(tab, recordings, tmp_path):
+    own = tmp_path / "old.csv"
+    own.write_bytes((recordings / "exports" / POINTS).read_bytes())
+    tab.locator("#file").set_input_files(own)
+    until(tab, "wizard.choices.export === 'old.csv.export' && wizard.table")
+    kept = recordings / "exports" / "old.csv.export"
+    until(tab, "document.getElementById('usage-note').textContent.includes('of 200 files')")
+    tab.locator("#delete").focus()
+    tab.keyboard.press("Enter")
+    assert "old.csv.export" in tab.locator("#deleting").inner_text()
+    tab.keyboard.press("Escape")
+    assert tab.locator("#deleting").is_hidden()
+    assert tab.evaluate("document.activeElement.id") == "delete"
+    assert kept.exists()
+    tab.keyboard.press("Enter")
+    tab.keyboard.press("Enter")
+    until(tab, "document.getElementById('problem-line').textContent.includes('is deleted')")
+    assert not kept.exists()
+    assert tab.locator("#delete").is_disabled()
+    assert "old.csv.export" not in tab.locator("#export").inner_text()
+    log = (recordings.parent / "page.log").read_text()
+    assert 'what="DELETE /join/exports/old.csv.export"' in log
+
+
+def test_a_token_is_shown_in_the_form_without_a_script_and_the_page_is_left(chromium, address):
+    context = chromium.new_context(java_script_enabled=False)
+    tab = context.new_page()
+    tab.goto(address.partition("?")[0])
+    tab.get_by_label("Token").fill(address.partition("token=")[2])
+    tab.keyboard.press("Enter")
+    tab.wait_for_selector("#banner")
+    assert tab.url == address.partition("?")[0]
+    (cookie,) = context.cookies()
+    assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")
+    context.close()
+    context = chromium.new_context()
+    tab = context.new_page()
+    tab.goto(address)
+    tab.keyboard.press("o")
+    tab.locator("#leave").click()
+    tab.wait_for_selector("#token")
+    assert context.cookies() == []
+    context.close()
 
 
 def test_the_server_refuses_what_is_too_large_without_keeping_it(tab, recordings):
@@ -207,6 +252,7 @@ def test_who_may_look_only_tries_and_cannot_write(open_tab, recordings):
         until(tab, "wizard.command.includes('/mine.csv')")
         assert tab.locator("#write").is_disabled()
         assert tab.locator("#file").is_disabled()
+        assert tab.locator("#delete").is_disabled()
         assert "look only" in tab.locator("#writing-note").inner_text()
         asked = (
             "fetch('join/recording', {method: 'POST', body: JSON.stringify(wizard.choices)}).then(({status}) => status)"
