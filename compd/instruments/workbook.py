@@ -16,7 +16,6 @@ from compd.instruments.workbook_cells import VALUES, Row, SheetReader, cell_name
 from compd.instruments.workbook_parts import (
     BROKEN,
     SheetPart,
-    check_cells,
     check_workbook_file,
     read_sheet_part,
     unreadable,
@@ -73,8 +72,6 @@ def _read(path: Path, options: ReadOptions) -> RawTable:
 
     book = load_workbook(path, read_only=True, data_only=True)
     try:
-        for each in book.worksheets:
-            check_cells(path, cast(Any, each)._worksheet_path, options.limits)
         sheet = _choose_sheet(path, book, options.sheet)
         part = read_sheet_part(path, cast(Any, sheet)._worksheet_path)
         reader = SheetReader(path, sheet.title)

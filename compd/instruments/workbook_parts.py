@@ -23,8 +23,8 @@ _CHUNK = 1 << 20
 # Longer than what is looked for, which may lie across two chunks.
 _OVERLAP = 100
 _FORMULA = re.compile(rb"<(?:\w+:)?f[ >/]")
-_CELL = re.compile(rb"<(?:\w+:)?c[ >/]")
-_TEXT = re.compile(rb"<(?:\w+:)?si[ >/]")
+# Of a sheet, and of the table of texts.
+_CELL = re.compile(rb"<(?:\w+:)?(?:c|si)[ >/]")
 _MERGED = re.compile(rb"<(?:\w+:)?mergeCell [^>]*?ref=\"(([A-Z]{1,3})(\d{1,7}):([A-Z]{1,3})(\d{1,7}))\"")
 _SAVE_AS = "open it in a spreadsheet and save it as .xlsx, without a password"
 
@@ -49,7 +49,7 @@ class SheetPart:
 def check_workbook_file(path: Path, limits: ReadLimits) -> None:
     """Raise RecordingError for what is no .xlsx file, cannot be read, or unpacks to more than a list can have.
 
-    The table of texts, which a reader loads as a whole, is counted.
+    Cells are counted: a reader of XML would have to go through all of them, before it knows how many there are.
     """
     try:
         if not path.is_file():
@@ -86,32 +86,31 @@ def check_workbook_file(path: Path, limits: ReadLimits) -> None:
         raise RecordingError(
             Problem(where=str(path), what="is a binary workbook (.xlsb)", allowed=".xlsx", next_step=_SAVE_AS)
         )
-    for name in names:
-        if name.lower().endswith("sharedstrings.xml"):
-            _check_count(path, name, _TEXT, "texts", limits)
+    try:
+        for name in names:
+            if name.lower().endswith(".xml"):  # a sheet may have any name
+                _check_cells(path, name, limits)
+    except BROKEN as error:
+        raise RecordingError(unreadable(path, str(error) or type(error).__name__)) from error
 
 
-def check_cells(path: Path, name: str, limits: ReadLimits) -> None:
-    """Raise RecordingError where a sheet has too many cells, whatever it says of its size. name : of its part."""
-    _check_count(path, name, _CELL, "cells", limits)
-
-
-def _check_count(path: Path, name: str, pattern: re.Pattern[bytes], what: str, limits: ReadLimits) -> None:
+def _check_cells(path: Path, name: str, limits: ReadLimits) -> None:
+    """Raise RecordingError where a part has too many cells, or texts that cells name, whatever it says of its size."""
     count, rest = 0, b""
-    with zipfile.ZipFile(path) as archive, archive.open(name.lstrip("/")) as file:
+    with zipfile.ZipFile(path) as archive, archive.open(name) as file:
         while chunk := file.read(_CHUNK):
             text = rest + chunk
-            # what is cut by the chunk's end is counted with the next one
+            # a tag that is cut by the chunk's end is counted with the next one
             end = max(text.rfind(b"<"), 0)
-            count += len(pattern.findall(text, 0, end))
+            count += len(_CELL.findall(text, 0, end))
             rest = text[end:][:_OVERLAP]
             if count > limits.sheet_cells:
                 raise RecordingError(
                     Problem(
                         where=str(path),
-                        what=f"has too many {what} for a list of measurements in a workbook",
-                        value=f"more than {count - 1}",
-                        allowed=f"{limits.sheet_cells} {what} in a sheet",
+                        what="has too many cells for a list of measurements in a workbook",
+                        value=f"{name}: more than {limits.sheet_cells}",
+                        allowed=f"{limits.sheet_cells} cells in a sheet, and as many texts",
                         next_step="save the sheet as CSV, which is read much faster",
                     )
                 )

@@ -14,6 +14,7 @@ from compd.api.long_recordings import open_whole_or_sample
 from compd.configuration.shipped import Machine
 from compd.diagnosis.verdict import Diagnosis
 from compd.page.workbench.evidence import evidence
+from compd.page.workbench.opened_recording import model_of
 
 # Columns of the text, as on a terminal of usual width.
 _WIDTH = 100
@@ -32,14 +33,14 @@ class Diagnosing:
         effects: Sequence[str] = (),
         kept: None = None,
     ) -> None:
-        """Arguments as of `DiagnosisJob`. Raises CompdError where the recording cannot be opened."""
+        """Arguments as of `DiagnosisJob`. Raises CompdError where the recording or the model cannot be opened."""
         self._aligned, self._recorded_rows = open_whole_or_sample(path, machine)
-        self._model_path, self._effects = model_path, effects
+        self._model, self._effects = model_of(model_path, self._aligned), effects
         self._diagnosis: Diagnosis | None = None
 
     def outcome(self, progress: Callable[[str], None]) -> dict[str, Any]:
         """What it finds: `text`, `result` and `evidence`. progress : called with each step as it begins."""
-        self._diagnosis = diagnose(self._aligned, self._model_path, effects=self._effects, progress=progress)
+        self._diagnosis = diagnose(self._aligned, self._model, effects=self._effects, progress=progress)
         return {
             "text": _text(self._diagnosis),
             "result": self._diagnosis.as_json(),

@@ -11,8 +11,8 @@ from compd.diagnosis.model_changes import refit, remove, undo
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect
 from compd.model_file.model_document import read_stored, write_stored
-from compd.model_file.model_file import EffectNumber, ModelFile, read_model_file
-from compd.page.workbench.opened_recording import OpenedRecording
+from compd.model_file.model_file import EffectNumber, ModelFile
+from compd.page.workbench.opened_recording import OpenedRecording, model_of
 from compd.text.json_text import nan_to_null
 
 
@@ -44,11 +44,11 @@ def write(opened: OpenedRecording) -> None:
 
 def undone(opened: OpenedRecording) -> OpenedRecording:
     """Take the last step back, in the file. Raises StateError where there is none."""
-    path, model = opened.model_path, opened.model
+    path = opened.model_path
     if not path.exists():
         raise StateError(Problem(where=str(path), what="has no step to undo"))
     write_stored(path, undo(read_stored(path), str(path)))
-    return replace(opened, model=read_model_file(path, model.machine, model.links))
+    return replace(opened, model=model_of(path, opened.aligned))
 
 
 def step_summary(before: OpenedRecording, after: OpenedRecording) -> dict[str, Any]:

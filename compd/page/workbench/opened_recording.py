@@ -130,6 +130,10 @@ def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) 
     Raises CompdError with every problem of either.
     """
     aligned, recorded_rows = open_whole_or_sample(path, machine)
+    return OpenedRecording(path, model_path, aligned, recorded_rows, model_of(model_path, aligned))
+
+
+def model_of(path: Path | None, aligned: AlignedRecording) -> ModelFile:
+    """The model of a recording's machine: of the file, or begun where it is not there. Raises CompdError."""
     name, links = aligned.recording.machine, aligned.rows.links
-    model = read_model_file(model_path, name, links) if model_path.exists() else ModelFile(name, links)
-    return OpenedRecording(path, model_path, aligned, recorded_rows, model)
+    return ModelFile(name, links) if path is None or not path.exists() else read_model_file(path, name, links)

@@ -47,6 +47,11 @@ NESTED = [[[{"a": [{}, None]}]]]
 JUNK = (None, [], {}, 1e308, "", NESTED, 10**400, -(2**63), True, [{}], "\ud800", "\x00")
 
 
+@pytest.fixture
+def no_worker_outlives_its_test():
+    """They serve the next one, too."""
+
+
 @pytest.fixture(scope="module")
 def client(tmp_path_factory):
     directory = tmp_path_factory.mktemp("recordings")
