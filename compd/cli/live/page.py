@@ -48,12 +48,13 @@ def page(
     from compd.log import hide_secrets_of_libraries, is_journal, log_to_stderr
     from compd.page.guard import Token, hashed
     from compd.page.guard import new_token as make_token
-    from compd.page.run import run_page
     from compd.page.token_file import add_token, read_tokens
 
     if new_token is not None:
         typer.echo(add_token(_needed(tokens, "--new-token"), new_token))
         return
+    from compd.page.run import run_page  # the workbench's kernels, which a token does not need
+
     own = make_token()
     alone = listen is None and behind is None
     if alone:
