@@ -330,7 +330,7 @@ def installed_page(installed: Service) -> PageService:
     assert len(header) == 4
     for line in header:
         container.run("sh", "-ec", f"cd {UNITS}; {line}")
-    added = container.run(f"{COMPD}/bin/compd", "page", f"--tokens={TOKENS}", "--new-token=operate:anna")
+    added = container.run("sh", "-ec", f"cd /; {COMPD}/bin/compd page --tokens {TOKENS} --new-token operate:anna")
     installed.systemctl("restart", "compd-page")
     return PageService(installed, added.strip())
 
