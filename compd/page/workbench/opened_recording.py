@@ -17,6 +17,7 @@ from compd.comparison.comparison import Comparison
 from compd.configuration.shipped import Machine
 from compd.model_file.model_file import ModelFile, read_model_file
 from compd.page.packed import packed
+from compd.plugins import NO_CODE
 from compd.text.json_text import nan_to_null
 
 # Pictures have about so many rows at most; numbers are always of all rows.
@@ -134,6 +135,11 @@ def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) 
 
 
 def model_of(path: Path | None, aligned: AlignedRecording) -> ModelFile:
-    """The model of a recording's machine: of the file, or begun where it is not there. Raises CompdError."""
+    """The model of a recording's machine: of the file, or begun where it is not there.
+
+    Raises CompdError, also where an effect is code: a browser can bring a model file, and the page runs none.
+    """
     name, links = aligned.recording.machine, aligned.rows.links
-    return ModelFile(name, links) if path is None or not path.exists() else read_model_file(path, name, links)
+    if path is None or not path.exists():
+        return ModelFile(name, links)
+    return read_model_file(path, name, links, code=NO_CODE)

@@ -10,7 +10,7 @@ import pytest
 from compd.api.diagnosis import compare
 from compd.api.models import add_effect
 from compd.comparison.open import open_recording
-from compd.errors import StateError
+from compd.errors import CompdError, StateError
 from compd.model_file.model_document import read_stored
 from compd.page.workbench.workbench import Workbench
 from tests.support.measured import gauges, hidden, record
@@ -88,3 +88,16 @@ def test_of_two_browsers_the_second_is_told_that_it_shows_what_was(workbench):
     workbench.make("add", "link_expansion", revision)
     with pytest.raises(StateError, match="somebody else"):
         workbench.make("add", "scale_gain", revision)
+
+
+def test_a_model_with_code_is_refused_and_the_code_does_not_run(path, tmp_path):
+    ran = tmp_path / "ran"
+    code = tmp_path / "mine.py"
+    code.write_text(f"open({str(ran)!r}, 'w')\n")
+    model = tmp_path / "tripod.model.yaml"
+    model.write_text(
+        f"format: 2\nmachine: tripod-cmm\neffects:\n- {{effect: '{code}:MINE', parameters: []}}\ncovariance: []\n"
+    )
+    with pytest.raises(CompdError, match="executes no file"):
+        Workbench(path, model, None)
+    assert not ran.exists()
