@@ -366,7 +366,7 @@ def test_the_page_has_a_user_of_its_own_that_reaches_the_socket_and_nothing_else
     assert page.as_its_user(f"cat {TOKENS}"), "root has added a token, and the file is still the page's"
     for path in ("/etc/shadow", "/var/lib/compd", "/var/lib/compd/machine-zero.json", "/var/cache/compd"):
         assert run("ls", path).strip()
-        assert not page.as_its_user(f"cat {path}/* || cat {path} || ls {path}"), path
+        assert not page.as_its_user(f"cat {path} || ls {path}/"), path
     for place in ("/", "/etc", "/etc/compd", "/opt", "/run", "/run/compd", "/var", "/var/lib", "/usr", "/dev", "/home"):
         assert not page.as_its_user(f"touch {place}/x"), place
     assert not page.as_its_user(f"touch {TOKENS}"), "it gives nobody a token"
