@@ -36,6 +36,8 @@ MOST_EXPOSURE = 2.0
 STOP_S = 2.0
 # A bound for waiting, never a measure.
 PATIENCE_S = 60.0
+# The first start compiles kernels.
+FIRST_START_S = 300.0
 # Longer than these tests take: the machine stands still, so that machine zero fits its gauges throughout.
 ZERO_HOLD_S = 86_400
 
@@ -347,7 +349,7 @@ def page(service: Service, installed_page: PageService) -> PageService:
         )
 
     try:
-        wait_until(answers, "the page", PATIENCE_S)
+        wait_until(answers, "the page", FIRST_START_S)
     except AssertionError as error:
         raise AssertionError(page_log(service)) from error
     return installed_page
@@ -366,7 +368,7 @@ def test_the_page_has_a_user_of_its_own_that_reaches_the_socket_and_nothing_else
     assert page.as_its_user(f"cat {TOKENS}"), "root has added a token, and the file is still the page's"
     for path in ("/etc/shadow", "/var/lib/compd", "/var/lib/compd/machine-zero.json", "/var/cache/compd"):
         assert run("ls", path).strip()
-        assert not page.as_its_user(f"cat {path}/* || cat {path} || ls {path}"), path
+        assert not page.as_its_user(f"cat {path} || ls {path}/"), path
     for place in ("/", "/etc", "/etc/compd", "/opt", "/run", "/run/compd", "/var", "/var/lib", "/usr", "/dev", "/home"):
         assert not page.as_its_user(f"touch {place}/x"), place
     assert not page.as_its_user(f"touch {TOKENS}"), "it gives nobody a token"
