@@ -6,7 +6,7 @@ import asyncio
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 from typing import TYPE_CHECKING, Any
@@ -64,13 +64,16 @@ class Worker:
         with self._changed:
             return len(self._waiting) + (self._current is not None)
 
-    async def ask(self, question: str, *given: Any, seconds: float) -> bytes:
-        """The answer. When the caller is cancelled, the question is, too.
+    def ask(self, question: str, *given: Any, seconds: float) -> Coroutine[Any, Any, bytes]:
+        """The answer, to be awaited. When the caller is cancelled, the question is, too.
 
         Raises what the state raises of CompdError, KeyError, IndexError and FileNotFoundError; StateError where a limit
         is met, or the process was killed.
         """
-        asked = self.submit(question, *given, seconds=seconds)
+        # counted at once, so that the next one who asks finds another worker free
+        return self._awaited(self.submit(question, *given, seconds=seconds))
+
+    async def _awaited(self, asked: Asked) -> bytes:
         try:
             return await asyncio.wrap_future(asked.answer)
         except asyncio.CancelledError:

@@ -36,7 +36,7 @@ def worker(workers):
 
 
 def ask(worker, question, *given, seconds=PATIENCE_S):
-    return asyncio.run(worker.ask(f"{COUNTER}.{question}", *given, seconds=seconds))
+    return worker.submit(f"{COUNTER}.{question}", *given, seconds=seconds).answer.result()
 
 
 def process_of(worker):
