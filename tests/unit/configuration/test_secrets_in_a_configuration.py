@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+import yaml
 
 from compd.errors import CompdError
 from compd.machine_check import load_whole
@@ -39,9 +40,9 @@ def test_a_password_in_a_line_is_not_repeated(line: str, tmp_path) -> None:
 
 def test_a_token_in_the_place_of_its_file_is_not_repeated(tmp_path) -> None:
     path = tmp_path / "machine.yaml"
-    path.write_text(
-        TRIPOD.replace("\nsockets:\n", f"\nsockets:\n  tcp: {{token_file: {SECRET}, token: {SECRET}}}\n", 1)
-    )
+    data = yaml.safe_load(TRIPOD)
+    data["sockets"]["tcp"] |= {"token_file": SECRET, "token": SECRET}
+    path.write_text(yaml.safe_dump(data))
     with pytest.raises(CompdError) as caught:
         load_whole(path)
     assert "token_file" in str(caught.value)

@@ -30,7 +30,13 @@ def test_what_is_no_role_or_has_a_token_already_is_refused(tmp_path, text):
     assert len(read_tokens(path)) == 1
 
 
-@pytest.mark.parametrize("text", ["", "[1, 2", "tokens: 3", "tokens: [{name: a, role: master, sha256: b}]", "more: 1"])
+def test_an_empty_file_lets_nobody_in(tmp_path):
+    path = tmp_path / "tokens.yaml"
+    path.touch(0o600)
+    assert read_tokens(path) == []
+
+
+@pytest.mark.parametrize("text", ["3", "[1, 2", "tokens: 3", "tokens: [{name: a, role: master, sha256: b}]", "more: 1"])
 def test_a_file_that_is_none_is_named(tmp_path, text):
     path = tmp_path / "tokens.yaml"
     path.write_text(text)
