@@ -119,7 +119,7 @@ class ChildProcess:
         code = 1
         try:
             # without the supervisor nobody would start it anew, nor end it
-            _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+            end_with_parent()
             if os.getppid() != supervisor:
                 os._exit(code)
             _libc.prctl(_PR_SET_NAME, f"compd {self.name}".encode()[:_LONGEST_NAME], 0, 0, 0)
@@ -145,6 +145,11 @@ class ChildProcess:
                 sys.stderr.flush()
             finally:
                 os._exit(code)
+
+
+def end_with_parent() -> None:
+    """Have this process killed when the thread that has started it ends, as with its process."""
+    _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
 
 
 def _close_sockets() -> None:

@@ -97,7 +97,7 @@ def test_an_answer_that_comes_after_another_question_is_not_shown(with_models):
     tab.route("**/orders/shadow?subject=*two*", hold)
     while not late:
         tab.wait_for_timeout(50.0)
-    name.fill("/etc/hostname")
+    name.fill("one.model.yaml")
     tab.locator("#order-shadow").click()
     until(tab, "document.querySelector('#confirm')?.disabled === false")
     with tab.expect_response("**/orders/shadow?subject=*two*"):

@@ -43,7 +43,8 @@ def back_afterwards(tab, live, daemon):
 
 @pytest.fixture
 def model(live):
-    return file_with(live.directory / "warm.model.yaml", "link_expansion", link_expansion=10.0)
+    live.recordings.mkdir(exist_ok=True)
+    return file_with(live.recordings / "warm.model.yaml", "link_expansion", link_expansion=10.0)
 
 
 def gauge(name):
@@ -239,7 +240,7 @@ def test_adopt(tab, live, daemon, model):
 @pytest.mark.parametrize("named", ["", "another"])
 def test_only_the_model_whose_change_was_told_is_adopted(tab, live, daemon, model, named):
     """Another file is refused, and so is none, which would be to run without effects."""
-    other = file_with(live.directory / "other.model.yaml", "link_expansion", link_expansion=90.0)
+    other = file_with(live.recordings / "other.model.yaml", "link_expansion", link_expansion=90.0)
     daemon.model(str(model), shadow=True)
     until(tab, "compd.live.setpoint?.shadow?.correction_mm && compd.slow.status.model.shadow")
     arm_from_keyboard(tab)

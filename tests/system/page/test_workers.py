@@ -151,8 +151,9 @@ def gaps(address):
 def upload_and_read(page, path):
     assert page.ask(f"/join/exports?name={path.name}", None, path.read_bytes()).status == 200
     began_s = time.monotonic()
-    answer = page.table(path.name)
-    (page.exports / path.name).unlink()
+    kept = f"{path.name}.export"
+    answer = page.table(kept)
+    (page.exports / kept).unlink()
     return answer, time.monotonic() - began_s
 
 
