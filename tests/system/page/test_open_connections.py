@@ -24,7 +24,7 @@ MANY = 1100
 UNKNOWN = ConnectionLimits().unknown
 # Sockets of the server itself, and connections that are just being closed.
 MORE_DESCRIPTORS = 24
-ANSWER_WITHIN_S = 1.0
+ANSWER_WITHIN_S = 2.0
 # Of the server's timers and this computer.
 MORE_S = 3.0
 GROWTH_MB = 30.0
