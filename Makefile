@@ -64,13 +64,13 @@ SIDE_BY_SIDE ?= 4
 # Likewise the commands of the documentation's pages and the examples of CONTRIBUTING.md.
 DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py
 
-# What runs a daemon or a browser in real time. It waits more than it computes: some side by side are still in time, but
+# What runs a daemon or a browser in real time. It waits as much as it computes: two side by side are still in time, but
 # not beside tests that compute.
 REAL_TIME := $(addprefix tests/system/,page processes linuxcnc test_chain.py test_fault_matrix.py \
   test_half_open_connections.py test_pushed_lines.py test_reference_examples.py test_simultaneous_sampling.py)
 COMPUTED := $(REAL_TIME:%=--ignore=%) $(HIDDEN:%=--ignore=%)
 # Files are shared out whole: what the tests of one share is made once.
-IN_REAL_TIME := -n 3 --dist loadfile
+IN_REAL_TIME := -n 2 --dist loadfile
 
 # Tests run side by side: threads of the linear algebra beside them take twice the processor time.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1

@@ -101,7 +101,6 @@ class Server:
     @asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
         tasks = [asyncio.create_task(self._link.run()), asyncio.create_task(self._broadcast.run())]
-        self._workers.prepare()
         yield
         self._workers.end()
         await _ended(tasks)

@@ -41,7 +41,8 @@ class JoinRoutes:
         self._exports = Exports(recordings.directory / EXPORTS)
         self._page = page
         arguments = (self._directory, self._exports.directory, machine)
-        self._joiners = WorkerGroup(workers or Workers(), WORKERS, "join", _JOINER, arguments, LIMITS)
+        self._workers = workers or Workers()
+        self._joiners = WorkerGroup(self._workers, WORKERS, "join", _JOINER, arguments, LIMITS)
         self._writing = asyncio.Lock()  # a name is given once
 
     def routes(self) -> list[Route]:
@@ -57,6 +58,7 @@ class JoinRoutes:
         ]
 
     async def _index(self, request: Request) -> Response:
+        self._workers.prepare()
         return FileResponse(self._page)
 
     async def _sources(self, request: Request) -> Response:

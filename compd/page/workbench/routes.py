@@ -66,6 +66,7 @@ class WorkbenchRoutes:
         ]
 
     async def _index(self, request: Request) -> Response:
+        self._workers.prepare()
         return FileResponse(self._page)
 
     async def _list_libraries(self, request: Request) -> Response:

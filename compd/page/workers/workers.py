@@ -39,8 +39,8 @@ class Workers:
         self._starting = threading.Lock()  # the first start waits for what is imported
 
     def prepare(self) -> None:
-        """Start the process that workers are forked from. It imports what they need, which takes seconds; this does
-        not wait for it."""
+        """Start the process that workers are forked from, unless it runs. It imports what they need, which takes
+        seconds; this does not wait for it. Whoever only looks at the machine needs none."""
         self._context.set_forkserver_preload(PRELOADED)
         forkserver.ensure_running()
 
@@ -66,7 +66,6 @@ class Workers:
     def start(self, arguments: tuple[Any, ...]) -> tuple[ForkServerProcess, Connection]:
         """A new process and the connection to it. arguments : of `serve`, after the connection."""
         with self._starting:
-            self.prepare()
             ours, theirs = self._context.Pipe()
             process = self._context.Process(target=serve, args=(theirs, *arguments), daemon=True)
             process.start()
