@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import pytest
 import pytest_timeout
+import structlog
 from _pytest.runner import runtestprotocol
 
 from tests.support.pauses import MATTERS_S, Pauses
@@ -16,6 +18,7 @@ _TRIES = 4
 # Of a report: it failed, and its test is tried again. Counted and listed by this word at the end.
 _TRIED_AGAIN = "tried again"
 _PAUSES = Pauses()
+_LAST_RESORT = logging.lastResort
 
 
 @pytest.hookimpl(wrapper=True)
@@ -42,7 +45,7 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     for tries_left in reversed(range(_TRIES)):
         before_s = _PAUSES.lost_s
         reports = runtestprotocol(item, log=False, nextitem=nextitem)
-        _be_as_important_as_others()
+        _leave_things_as_they_were()
         paused_s = _PAUSES.lost_s - before_s
         if not tries_left or paused_s < MATTERS_S or not any(report.failed for report in reports):
             break
@@ -57,10 +60,16 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     return True
 
 
-def _be_as_important_as_others() -> None:
-    """A loop that a test has run in this process had a real-time priority, beside which other tests stand still."""
+def _leave_things_as_they_were() -> None:
+    """Take back what a test has changed of this process by running a command or a loop in it."""
+    # beside a real-time priority other tests stand still
     if os.sched_getscheduler(0) != os.SCHED_OTHER:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    # a command logs to its own stderr, which is closed after it where a test has run it
+    log_file = getattr(structlog.get_config()["logger_factory"], "_file", None)
+    if log_file is not None and log_file.closed:
+        structlog.reset_defaults()
+    logging.lastResort = _LAST_RESORT
 
 
 @contextmanager

@@ -61,7 +61,7 @@ def test_a_pipe_a_directory_and_a_missing_file_are_refused_at_once(tmp_path: Pat
     os.mkfifo(tmp_path / "pipe")
     for name, wanted in (
         ("pipe", "cannot be read: it is not a regular file"),
-        (".", "cannot be read: Is a directory"),
+        (".", "cannot be read: it is a directory"),
         ("none", "No such file"),
     ):
         with pytest.raises(RecordingError, match=wanted):
