@@ -65,6 +65,8 @@ def told_or_read(path: Path, content: bytes, options: ReadOptions) -> bool:
     return is_told(error) and (error is None or all(str(path) in problem.where for problem in error.problems))
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @given(content=changed_bytes(EXPORTS), options=OPTIONS)
 @examples(300)
 def test_a_changed_export_is_one_or_is_refused(folder: Path, content: bytes, options: ReadOptions) -> None:
@@ -77,6 +79,7 @@ def test_bytes_are_an_export_or_are_refused(folder: Path, content: bytes) -> Non
     assert told_or_read(folder / "export.txt", content, ReadOptions())
 
 
+@pytest.mark.long
 @given(content=tables(), options=OPTIONS)
 @examples(400)
 def test_a_table_of_odd_cells_is_an_export_or_is_refused(folder: Path, content: bytes, options: ReadOptions) -> None:

@@ -53,6 +53,8 @@ def test_a_changed_configuration_is_one_or_is_refused(folder: Path, content: byt
     assert is_told(refusal(lambda: load(path), ConfigurationError))
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @given(table=changed_bytes([csv_text()]), sidecar=st.just(SIDECAR.encode()) | changed_bytes([SIDECAR]))
 @examples(150)
 def test_a_changed_recording_is_one_or_is_refused(folder: Path, table: bytes, sidecar: bytes) -> None:

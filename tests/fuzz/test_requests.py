@@ -79,6 +79,8 @@ def answer_or_error(asked: Requests, client: ClientSession, data: bytes) -> byte
         return error.to_json()
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @given(
     lines=st.lists(LINES, min_size=1, max_size=6),
     local=st.booleans(),

@@ -37,7 +37,7 @@ class Case:
     given, or may be where nothing must show. bound_um : of the error of any valid setpoint, from the beginning
     until the state is ok again. way : out of it. at_least_um : of what nothing shows, the error that it makes.
     watched_s : how long the fault lasts. lost : whether the daemon itself ends and the service manager starts it
-    again. sample : runs in `make test`.
+    again. sample : `.ci/run` runs it too.
     """
 
     id: str

@@ -31,6 +31,8 @@ def fall_um(said: str) -> tuple[float, float, float]:
     return float(match["before"]), float(match["after"]), float(match["floor"])
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_the_comparators_of_the_first_recording_bring_the_error_to_the_floor(tmp_path: Path) -> None:
     said = run("first_recording.py", tmp_path)
     without = {source: float(um) for source, um in re.findall(r"without compensation of the (\w+): ([\d.]+) um", said)}
@@ -67,6 +69,7 @@ def test_an_external_machine_learns_what_its_model_lacks(tmp_path: Path) -> None
     assert "temperature_spindle_degC" in said
 
 
+@pytest.mark.long
 def test_an_arms_wrong_length_and_zero_are_found_among_eight(tmp_path: Path) -> None:
     said = run("arm_parameters.py", tmp_path)
     before_um, after_um, floor_um = fall_um(said)
@@ -76,6 +79,7 @@ def test_an_arms_wrong_length_and_zero_are_found_among_eight(tmp_path: Path) -> 
     assert found == pytest.approx({"zero_3": 0.04, "forearm": 0.6}, rel=0.05)
 
 
+@pytest.mark.long
 def test_without_an_argument_nothing_is_left_behind(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, ROOT / "examples" / "external_machine.py"],

@@ -23,7 +23,7 @@ def machine() -> Iterator[InjectedMachine]:
 
 
 def marked(case: Case) -> object:
-    return pytest.param(case, id=case.id, marks=() if case.sample else pytest.mark.long)
+    return pytest.param(case, id=case.id, marks=[pytest.mark.long, *([pytest.mark.sample] if case.sample else [])])
 
 
 @pytest.mark.parametrize("case", [marked(case) for case in MATRIX])

@@ -52,6 +52,8 @@ def cluster(tmp_path: Path) -> Iterator[DaskCluster]:
         yield running
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_a_command_on_a_cluster_of_processes(fleet: Path, cluster: DaskCluster, tmp_path: Path) -> None:
     command = ["fleet", "compare", str(fleet), "--scheduler", cluster.address, "--html", "fleet.html"]
     done = subprocess.run(
@@ -73,6 +75,7 @@ def test_a_command_on_a_cluster_of_processes(fleet: Path, cluster: DaskCluster, 
     assert "run3.csv" in (tmp_path / "fleet.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_a_worker_that_is_killed_in_the_middle_costs_no_recording(fleet: Path, cluster: DaskCluster) -> None:
     done: list[RecordingResult] = []
 
@@ -86,6 +89,7 @@ def test_a_worker_that_is_killed_in_the_middle_costs_no_recording(fleet: Path, c
     assert [Path(result.recording).name for result in run.results if result.problem] == ["run3.csv"]
 
 
+@pytest.mark.long
 def test_a_scheduler_that_ends_leaves_a_result_for_every_recording(
     fleet: Path, cluster: DaskCluster, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -99,6 +103,7 @@ def test_a_scheduler_that_ends_leaves_a_result_for_every_recording(
     assert "Traceback" not in capfd.readouterr().err
 
 
+@pytest.mark.long
 def test_ctrl_c_leaves_a_result_for_every_recording(fleet: Path, cluster: DaskCluster) -> None:
     def interrupt(result: RecordingResult) -> None:
         raise KeyboardInterrupt

@@ -43,9 +43,10 @@ def split(campaign: Path, directory: Path) -> tuple[Path, Path]:
     return directory / "gauges.csv", directory / "points.txt"
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("by", ["order", pytest.param("name", marks=pytest.mark.long)])
-@pytest.mark.parametrize("number", [NUMBERS[0], pytest.param(NUMBERS[1], marks=pytest.mark.long)])
+@pytest.mark.parametrize("by", ["order", "name"])
+@pytest.mark.parametrize("number", NUMBERS)
 def test_found_as_in_the_campaigns_own_recording(tmp_path: Path, number: int, by: str) -> None:
     files = simulate_campaign("tripod-cmm", tmp_path / "campaign.csv", seed=number, hidden=number)
     gauges, listed = split(files.recording, tmp_path)

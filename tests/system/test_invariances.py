@@ -41,6 +41,7 @@ from tests.support.changed_recordings import (
 )
 from tests.support.hidden_effects import NOISE_UM, campaign, record_with_effects
 from tests.support.own_machines import milling_table, rotary_axis
+from tests.support.sampled import sampled
 
 VISITS = 96
 FLOORS_MOVED = 300.0
@@ -201,7 +202,7 @@ def changes() -> Iterator[object]:
         yield from (pytest.param(name, change, id=f"{name}: {change}", marks=marks) for change in case.changes)
 
 
-@pytest.mark.parametrize(("name", "change"), list(changes()))
+@pytest.mark.parametrize(("name", "change"), sampled(changes(), 4))
 def test_the_diagnosis_stays_the_same(
     name: str, change: str, original_of: Callable[[str], Original], tmp_path: Path
 ) -> None:

@@ -48,6 +48,7 @@ def names(verdict: dict[str, Any]) -> set[str]:
     return {name for step in verdict["steps"] for name in (step["effect"], *step["rivals"])}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hidden", ["link_elasticity=100", "joint_contact=0.05"])
 def test_a_planned_measurement_leaves_one_name(tmp_path: Path, hidden: str) -> None:
     """Loads of one size and direction leave two names; the plan's loads, on the same machine, leave the right one."""

@@ -20,6 +20,8 @@ from tests.support.paths import ROOT
 TEMPLATE = ROOT / "drivers" / "template"
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_its_own_tests_pass() -> None:
     done = subprocess.run(
         [

@@ -84,7 +84,7 @@ class Worker:
         self, question: str, *given: Any, seconds: float, progress: Callable[[str], None] | None = None
     ) -> Asked:
         """As `ask`, without waiting; `progress` is called with each step that the state tells."""
-        self._workers.prepare()  # not in the worker's thread, with which it would end
+        self._workers.prepare()
         asked = Asked(question, given, seconds, progress)
         with self._changed:
             self._waiting.append(asked)

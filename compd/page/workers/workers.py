@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import threading
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
@@ -25,6 +26,9 @@ PRELOADED = [
     "compd.page.workbench.formula_questions",
     "compd.page.workbench.plan_questions",
 ]
+# The process that workers are forked from ends with the thread that started it, so that one lives as long as this
+# process does.
+_STARTER = ThreadPoolExecutor(1, "workers")
 
 
 class Workers:
@@ -41,6 +45,9 @@ class Workers:
     def prepare(self) -> None:
         """Start the process that workers are forked from, unless it runs. It imports what they need, which takes
         seconds; this does not wait for it. Whoever only looks at the machine needs none."""
+        _STARTER.submit(self._ensure_running).result()
+
+    def _ensure_running(self) -> None:
         self._context.set_forkserver_preload(PRELOADED)
         forkserver.ensure_running()
 

@@ -39,6 +39,8 @@ def test_every_part_shows_numbers(tab):
     assert painted
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_dragging_and_keys_turn_the_machine(tab):
     until(tab, "compd.live.scene && !compd.unpainted")
     tab.keyboard.press(" ")  # one and the same moment
@@ -77,6 +79,8 @@ def test_space_freezes_all_but_the_banner(tab):
     assert shown(tab) != before
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_scrubbing_shows_the_machine_links_tip_and_gauges_of_that_moment(tab, live):
     """A gauge of the frame is moved; then the page goes back to before that, and forth."""
     until(tab, "document.querySelector('#hour-chart canvas')")
@@ -103,6 +107,8 @@ def test_scrubbing_shows_the_machine_links_tip_and_gauges_of_that_moment(tab, li
         live.machine.ask("FAULT", line="frame_u", fault=None)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_arrows_and_points_scrub_by_a_second_and_a_tenth(tab):
     until(tab, "document.querySelector('#hour-chart canvas') && compd.live.unix_s")
     unix_s = tab.evaluate("compd.live.unix_s")
@@ -120,6 +126,8 @@ def test_arrows_and_points_scrub_by_a_second_and_a_tenth(tab):
     assert not tab.locator("#frozen").is_visible()
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_everybody_sees_who_is_armed(tab, chromium, live):
     with opened(chromium, live) as other:
         tab.keyboard.press("o")
@@ -128,6 +136,8 @@ def test_everybody_sees_who_is_armed(tab, chromium, live):
         assert "2 looking" in text(other, "#connected")
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_a_recording_is_made_and_downloaded(tab, live):
     tab.keyboard.press("o")
     tab.locator("input[aria-label='Name of the recording']").fill("from-the-page")
@@ -156,6 +166,8 @@ def test_a_lost_gauge_is_on_top_and_the_state_says_so(tab, live):
         live.machine.ask("FAULT", line="frame_u", fault=None)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_events_that_the_system_kept_while_the_page_stood_still_are_never_shown_as_live(chromium, live):
     """The page is stopped for six seconds: what comes then is old, and grey until it is not."""
     with opened(chromium, live) as tab:

@@ -12,6 +12,7 @@ import pytest
 from compd.live.loop.states import State
 from tests.support.daemon_process import Daemon, Pidfds
 from tests.support.process_checks import is_ok, is_valid, started_again, starts
+from tests.support.sampled import sampled
 from tests.support.watching import PATIENCE_S, Seen, until
 
 # Promised are 20 ms, or two periods where that is longer, until clients hear of a lost loop.
@@ -23,7 +24,7 @@ def largest_silence_s(seen: list[Seen]) -> float:
     return max(b.arrived_s - a.arrived_s for a, b in itertools.pairwise(seen) if is_valid(a))
 
 
-@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGSTOP], ids=lambda sent: sent.name)
+@pytest.mark.parametrize("sent", sampled([signal.SIGKILL, signal.SIGSTOP], 2), ids=lambda sent: sent.name)
 def test_without_its_loop_the_daemon_says_stop_and_goes_on_from_the_last_correction(
     apart: Daemon, sent: signal.Signals
 ) -> None:
@@ -55,7 +56,7 @@ def test_without_its_loop_the_daemon_says_stop_and_goes_on_from_the_last_correct
     assert {**apart.pids(), "loop": 0} == {**pids, "loop": 0}, "the others are the same"
 
 
-@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGSTOP], ids=lambda sent: sent.name)
+@pytest.mark.parametrize("sent", sampled([signal.SIGKILL, signal.SIGSTOP], 2), ids=lambda sent: sent.name)
 def test_a_lost_acquisition_is_a_lost_scale_and_comes_back(apart: Daemon, sent: signal.Signals) -> None:
     before, pids = starts(apart, "acquisition"), apart.pids()
     with apart.watched() as watcher, Pidfds([pids["acquisition"]]) as old:
@@ -74,7 +75,7 @@ def test_a_lost_acquisition_is_a_lost_scale_and_comes_back(apart: Daemon, sent: 
     assert {**apart.pids(), "acquisition": 0} == {**pids, "acquisition": 0}, "the others are the same"
 
 
-@pytest.mark.parametrize("victim", ["service", "supervisor"])
+@pytest.mark.parametrize("victim", sampled(["service", "supervisor"], 2))
 def test_without_service_or_supervisor_nothing_is_left(fresh: Daemon, victim: str) -> None:
     """A restart is the service manager's: there must be nobody in its way."""
     pids = fresh.pids()

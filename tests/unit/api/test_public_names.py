@@ -63,6 +63,8 @@ def test_the_version_is_the_installed_one() -> None:
     assert compd.__version__.count(".") == 2
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_the_examples_of_the_docstrings_are_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the order of the reference page, in one directory, as a reader would type them."""
     monkeypatch.chdir(tmp_path)

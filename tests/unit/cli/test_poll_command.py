@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
+import pytest
 import yaml
 from typer.testing import CliRunner
 
@@ -39,6 +40,8 @@ def with_gateway(directory: Path, gateway: SerialGateway) -> Path:
     return path
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_a_unit_that_has_come_back_is_asked_at_once(tmp_path: Path) -> None:
     with serial_gateway(UNITS, EXCHANGE_S, WAIT_S, exceptions=True) as gateway:
         loaded = load(with_gateway(tmp_path, gateway))

@@ -134,6 +134,8 @@ def test_killed_in_the_middle_it_reads_back_cleanly_and_replays(tmp_path):
     assert len({cycle.replayed for cycle in replayed}) == len(replayed)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @pytest.mark.usefixtures("drifting")
 def test_killed_while_it_writes_parquet_every_synchronised_row_is_there_and_replays(tmp_path):
     with daemon_at(tmp_path) as (configuration, _, client):
@@ -170,6 +172,8 @@ def test_it_ends_at_a_signal_with_everything_written(tmp_path, end):
     assert not [cycle for cycle in replay_cycles(configuration, RecordedCycles(tmp_path / "run")) if cycle.differs]
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @pytest.mark.usefixtures("drifting")
 def test_it_goes_on_in_a_new_part_when_the_daemon_has_started_anew(tmp_path):
     with ExitStack() as stack:
@@ -191,6 +195,7 @@ def test_it_goes_on_in_a_new_part_when_the_daemon_has_started_anew(tmp_path):
     assert not [cycle for cycle in replayed if cycle.differs]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("drifting")
 def test_while_the_daemon_is_away_ctrl_c_ends_it_with_everything_written(tmp_path):
     with daemon_at(tmp_path) as (_, _, client), record_command(tmp_path) as process:
@@ -203,6 +208,7 @@ def test_while_the_daemon_is_away_ctrl_c_ends_it_with_everything_written(tmp_pat
     assert f"{rows_in(tmp_path / 'run-0001.csv')} rows in 1 part" in said
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("drifting")
 def test_a_burst_has_every_cycle_for_as_long_as_asked_and_no_longer(tmp_path, capsys, monkeypatch):
     from compd.cli.live.record import record
@@ -230,6 +236,7 @@ def test_a_burst_has_every_cycle_for_as_long_as_asked_and_no_longer(tmp_path, ca
     assert "rate_hz" not in watch, "every cycle was asked for"
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("drifting")
 def test_a_recorder_that_reads_nothing_for_a_while_is_not_dropped_and_misses_nothing(tmp_path):
     with daemon_at(tmp_path) as (_, _, client), connect(tmp_path / "s", TIMEOUT_S) as slow:

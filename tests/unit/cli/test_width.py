@@ -50,6 +50,7 @@ def test_check_names_every_line_and_cuts_no_head(printed, name):
     assert all(f" {line} " in text for line in load(CONFIG / name).lines)
 
 
+@pytest.mark.long
 def test_a_ledger_has_whole_names_and_numbers(printed, tmp_path):
     recording, model, effects = tmp_path / "run.csv", tmp_path / "model.yaml", tmp_path / "mine.yaml"
     name = "expansion_of_my_platform"

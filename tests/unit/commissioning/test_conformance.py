@@ -38,12 +38,15 @@ def test_installed_driver_in_virtual_time(name: str) -> None:
     assert sum(result.verdict == "pass" for _, result in results) >= 12
 
 
+@pytest.mark.long
 def test_a_line_that_never_learns_where_a_map_ends_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(RtuMaster, "_may_extend", lambda *_: True)
     results = list(run_conformance(driver_under_test("modbus"), on_real_wires=False))
     assert any("the map ends" in text and "no reply, still: timeout" in text for text in failures(results))
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_a_driver_on_ptys_and_ports() -> None:
     results = list(run_conformance(driver_under_test("heidenhain_nd28x")))
     assert failures(results) == []
@@ -237,13 +240,16 @@ def test_a_careful_driver_passes() -> None:
 
 @pytest.mark.parametrize(
     ("gauge", "case"),
-    [
-        (Micrometres, "units and scale"),
-        (StampsTheAnswer, "units and scale"),
-        (Trusting, "garbage inside the reply"),
-        (Remembering, "no reply"),
-        (CutOff, "no reply"),
-    ],
+    sampled(
+        [
+            (Micrometres, "units and scale"),
+            (StampsTheAnswer, "units and scale"),
+            (Remembering, "no reply"),
+            (Trusting, "garbage inside the reply"),
+            (CutOff, "no reply"),
+        ],
+        2,
+    ),
 )
 def test_a_wrong_driver_is_found(gauge: type[Gauge[Any]], case: str) -> None:
     results = list(run_conformance(driver_of(gauge), on_real_wires=False))

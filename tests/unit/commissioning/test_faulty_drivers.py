@@ -146,7 +146,7 @@ def test_where_replies_do_not_say_whose_they_are_that_is_said() -> None:
     assert "not detectable on this wire: the reply of a device with unit=inch" in result.observed
 
 
-@pytest.mark.parametrize("name", polled_drivers())
+@pytest.mark.parametrize("name", sampled(polled_drivers(), 3))
 def test_each_shipped_driver_is_right_from_digit_to_end_of_scale_on_both_sides_of_zero(name: str) -> None:
     under_test = driver_under_test(name)
     channels: list[Channel] = list(under_test.gauge(under_test.options).channels)
@@ -172,6 +172,7 @@ def test_the_search_for_a_digit_ends_where_numbers_are_no_finer() -> None:
     assert "c: 2147.48365 mm as ok, the sensor had nan" in result.observed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("options", "why"),
     [
@@ -186,6 +187,7 @@ def test_a_preset_that_is_asked_by_dtr_is_tried_in_virtual_time(options: dict[st
     assert why in results[-1][1].observed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", sampled(["%+08.3f%0<sum8>", "%+08.3f", "%+08.3f mm"], 3))
 def test_a_described_device_that_speaks_unasked_is_tried_in_virtual_time(form: str) -> None:
     options = {"in": form, "in_terminator": r"\r\n", "channels": [{"name": "a", "unit": "mm"}]}

@@ -75,7 +75,7 @@ DEVICES: dict[str, tuple[bytes, dict[bytes, bytes], bytes, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", sampled(DEVICES, 2))
+@pytest.mark.parametrize("name", sampled(DEVICES, 4))
 def test_a_device_is_found_although_it_keeps_what_others_were_asked(name: str) -> None:
     end, answers, unknown, announced = DEVICES[name]
     with instrument(end, answers, unknown) as (port, _):
@@ -84,6 +84,7 @@ def test_a_device_is_found_although_it_keeps_what_others_were_asked(name: str) -
     assert "1.25" in line or "0.0125" in line
 
 
+@pytest.mark.long
 def test_nothing_is_left_in_the_buffer_of_a_device() -> None:
     """What a Modbus master has sent is ended too: the next command is heard as it is."""
     with instrument(b"\r", {b"M": b"+1.250\r"}) as (port, heard):
@@ -104,6 +105,7 @@ def modbus_slave(tmp_path: Path, name: str, **options: Any) -> SimulatedLine:
     return SimulatedLine("slave", settings, [device], tmp_path)
 
 
+@pytest.mark.long
 def test_a_modbus_slave_is_no_preset(tmp_path: Path) -> None:
     """Of two presets whose registers it has, none is announced; nor is a value of theirs."""
     channels = [{"name": f"r{k}", "function": 3, "address": k, "type": "int16", "unit": "1"} for k in range(8)]

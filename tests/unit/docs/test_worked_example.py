@@ -64,6 +64,7 @@ def compd_numbers(example: Example) -> Iterator[tuple[str, float]]:
     yield "values", float(losses.data.value_count)
 
 
+@pytest.mark.long
 def test_the_file_holds_compds_numbers_as_formulas(example: Example, sheets: Sheets, file: Path) -> None:
     numbers = dict(compd_numbers(example))
     assert set(numbers) | {"floor", "verdict"} == set(sheets.results)

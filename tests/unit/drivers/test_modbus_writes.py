@@ -150,6 +150,7 @@ def test_a_status_bit_that_is_not_set_right_leaves_its_channel_without_value() -
         assert reading.quality is quality
 
 
+@pytest.mark.long
 def test_the_rich_map_on_wires_that_go_wrong() -> None:
     rich = {**RICH, "write_before_poll": []}
     results = list(run_conformance(driver_under_test("modbus", rich), on_real_wires=False))

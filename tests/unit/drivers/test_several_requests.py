@@ -71,6 +71,7 @@ def test_requests_that_cannot_be_are_refused(keys: dict[str, Any], problem: str)
         gauge(**{**PROBES, **keys})
 
 
+@pytest.mark.long
 def test_several_requests_on_wires_that_go_wrong() -> None:
     options = {**PROBES, "out_terminator": r"\r", "in_terminator": r"\r\n"}
     results = list(run_conformance(driver_under_test("serial_ascii", options), on_real_wires=False))

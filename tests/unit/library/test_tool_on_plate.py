@@ -65,6 +65,7 @@ def test_a_hidden_expansion_is_fitted_along_the_tool_on_the_plate(hide: Hide) ->
     assert fit(hide("tool_expansion=12"), "tool_expansion") == pytest.approx([12.0], rel=0.05)
 
 
+@pytest.mark.long
 def test_a_hidden_offset_is_fitted_in_the_plates_frame(hide: Hide, tmp_path: Path) -> None:
     aligned = hide("tool_offset=10")
     hidden = json.loads((tmp_path / "hidden.answer.json").read_text(encoding="utf-8"))["effects"]["tool_offset"]

@@ -16,6 +16,7 @@ from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.acquisition.acquisition import Acquisition
 from compd.live.acquisition.peers import Peers
+from tests.support.sampled import sampled
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, Rig, WatchedLatest, rig
 from tests.unit.drivers.test_simulated import CASES, Case
 
@@ -51,7 +52,7 @@ def build_rig(tmp_path: Path, case: Case) -> Any:
     return rig(tmp_path, case.line, {"g": case.gauge}, dict(case.values))
 
 
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+@pytest.mark.parametrize("case", sampled(CASES.values(), 4), ids=CASES)
 def test_an_unplugged_line_is_lost_and_comes_back_by_itself(tmp_path: Path, case: Case) -> None:
     with build_rig(tmp_path, case) as device_rig, acquiring(device_rig) as (acquisition, latest):
         channel, value = f"ag.{next(iter(case.values))}", next(iter(case.values.values()))
@@ -97,6 +98,8 @@ def test_a_device_that_comes_later_is_found(tmp_path: Path) -> None:
             latest.wait_for("ag.1", OK)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_a_dead_line_does_not_delay_another(tmp_path: Path) -> None:
     dead = CASES["keyence"]._replace(line={**CASES["keyence"].line, "timeout_s": PATIENCE_S / 2})
     alive = CASES["modbus RTU"]
@@ -138,7 +141,9 @@ def test_a_line_that_was_closed_shares_its_device_no_more() -> None:
     assert logs == []
 
 
-@pytest.mark.parametrize("name", ["heidenhain 38400", "keyence", "modbus RTU", "modbus RTU over TCP", "modbus TCP"])
+@pytest.mark.parametrize(
+    "name", sampled(["heidenhain 38400", "modbus RTU over TCP", "keyence", "modbus RTU", "modbus TCP"], 3)
+)
 def test_a_late_reply_is_never_taken_for_a_new_one(tmp_path: Path, name: str) -> None:
     case = CASES[name]
     with build_rig(tmp_path, case) as device_rig, acquiring(device_rig) as (_, latest):
@@ -156,13 +161,16 @@ def test_a_late_reply_is_never_taken_for_a_new_one(tmp_path: Path, name: str) ->
 
 @pytest.mark.parametrize(
     ("fault", "quality"),
-    [
-        ("silent", Quality.TIMEOUT),
-        ("garble", Quality.CRC),
-        ("cut", Quality.INCOMPLETE),
-        ("noise before", Quality.CRC),
-        ("wrong unit", Quality.MISMATCH),
-    ],
+    sampled(
+        [
+            ("silent", Quality.TIMEOUT),
+            ("garble", Quality.CRC),
+            ("cut", Quality.INCOMPLETE),
+            ("noise before", Quality.CRC),
+            ("wrong unit", Quality.MISMATCH),
+        ],
+        2,
+    ),
 )
 def test_while_a_line_is_broken_no_reading_is_ok(tmp_path: Path, fault: str, quality: Quality) -> None:
     with build_rig(tmp_path, CASES["modbus RTU"]) as device_rig, acquiring(device_rig) as (_, latest):

@@ -50,6 +50,7 @@ def test_every_event_of_the_daemon_is_in_the_list_with_its_keys() -> None:
     assert extra == [], "name these keys in compd/live/events.py"
 
 
+@pytest.mark.long
 def test_the_list_has_nothing_that_does_not_come() -> None:
     said = {text for _, text, _, _ in logged()}
     assert {event.text for event in EVENTS} == said

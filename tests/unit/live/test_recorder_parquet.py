@@ -109,6 +109,7 @@ def killed(tmp_path):
     return tmp_path / "run-0001.arrow"
 
 
+@pytest.mark.long
 def test_killed_in_the_middle_every_synchronised_row_can_be_read(killed):
     assert not killed.with_suffix(".parquet").exists()
     with killed.open("ab") as file:

@@ -6,6 +6,7 @@ import json
 import math
 import os
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from compd.model.motion import Motion
 from tests.support.live_machine import CONFIG, machine
 from tests.support.live_models import file_with
 from tests.support.recorded_run import ROOMY, Run
+from tests.support.sampled import sampled
 
 CYCLES = 400
 
@@ -38,9 +40,10 @@ def record(run, name, cycles, every=1):
     return sent
 
 
-@pytest.mark.parametrize("on_limit", ["clamp", "refuse"])
-@pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
-@pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
+@pytest.mark.parametrize(
+    ("name", "on_stale", "on_limit"),
+    sampled(product(["tripod-cmm.yaml", "hexapod.yaml"], ["hold", "fade", "stop"], ["clamp", "refuse"]), 5),
+)
 def test_a_recorded_run_replays_bit_for_bit(tmp_path, name, on_stale, on_limit):
     run = Run(machine(name, on_stale=on_stale, on_limit=on_limit), seed=11)
     sent = record(run, tmp_path / "run", CYCLES)

@@ -55,6 +55,7 @@ def test_a_directory_that_the_person_names_is_the_only_one(
     assert str(tmp_path / "named") == jit._config.CACHE_DIR
 
 
+@pytest.mark.long
 def test_kernels_work_where_nothing_can_be_kept(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
@@ -72,6 +73,8 @@ def test_kernels_work_where_nothing_can_be_kept(tmp_path: Path) -> None:
     assert done.stdout.strip() == "'' [1.0, 1.0, 1.0]"
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_processes_that_start_together_do_not_spoil_each_others_kernels(tmp_path: Path) -> None:
     """numba names a kernel by what its process compiled before, so these two do not agree on the name."""
     ours = (
@@ -105,6 +108,7 @@ def _on_a_terminal(cache: Path) -> str:
     return said.decode()
 
 
+@pytest.mark.long
 def test_a_terminal_that_waits_is_told_once(tmp_path: Path) -> None:
     said = _on_a_terminal(tmp_path)
     assert "compd compiles kernels (once, 1 to 2 min): compose\r\033[K" in said
@@ -113,6 +117,7 @@ def test_a_terminal_that_waits_is_told_once(tmp_path: Path) -> None:
     assert _on_a_terminal(tmp_path) == ""
 
 
+@pytest.mark.long
 def test_a_terminal_is_told_that_nothing_can_be_kept(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")

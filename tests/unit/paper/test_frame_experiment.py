@@ -71,6 +71,7 @@ def test_the_difference_is_the_second_order_term_by_another_formula(configuratio
     np.testing.assert_allclose(difference.displacement_mm, by_formula_mm, rtol=0.02)
 
 
+@pytest.mark.long
 def test_the_slope_is_two_and_is_fitted(result: FrameResult) -> None:
     assert frame_experiment.order(result) == pytest.approx(2.0, abs=0.02)
     first_order = result.by_size._replace(tip_mm=1e-3 * SIZES_MM[:, None] * np.ones(4))
@@ -147,6 +148,7 @@ def test_command_prints_table_and_sentences_and_draws_a_page(tmp_path: Path) -> 
     assert "power 2.00" in text
 
 
+@pytest.mark.long
 def test_the_committed_picture_is_what_the_command_finds() -> None:
     def numbers(svg: str) -> list[float]:
         return [float(number) for number in re.findall(r"\d+\.\d", svg)]

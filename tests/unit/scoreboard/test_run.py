@@ -33,6 +33,7 @@ def result(campaigns):
     return json.loads(json.dumps(run(prepared(campaigns)[0])))
 
 
+@pytest.mark.long
 def test_a_case_has_two_recordings_and_an_answer_apart_from_them(campaigns):
     (directory,) = prepared(campaigns)
     assert {path.name for path in directory.iterdir()} == {

@@ -29,7 +29,6 @@ from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, Move
 from compd.simulation.truth.strengths import FULLY_MEASURED, FULLY_MEASURED_WITHOUT_NOISE, NOTHING
 from tests.support.paths import SHARED
-from tests.support.sampled import sampled
 from tests.support.simulated import HEXAPOD, TRIPOD, hexapod, tripod, wiring
 
 TRACKER_WITH_OUTLIERS = replace(TRACKER, outlier_share=0.01)
@@ -50,6 +49,7 @@ def column(recorded: SimulatedRecording, name: str) -> Any:
     return np.array(recorded.columns[name], dtype=float)
 
 
+@pytest.mark.long
 def test_columns_are_those_of_the_example_recordings(recorded: SimulatedRecording) -> None:
     if not EXAMPLE.exists():
         pytest.skip(f"the example recordings are not at {EXAMPLE.parent.parent}")
@@ -94,6 +94,7 @@ def test_a_pass_moves_at_constant_speed(recorded: SimulatedRecording) -> None:
     assert np.unique(np.round(speed[speed > 0.5], 0)).size > 3
 
 
+@pytest.mark.long
 def test_one_row_in_a_hundred_is_far_off(machine: Mechanism) -> None:
     days = draw_campaign_plan(machine, 3)
     measured = Campaign(tripod(), wiring(), days, 3, NOTHING, reference=TRACKER_WITH_OUTLIERS).run()
@@ -105,6 +106,7 @@ def test_one_row_in_a_hundred_is_far_off(machine: Mechanism) -> None:
     assert np.std(error_um[:, ~outliers]) == pytest.approx(TRACKER_SIGMA_UM, rel=0.1)
 
 
+@pytest.mark.long
 def test_gauges_explain_a_machine_without_hidden_causes(machine: Mechanism) -> None:
     for geometry, wires in ((tripod(), wiring()), (hexapod(), wiring(HEXAPOD))):
         sizer = CauseSizer(geometry, wires, 4)
@@ -114,8 +116,9 @@ def test_gauges_explain_a_machine_without_hidden_causes(machine: Mechanism) -> N
         assert Campaign(geometry, wires, sizer.plan.thinned(5), 4, unseen).run().error_um() > 0.1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
-    "name", sampled(["link_expansion", "backlash", "joint_contact", "reference_drift", "humidity_swelling"], 3)
+    "name", ["link_expansion", "backlash", "joint_contact", "reference_drift", "humidity_swelling"]
 )
 def test_a_cause_is_as_strong_as_it_takes(name: str) -> None:
     sizer = CauseSizer(tripod(), wiring(), 5)
@@ -126,6 +129,7 @@ def test_a_cause_is_as_strong_as_it_takes(name: str) -> None:
     assert same.floors == pytest.approx(sized.floors, rel=1e-9)
 
 
+@pytest.mark.long
 def test_weak_disturbances_are_two_and_weak(recorded: SimulatedRecording) -> None:
     sizer = CauseSizer(tripod(), wiring(), 3)
     assert len(recorded.weak) == 2
@@ -189,6 +193,7 @@ def test_the_same_seed_brings_home_the_same(machine: Mechanism) -> None:
         np.testing.assert_array_equal(values, again.columns[name])
 
 
+@pytest.mark.long
 def test_other_days_are_on_the_same_machine(recorded: SimulatedRecording) -> None:
     other = simulate_recording(
         load(TRIPOD), 3, [HiddenCause("link_expansion", recorded.hidden[0].cause.strength)], other_days=1
@@ -205,17 +210,15 @@ def test_balls_of_a_plate_are_apart_and_within_reach(machine: Mechanism) -> None
     assert apart.min() > 20.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("config", "options", "quantity"),
-    sampled(
-        [
-            (TRIPOD, ["--hidden", "7"], "tool_position"),
-            (TRIPOD, ["--effect", "link_expansion=11", "--reference", "interferometer"], "link_length"),
-            (TRIPOD, ["--effect", "backlash", "--reference", "ball_plate"], "ball_plate"),
-            (HEXAPOD, ["--effect", "humidity_swelling"], "tool_position"),
-        ],
-        3,
-    ),
+    [
+        (TRIPOD, ["--hidden", "7"], "tool_position"),
+        (TRIPOD, ["--effect", "link_expansion=11", "--reference", "interferometer"], "link_length"),
+        (TRIPOD, ["--effect", "backlash", "--reference", "ball_plate"], "ball_plate"),
+        (HEXAPOD, ["--effect", "humidity_swelling"], "tool_position"),
+    ],
 )
 def test_command_writes_what_the_workbench_reads(
     tmp_path: Path, config: Path, options: list[str], quantity: str

@@ -58,6 +58,7 @@ def errors_um(world: World, geometry: Geometry, wires: Wiring) -> FloatArray:
     return np.asarray(np.median(errors, axis=0))
 
 
+@pytest.mark.long
 @machines
 def test_joints_cold_and_frame_warm(geometry: Geometry, wires: Wiring) -> None:
     """The truth has causes that no gauge sees: a little is left, but a little only."""

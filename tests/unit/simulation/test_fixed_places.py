@@ -45,6 +45,7 @@ def test_a_hidden_spring_is_found_and_the_error_falls(reference: Kind, machine: 
     assert compare(other, diagnosis.after.fitted).rms_um < 0.4 * compare(other).rms_um
 
 
+@pytest.mark.long
 def test_a_ballbar_shows_its_own_noise_and_its_wrong_length(tmp_path: Path) -> None:
     path = tmp_path / "bar.csv"
     compd.simulate_campaign("tripod-cmm", path, seed=4, reference="ballbar")

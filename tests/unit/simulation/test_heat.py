@@ -38,6 +38,7 @@ def test_steady_state_lets_out_what_the_drives_put_in() -> None:
     assert ((network.temperature_degC - 20.0) * [0.2, 0.6]).sum() == pytest.approx(heat_W.sum(), abs=1e-9)
 
 
+@pytest.mark.long
 def test_warm_up_rises_without_overshoot() -> None:
     warm = warm_up()
     before = dict.fromkeys(warm.thermometers_degC(), REFERENCE_degC)

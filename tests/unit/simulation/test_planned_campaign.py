@@ -265,6 +265,7 @@ def campaign(path: Path, other_days: int = 0) -> SimulatedRecording:
     )
 
 
+@pytest.mark.long
 def test_a_recording_of_the_planned_rows_on_the_same_machine(tmp_path: Path) -> None:
     up = {f"approach_{i}": 1 for i in (1, 2, 3)}
     warm = dict.fromkeys(WARM, 25.0)

@@ -65,6 +65,7 @@ def device(driver: str, options: Any) -> Any:
     return load(SIMULATED_GAUGES, driver, driver)(options, lambda channel: VALUES[channel])
 
 
+@pytest.mark.long
 def test_an_opc_ua_server_with_the_nodes_of_its_gauges() -> None:
     measured = gauge("opc_ua", channels=NODES)
     twin = OpcUaNodes("l", [device("opc_ua", measured.options)])
@@ -75,6 +76,7 @@ def test_an_opc_ua_server_with_the_nodes_of_its_gauges() -> None:
         twin.stop()
 
 
+@pytest.mark.long
 def test_a_server_that_stops_under_its_clients_leaves_nothing_that_waits(caplog: pytest.LogCaptureFixture) -> None:
     measured = gauge("opc_ua", channels=NODES)
     twin = OpcUaNodes("l", [device("opc_ua", measured.options)])
@@ -88,6 +90,7 @@ def test_a_server_that_stops_under_its_clients_leaves_nothing_that_waits(caplog:
     assert [record.getMessage() for record in caplog.records if record.name == "asyncio"] == []
 
 
+@pytest.mark.long
 @needs_mosquitto
 def test_a_publisher_on_the_topics_of_its_gauges(tmp_path: Path) -> None:
     measured = gauge("mqtt", channels=TOPICS, period_s=1.0)

@@ -67,6 +67,7 @@ def test_causes_of_the_same_distribution_differ() -> None:
     assert base.values != platform.values
 
 
+@pytest.mark.long
 def test_a_campaign_stays_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     def campaign() -> SimulatedRecording:
         return simulate_recording(load(TRIPOD), CAMPAIGN_SEED, [HiddenCause("joint_runout", 2.0)])

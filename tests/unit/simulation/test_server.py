@@ -239,6 +239,7 @@ def test_a_driver_without_a_simulated_device_is_named(monkeypatch: pytest.Monkey
         Simulation(configuration, world, directory, TurnedClock())
 
 
+@pytest.mark.long
 def test_the_command_serves_until_it_is_stopped() -> None:
     with run_directory() as directory:
         command = [sys.executable, "-m", "compd", "simulate", str(TRIPOD), "--directory", str(directory)]
@@ -272,6 +273,7 @@ def test_the_command_hides_a_cause_under_seal() -> None:
         assert name not in finished.stdout
 
 
+@pytest.mark.long
 def test_the_command_hides_a_cause_that_was_stated() -> None:
     with run_directory() as directory:
         options = ["--directory", str(directory), "--effect", "link_expansion=8", "--seconds", "0"]

@@ -14,6 +14,7 @@ import pytest
 
 from compd.errors import CompdError
 from compd.simulation.wires.simulation_directory import WRITTEN_BY, SimulationDirectory
+from tests.support.sampled import sampled
 from tests.support.simulated import TRIPOD, run_directory
 
 NAME = "tripod-cmm.yaml"
@@ -101,7 +102,7 @@ def test_a_configuration_that_no_simulator_wrote_is_not_replaced(directory: Path
     assert (directory / NAME).read_text() == "machine: mine\n"
 
 
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("end", sampled([signal.SIGINT, signal.SIGTERM, signal.SIGHUP], 3))
 def test_the_command_leaves_nothing_however_it_is_ended(directory: Path, end: signal.Signals) -> None:
     command = [sys.executable, "-m", "compd", "simulate", str(TRIPOD), "--directory", str(directory)]
     heeded = signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -145,6 +145,7 @@ def test_asking_where_the_tip_would_be_disturbs_nothing(geometry: Geometry, wire
     assert {name: asked.sense(name) for name in asked.names} == {name: left.sense(name) for name in left.names}
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_machine_and_another_does_not() -> None:
     first, second, other = (World(tripod(), wiring(), seed=seed, speedup=60.0) for seed in (7, 7, 8))
     for world in (first, second, other):

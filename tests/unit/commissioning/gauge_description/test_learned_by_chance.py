@@ -21,6 +21,7 @@ from compd.errors import CompdError
 from compd.gauge import LineFault
 from compd_drivers.serial_ascii import SerialAscii
 from tests.support.ascii_gauge import line_with
+from tests.support.sampled import sampled
 
 DEVICES_OF_A_RUN = 300
 SIGNS: Mapping[str, Callable[[str, bool], str]] = {
@@ -82,7 +83,7 @@ class Device(NamedTuple):
         return body + CHECKSUMS[self.checksum](body) + b"\r", shown
 
 
-@pytest.mark.parametrize("run", range(3))
+@pytest.mark.parametrize("run", sampled(range(3), 3))
 def test_what_is_learned_without_a_question_is_right(run: int) -> None:
     learned = 0
     for seed in range(run * DEVICES_OF_A_RUN, (run + 1) * DEVICES_OF_A_RUN):

@@ -76,6 +76,7 @@ def test_a_cause_outside_the_library_is_described_and_not_named(
     assert bool(diagnosis.next_measurement) == (covariate != "time_s"), "time varies by itself"
 
 
+@pytest.mark.long
 def test_a_step_in_time_is_an_effect_that_makes_a_constant_and_begins_then(tmp_path: Path) -> None:
     diagnosis = diagnose_with_cause(tmp_path, step_in_time, {})
     assert (diagnosis.verdict, diagnosis.steps) == ("unexplained", ())
@@ -102,6 +103,7 @@ def test_the_proposed_formula_can_be_pasted_and_lowers_the_error_to_the_floor(tm
     assert low < slope < high
 
 
+@pytest.mark.long
 def test_a_period_is_told_with_its_unit(tmp_path: Path) -> None:
     diagnosis = diagnose_with_cause(tmp_path, swing_in_time, {})
     (constant,) = diagnosis.depends_on[0].as_json()["constants"]

@@ -74,6 +74,8 @@ def test_what_a_command_has_changed_is_seen_at_the_next_opening(workbench, path,
     assert workbench.revision == revision, "its own change is no surprise"
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_a_long_recording_is_thinned_for_pictures_and_numbers_are_of_all_rows(tmp_path):
     path = record(tmp_path, gauges(12_000, 1), [hidden("link_expansion", 2.0)])
     workbench = Workbench(path, tmp_path / "tripod.model.yaml", None)
