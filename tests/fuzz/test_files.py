@@ -64,6 +64,7 @@ def test_a_changed_recording_is_one_or_is_refused(folder: Path, table: bytes, si
     assert is_told(refusal(lambda: read_recording(path), RecordingError, ConfigurationError))
 
 
+@pytest.mark.long
 @given(data=st.data())
 @examples(100)
 def test_a_changed_parquet_file_is_a_recording_or_is_refused(folder: Path, data: st.DataObject) -> None:
@@ -79,6 +80,8 @@ def test_a_changed_parquet_file_is_a_recording_or_is_refused(folder: Path, data:
     assert is_told(refusal(lambda: list(recording_blocks(changed, rows=7)), RecordingError))
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @given(data=st.data())
 @examples(150)
 def test_a_changed_model_file_is_one_or_is_refused(folder: Path, model_text: str, data: st.DataObject) -> None:

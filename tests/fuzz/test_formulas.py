@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -60,6 +61,8 @@ def expressions(draw: st.DrawFn, depth: int = 4) -> str:
             return f"{draw(st.sampled_from(['sin', 'exp', 'sqrt', 'log', 'abs']))}({draw(inside)})"
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @given(text=expressions(), k=st.floats(-1e300, 1e300), x=st.lists(st.floats(allow_nan=True), min_size=1, max_size=4))
 @examples(200)
 def test_a_formula_has_a_value_or_none_and_never_a_warning(text: str, k: float, x: list[float]) -> None:

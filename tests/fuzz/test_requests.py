@@ -111,6 +111,7 @@ def test_every_line_has_an_answer_an_error_or_a_documented_silence(
             assert asked.context.controller is client
 
 
+@pytest.mark.long
 @given(pieces=st.lists(st.binary(max_size=3000) | LINES | st.just(b"\n"), max_size=12))
 @examples(150)
 def test_any_stream_of_bytes_is_lines_and_errors(pieces: list[bytes]) -> None:

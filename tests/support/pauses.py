@@ -12,7 +12,7 @@ from compd.live.memory.shared_array import shared_floats
 from compd.live.realtime import sleep_until
 from tests.support.other_process import beside
 
-_STEP_S = 0.005
+_STEP_S = 0.01
 # Later than this, with the highest priority, is no matter of the processor's other work.
 _PAUSE_S = 0.01
 _PRIORITY = 90
@@ -60,8 +60,9 @@ class Pauses:
         os.sched_setaffinity(0, {processor})
         with suppress(OSError):  # where priority is not permitted, pauses look longer than they are
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
-        wake_s = time.monotonic() + _STEP_S
-        sleep_until(wake_s)
-        late_s = time.monotonic() - wake_s
-        if late_s > _PAUSE_S:
-            self._lost_s[i] += late_s
+        while True:
+            wake_s = time.monotonic() + _STEP_S
+            sleep_until(wake_s)
+            late_s = time.monotonic() - wake_s
+            if late_s > _PAUSE_S:
+                self._lost_s[i] += late_s

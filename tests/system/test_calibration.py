@@ -103,6 +103,7 @@ def test_p_values_are_uniform_where_nothing_is_hidden(tmp_path: Path) -> None:
     assert kstest(smallest_p_values(tmp_path, 200), "uniform").pvalue > 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", ["independent", "drifting"])
 def test_95_percent_intervals_hold_the_truth_in_a_sample(tmp_path: Path, noise: str) -> None:
     """Of 200 numbers a share of 95 % has a standard deviation of 1.5 %, 2 % as numbers of one fit err together."""

@@ -115,6 +115,7 @@ def test_ctrl_c_leaves_a_result_for_every_recording(fleet: Path, cluster: DaskCl
     assert sum("Ctrl-C ended the work" in problem for problem in problems) == RECORDINGS - 1
 
 
+@pytest.mark.long
 def test_a_run_goes_on_where_it_was_interrupted(fleet: Path, cluster: DaskCluster, tmp_path: Path) -> None:
     directory = tmp_path / "data"
     shutil.copytree(fleet, directory)

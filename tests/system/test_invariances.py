@@ -202,7 +202,7 @@ def changes() -> Iterator[object]:
         yield from (pytest.param(name, change, id=f"{name}: {change}", marks=marks) for change in case.changes)
 
 
-@pytest.mark.parametrize(("name", "change"), sampled(changes(), 4))
+@pytest.mark.parametrize(("name", "change"), sampled(changes(), 8))
 def test_the_diagnosis_stays_the_same(
     name: str, change: str, original_of: Callable[[str], Original], tmp_path: Path
 ) -> None:

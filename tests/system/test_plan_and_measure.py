@@ -89,6 +89,7 @@ def copied(short: Path, path: Path, began: datetime | None = None, **sidecar: An
     return path
 
 
+@pytest.mark.long
 def test_merged_recordings_keep_their_rows_apart(tmp_path: Path, short: Path) -> None:
     monday = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
     first = copied(short, tmp_path / "first.csv", monday, excluded_rows=[{"row": 3, "reason": "the beam was cut"}])

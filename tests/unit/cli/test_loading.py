@@ -47,6 +47,7 @@ def test_what_is_loaded_is_looked_through_neither_then_nor_later():
     assert gc.get_freeze_count() >= len(loaded)
 
 
+@pytest.mark.long
 def test_garbage_of_a_compilation_is_not_kept():
     Cyclic.freed = 0
     with loading():

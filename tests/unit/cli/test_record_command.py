@@ -26,6 +26,7 @@ from compd.recording.open_part import OpenPart
 from compd.recording.reader import read_recording
 from tests.support.live_machine import CONFIG
 from tests.support.running_daemon import supervised
+from tests.support.sampled import sampled
 
 TIMEOUT_S = 60
 NEVER_STALE_S = 1e6
@@ -157,7 +158,7 @@ def test_killed_while_it_writes_parquet_every_synchronised_row_is_there_and_repl
 
 
 @pytest.mark.usefixtures("drifting")
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("end", sampled([signal.SIGTERM, signal.SIGINT], 2))
 def test_it_ends_at_a_signal_with_everything_written(tmp_path, end):
     with daemon_at(tmp_path) as (configuration, _, client):
         with record_command(tmp_path, "--rate-hz", "20") as process:

@@ -43,6 +43,7 @@ def test_gauge_show_wraps_no_text_twice(printed):
     assert "no: None" not in printed("gauge", "show", "heidenhain_nd28x")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
 def test_check_names_every_line_and_cuts_no_head(printed, name):
     text = printed("check", CONFIG / name)

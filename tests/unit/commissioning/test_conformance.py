@@ -31,7 +31,7 @@ def failures(results: Sequence[tuple[str, CaseResult]]) -> list[str]:
     return [f"{wire}: {result.case}: {result.observed}" for wire, result in results if result.verdict == "FAIL"]
 
 
-@pytest.mark.parametrize("name", sampled(NAMES, 3))
+@pytest.mark.parametrize("name", sampled(NAMES, 8))
 def test_installed_driver_in_virtual_time(name: str) -> None:
     results = list(run_conformance(driver_under_test(name), on_real_wires=False))
     assert failures(results) == []
@@ -60,6 +60,7 @@ def test_every_driver_on_ptys_and_ports(name: str) -> None:
     assert failures(list(run_conformance(driver_under_test(name)))) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("form", "error"),
     [
@@ -130,7 +131,7 @@ def run_through(driver: DriverUnderTest, polls: Sequence[Sequence[Fault]]) -> No
     assert session.poll().ok
 
 
-@pytest.mark.parametrize("name", sampled(NAMES, 4))
+@pytest.mark.parametrize("name", sampled(NAMES, 8))
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_no_interleaving_of_faults_gives_a_wrong_number(name: str, data: st.DataObject) -> None:

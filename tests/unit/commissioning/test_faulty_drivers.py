@@ -109,14 +109,14 @@ def result_of(name: str, case: str) -> CaseResult:
     return next(result for _, result in run_conformance(driver(name), on_real_wires=False) if result.case == case)
 
 
-@pytest.mark.parametrize("name", sampled(RIGHT, 3))
+@pytest.mark.parametrize("name", sampled(RIGHT, 6))
 def test_a_right_driver_fails_in_nothing(name: str) -> None:
     results = [result for _, result in run_conformance(driver(name), on_real_wires=False)]
     assert [result for result in results if result.verdict == "FAIL"] == []
     assert sum(result.verdict == "pass" for result in results) >= 20
 
 
-@pytest.mark.parametrize("name", sampled(FAULTY, 3))
+@pytest.mark.parametrize("name", sampled(FAULTY, 8))
 def test_a_faulty_driver_is_found_and_its_fault_is_named(name: str) -> None:
     case, message = FAULTY[name]
     result = result_of(name, case)
@@ -138,6 +138,7 @@ def test_from_the_command_line(name: str, code: int) -> None:
     assert ("nothing failed" in result.output) == (not code)
 
 
+@pytest.mark.long
 def test_where_replies_do_not_say_whose_they_are_that_is_said() -> None:
     """Sylvac's replies have neither the unit of length nor an address."""
     driver = driver_under_test("sylvac_optors")
@@ -164,6 +165,7 @@ class InvalidForgotten(Modbus):
         self._map = tuple(channel.model_copy(update={"invalid": ()}) for channel in self._map)
 
 
+@pytest.mark.long
 def test_the_search_for_a_digit_ends_where_numbers_are_no_finer() -> None:
     shipped = driver_under_test("modbus")
     wrong = DriverUnderTest("x", InvalidForgotten, shipped.simulator, shipped.options)

@@ -120,6 +120,7 @@ def test_a_modbus_slave_is_no_preset(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.long
 def test_a_slave_without_the_registers_of_any_preset(tmp_path: Path) -> None:
     channels = [{"name": "a", "function": 4, "address": 100, "type": "int16", "unit": "1"}]
     line = modbus_slave(tmp_path, "modbus", unit=1, channels=channels)

@@ -74,6 +74,7 @@ def test_two_effects_are_fitted_together(blank: AlignedRecording) -> None:
     assert result.rms_um == pytest.approx(SIGMA_UM, rel=0.05)
 
 
+@pytest.mark.long
 def test_a_95_percent_interval_covers_the_truth_in_95_percent(blank: AlignedRecording) -> None:
     truth = hidden("backlash", 0.9, 1.1, 0.8)
     inside = []

@@ -14,6 +14,8 @@ from docs.worked_example.sheets import Sheets
 from docs.worked_example.spreadsheet import Address, Spreadsheet, column_letters
 from docs.worked_example.workbook import make_sheets
 
+pytestmark = pytest.mark.long
+
 MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
 
 
@@ -64,7 +66,6 @@ def compd_numbers(example: Example) -> Iterator[tuple[str, float]]:
     yield "values", float(losses.data.value_count)
 
 
-@pytest.mark.long
 def test_the_file_holds_compds_numbers_as_formulas(example: Example, sheets: Sheets, file: Path) -> None:
     numbers = dict(compd_numbers(example))
     assert set(numbers) | {"floor", "verdict"} == set(sheets.results)

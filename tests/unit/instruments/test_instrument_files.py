@@ -15,6 +15,8 @@ from compd.simulation.campaign.simulate_campaign import simulate_campaign
 from tests.support.instrument_files import OFFSET_S, SplitCampaign, split_campaign, write_export
 from tests.support.simulated import TRIPOD
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def split(tmp_path_factory: pytest.TempPathFactory) -> SplitCampaign:

@@ -117,6 +117,8 @@ def settings(url: str) -> Any:
     return SETTINGS.validate_python(keys)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_a_gauge_behind_a_device_server_is_read_and_found_again(server: DeviceServer) -> None:
     dial = gauge(**{"out": "?", "out_terminator": r"\r", "in": "%+07.3f", "in_terminator": r"\r\n"})
     latest = WatchedLatest(["dial.value"])

@@ -137,6 +137,7 @@ def test_lengths_are_told_in_the_unit_that_suits_them(mm: float, text: str) -> N
     assert frame_page.length_text(mm) == text
 
 
+@pytest.mark.long
 def test_command_prints_table_and_sentences_and_draws_a_page(tmp_path: Path) -> None:
     page = tmp_path / "pictures" / "page.html"
     result = CliRunner().invoke(app, ["paper", "instantaneous", "--page", str(page)], terminal_width=160)

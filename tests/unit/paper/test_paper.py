@@ -15,6 +15,7 @@ from compd.configuration import Configuration, load
 from compd.paper import drift_experiment, link_experiment, plate_experiment
 from compd.paper.reproduction import Reduction
 from compd.simulation.truth import strengths
+from tests.support.sampled import sampled
 from tests.support.simulated import TRIPOD
 
 
@@ -63,7 +64,7 @@ def test_figure_21_the_ball_stands_still_once_the_frame_is_measured(tripod: Conf
     assert len(result.time_h) > 50
 
 
-@pytest.mark.parametrize("figure", ["fig18", "fig20", "fig21"])
+@pytest.mark.parametrize("figure", sampled(["fig18", "fig20", "fig21"], 3))
 def test_command_prints_the_reduction_and_draws_a_page(tmp_path: Path, figure: str) -> None:
     page = tmp_path / "pictures" / "page.html"
     result = CliRunner().invoke(app, ["paper", figure, "--page", str(page)], terminal_width=160)

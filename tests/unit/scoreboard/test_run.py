@@ -45,6 +45,7 @@ def test_a_case_has_two_recordings_and_an_answer_apart_from_them(campaigns):
     assert read_answer(directory)["expected"]["groups"] == [["link_elasticity"]]
 
 
+@pytest.mark.long
 def test_a_case_that_is_there_is_not_made_again(campaigns):
     answer = prepared(campaigns)[0] / "answer.json"
     before = answer.stat().st_mtime_ns
@@ -52,12 +53,14 @@ def test_a_case_that_is_there_is_not_made_again(campaigns):
     assert answer.stat().st_mtime_ns == before
 
 
+@pytest.mark.long
 def test_the_diagnosis_of_a_case_is_scored(result):
     assert result["case"] == SHORT.name
     assert score(result).near
     assert result["other_floor_ratio"] < 2.0
 
 
+@pytest.mark.long
 def test_a_miss_is_on_the_page_with_what_was_hidden_and_said(result, tmp_path):
     missed = result | {"verdict": result["verdict"] | {"verdict": "adequate", "steps": [], "said": "It <is> fine."}}
     write_page(tmp_path / "page.html", [result, missed], tmp_path)
@@ -69,6 +72,7 @@ def test_a_miss_is_on_the_page_with_what_was_hidden_and_said(result, tmp_path):
     assert "python -m tests.scoreboard --case &#39;short:link_elasticityx4:7&#39;" in page
 
 
+@pytest.mark.long
 def test_the_tables_count_families_and_misses(result):
     missed = result | {"verdict": result["verdict"] | {"verdict": "adequate", "steps": []}}
     text = report([result, missed])

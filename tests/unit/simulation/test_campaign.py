@@ -59,6 +59,8 @@ def test_columns_are_those_of_the_example_recordings(recorded: SimulatedRecordin
     assert 0.8 * len(rows) < len(recorded.columns["time_s"]) < 1.3 * len(rows)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_sessions_points_repeats_and_loads(recorded: SimulatedRecording) -> None:
     time_s, session, point, visit = (column(recorded, name) for name in ("time_s", "session", "point", "visit"))
     assert np.all(np.diff(time_s) > 0)
@@ -78,6 +80,7 @@ def test_sessions_points_repeats_and_loads(recorded: SimulatedRecording) -> None
         assert np.ptp(column(recorded, f"temperature_{place}_degC")) > 2.0
 
 
+@pytest.mark.long
 def test_immediate_repeats_scatter_as_the_tracker_does(recorded: SimulatedRecording) -> None:
     again = np.diff(column(recorded, "visit")) == 0
     differences = np.concatenate([np.diff(column(recorded, f"reference_{axis}_mm"))[again] for axis in "xyz"])
@@ -85,6 +88,7 @@ def test_immediate_repeats_scatter_as_the_tracker_does(recorded: SimulatedRecord
     assert sigma_um == pytest.approx(TRACKER_SIGMA_UM, rel=0.15)
 
 
+@pytest.mark.long
 def test_a_pass_moves_at_constant_speed(recorded: SimulatedRecording) -> None:
     time_s, scale_mm = column(recorded, "time_s"), column(recorded, "scale_1_mm")
     quick = np.diff(time_s) < 0.25
@@ -139,6 +143,7 @@ def test_weak_disturbances_are_two_and_weak(recorded: SimulatedRecording) -> Non
         assert sizer.error_in_floors(again) == pytest.approx(0.2, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_weak_disturbance_is_not_stronger_than_it_can_be() -> None:
     """The joints' run-out across the links does next to nothing to a hexapod: no strength would be enough."""
     weak = CauseSizer(hexapod(), wiring(HEXAPOD), 6).weak_disturbances(["scale_expansion"])
@@ -155,6 +160,7 @@ def test_a_way_too_short_for_the_speed_is_passed_slowly() -> None:
     assert steady_s * speed_mm_per_s == pytest.approx(2.0), "half of the way"
 
 
+@pytest.mark.long
 def test_every_campaign_of_a_machine_has_rows_in_the_order_of_time(machine: Mechanism) -> None:
     """On the third day of machine 15 a pass goes to a place that is near."""
     plan = draw_campaign_plan(machine, 15, 2)
@@ -182,6 +188,7 @@ def test_what_is_asked_for() -> None:
     assert len(caught.value.problems) == 3
 
 
+@pytest.mark.long
 def test_the_same_seed_brings_home_the_same(machine: Mechanism) -> None:
     def rows() -> LoggedRows:
         days = draw_campaign_plan(machine, 6).thinned(4)

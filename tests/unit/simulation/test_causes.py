@@ -16,6 +16,7 @@ from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import NOTHING
 from compd.simulation.truth.weather import REFERENCE_degC, Weather
 from compd.simulation.truth.world import World
+from tests.support.sampled import sampled
 from tests.support.simulated import HEXAPOD, hexapod, tripod, tripod_with_tool_on_plate, wiring
 
 WARM_K = 3.0
@@ -78,7 +79,7 @@ def test_every_cause_that_the_library_has_is_in_the_truth_and_others_besides() -
     assert all(kind.covariates for name, kind in CAUSES.items() if name not in ours)
 
 
-@pytest.mark.parametrize("name", possible_causes(MACHINE))
+@pytest.mark.parametrize("name", sampled(possible_causes(MACHINE), 3))
 def test_without_strength_a_cause_does_nothing(name: str) -> None:
     with_it, without = ideal(cause(name, 0.0), WarmRoom()), ideal(None, WarmRoom())
     for world in (with_it, without):

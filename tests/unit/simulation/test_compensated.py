@@ -26,6 +26,7 @@ def gauge_values(world: World, wires: Wiring) -> GaugeValues:
     )
 
 
+@pytest.mark.long
 @arrangements
 def test_measuring_where_the_tip_is(geometry: Geometry, wires: Wiring) -> None:
     model = build_model(geometry, wires)

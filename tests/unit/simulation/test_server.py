@@ -261,6 +261,8 @@ def test_the_command_serves_until_it_is_stopped() -> None:
         assert list(directory.iterdir()) == []
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_the_command_hides_a_cause_under_seal() -> None:
     with run_directory() as directory:
         options = ["--directory", str(directory), "--hidden", "3", "--seconds", "0"]

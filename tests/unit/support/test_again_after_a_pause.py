@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from tests.support.paths import ROOT
 
 CONFTEST = """
@@ -57,6 +59,7 @@ def test_fails_in_every_pause(paused):
 """
 
 
+@pytest.mark.long
 def test_only_in_a_pause_and_four_times_at_most(tmp_path):
     (tmp_path / "conftest.py").write_text(CONFTEST)
     (tmp_path / "test_gauges.py").write_text(TESTS)

@@ -19,6 +19,7 @@ from compd.model.library import load_library
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
 from tests.support.measured import gauges, hidden, record, tripod
+from tests.support.sampled import sampled
 from tests.support.streams import in_blocks
 
 ROWS, BLOCK = 600, 70
@@ -43,7 +44,7 @@ def recorded(directory: Path, reference: dict[str, Any] | None, drop: tuple[str,
 
 
 @pytest.mark.parametrize("reference", [None, INSTRUMENT], ids=["own frame", "instrument's frame"])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", sampled(MODELS, 3))
 def test_the_same_numbers_as_in_memory(tmp_path: Path, model: str, reference: dict[str, Any] | None) -> None:
     recording = recorded(tmp_path, reference)
     effects = [initial_effect(LIBRARY[name], constants, 3) for name, constants in MODELS[model]]

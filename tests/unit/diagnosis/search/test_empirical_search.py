@@ -19,6 +19,7 @@ from compd.model.library import find_effect
 from compd.report.diagnosis_evidence import findings_table
 from tests.support.hidden_effects import LIBRARY, record_with_effects
 from tests.support.paths import SHARED
+from tests.support.sampled import sampled
 
 EFFECTS = list(LIBRARY.values())
 Cause = Callable[[AlignedRecording], FloatArray]
@@ -56,12 +57,15 @@ def diagnose_with_cause(path: Path, cause: Cause, effects: dict[str, tuple[float
 
 @pytest.mark.parametrize(
     ("cause", "covariate", "form"),
-    [
-        (swell_with_humidity, "humidity_pct", "linear"),
-        (rise_with_pressure, "pressure_hPa", "linear"),
-        (swing_in_time, "time_s", "periodic"),
-        pytest.param(drag_at_one_side, "tip_x_mm", "knee", marks=pytest.mark.long),
-    ],
+    sampled(
+        [
+            (swell_with_humidity, "humidity_pct", "linear"),
+            (rise_with_pressure, "pressure_hPa", "linear"),
+            (drag_at_one_side, "tip_x_mm", "knee"),
+            (swing_in_time, "time_s", "periodic"),
+        ],
+        3,
+    ),
 )
 def test_a_cause_outside_the_library_is_described_and_not_named(
     tmp_path: Path, cause: Cause, covariate: str, form: str
