@@ -77,7 +77,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 PYTEST := $(ONE_THREAD) $(BIN)/pytest
 
 test: $(STAMP)
-	$(PYTEST) -n 2 --dist worksteal $(COMPUTED)
+	$(PYTEST) -n 3 --dist worksteal $(COMPUTED)
 	$(PYTEST) -rs $(IN_REAL_TIME) $(HIDDEN) $(REAL_TIME)
 
 long: $(STAMP)
@@ -95,10 +95,10 @@ SERVICE := tests/system/test_service_in_container.py
 service: $(STAMP)
 	$(PYTEST) -m long -rsP $(SERVICE)
 
-# Every command and every piece of Python of README and docs/, one page after the other: they run machines in real time.
+# Every command and every piece of Python of README and docs/; the pages that run machines in real time beside no others.
 pages: $(STAMP)
 	$(PYTEST) -m sample -n 2 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_runs
-	$(PYTEST) -m sample tests/system/test_pages.py -k test_everything_on_a_page_with_a_machine_runs
+	$(PYTEST) -m sample -n 2 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_with_a_machine_runs
 
 # The worked examples of CONTRIBUTING.md.
 walks: $(STAMP)
@@ -109,7 +109,7 @@ hidden: $(STAMP)
 
 # The tutorial, a cause, a pair and a cause outside the library.
 hidden-sample: $(STAMP)
-	$(PYTEST) -m sample -n 2 $(HIDDEN)
+	$(PYTEST) -m sample -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
 
 lint: $(STAMP)
 	$(BIN)/ruff check

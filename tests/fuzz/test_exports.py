@@ -73,6 +73,8 @@ def test_a_changed_export_is_one_or_is_refused(folder: Path, content: bytes, opt
     assert told_or_read(folder / "export.txt", content, options)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @given(content=st.binary(max_size=300).filter(lambda content: not content.startswith((b"PK\x03\x04", b"HEADER::"))))
 @examples(200)
 def test_bytes_are_an_export_or_are_refused(folder: Path, content: bytes) -> None:

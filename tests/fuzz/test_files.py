@@ -45,6 +45,8 @@ def test_a_file_that_breaks_parsers_is_no_configuration(folder: Path, bomb: str)
     assert len(str(refused.value)) < 20_000
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @given(content=changed_bytes(SHIPPED))
 @examples(150)
 def test_a_changed_configuration_is_one_or_is_refused(folder: Path, content: bytes) -> None:

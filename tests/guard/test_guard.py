@@ -51,7 +51,7 @@ def test_examples_are_compared_as_by_0_1_0(name):
     assert differences(before, now) == []
 
 
-@pytest.mark.parametrize("name", sampled(VERDICTS, 3))
+@pytest.mark.parametrize("name", sampled(VERDICTS, 5))
 @pytest.mark.skipif(not EXAMPLES.is_dir(), reason=f"no example recordings in {EXAMPLES}")
 def test_examples_get_the_verdict_of_0_1_0(name):
     """The same word, the same effects, numbers within a standard error, and every key that a program may read."""

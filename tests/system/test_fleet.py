@@ -170,6 +170,8 @@ def kills_at(deadly: int, number: int) -> int:
     return number**2
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_an_item_that_kills_its_worker_is_one_outcome() -> None:
     items = [*range(20), -1]
     with open_cluster(processes=1) as client:

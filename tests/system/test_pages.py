@@ -14,7 +14,7 @@ from tests.support.paths import ROOT
 TUTORIAL = "docs/tutorials/missing-effect.md"
 
 
-# A machine that is simulated in real time has both processors for itself; other pages run side by side.
+# A machine that is simulated in real time has no pages beside it that compute.
 MACHINE = re.compile(r"^\$ (compd (simulate|run|demo|page)|make demo)\b", re.MULTILINE)
 PAGES = [name for name in page_names() if name != TUTORIAL]
 WITH_MACHINE = [name for name in PAGES if MACHINE.search((ROOT / name).read_text(encoding="utf-8"))]

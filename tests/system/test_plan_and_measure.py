@@ -115,6 +115,7 @@ def test_merged_recordings_keep_their_rows_apart(tmp_path: Path, short: Path) ->
     np.testing.assert_array_equal(both.columns["scale_1_mm"][: one.rows], one.columns["scale_1_mm"])
 
 
+@pytest.mark.long
 def test_an_unknown_time_between_recordings_is_said(tmp_path: Path, short: Path) -> None:
     first, second = copied(short, tmp_path / "first.csv"), copied(short, tmp_path / "second.csv")
     assert "1 h is put between them" in compd("recording", "merge", first, second, "--out", tmp_path / "both.csv")

@@ -59,7 +59,7 @@ LENGTH = {"quantity": "link_length", "sigma_um": 1.0}
                 for links in ([1], [2], [1, 2, 3], [1, 2, 3, 4, 5, 6])
             ),
         ],
-        8,
+        9,
     ),
 )
 def test_what_an_external_recording_follows_is_described(

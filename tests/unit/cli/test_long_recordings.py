@@ -46,6 +46,8 @@ def test_compare_goes_through_it_in_blocks(recorded: Path) -> None:
     assert report["largest_row_xyz"].keys() == {"x", "y", "z"}
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_compare_says_what_rests_on_the_sample(recorded: Path, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     text = " ".join(run("compare", recorded, "--html", page).split())
@@ -57,6 +59,7 @@ def test_compare_says_what_rests_on_the_sample(recorded: Path, tmp_path: Path) -
     assert "means over all rows" not in written
 
 
+@pytest.mark.long
 def test_diagnose_takes_a_sample_and_says_so(recorded: Path) -> None:
     page = recorded.with_name("page.html")
     assert json.loads(run("diagnose", recorded, "--json", "--html", page))["sample"] == {"rows": ROWS, "of": ROWS}
@@ -68,6 +71,7 @@ def test_a_file_that_cannot_be_counted_is_left_to_who_reads_it_whole(recorded: P
     assert not recording_stream.is_long(recorded.with_name("none.csv"))
 
 
+@pytest.mark.long
 def test_effects_are_fitted_to_all_rows(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(draw_sample, "__defaults__", (100, *(draw_sample.__defaults__ or ())[1:]))
     model = tmp_path / "run.model.yaml"

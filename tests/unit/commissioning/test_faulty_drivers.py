@@ -128,6 +128,7 @@ def test_every_driver_of_the_file_is_tried() -> None:
     assert set(DRIVERS) == {*RIGHT, *FAULTY}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "code"), [("AnyAddress", 1), ("Addressed", 0)])
 def test_from_the_command_line(name: str, code: int) -> None:
     gauge = f"{inspect.getfile(DRIVERS[name])}:{name}"

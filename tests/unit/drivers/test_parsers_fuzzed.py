@@ -191,6 +191,7 @@ described_ascii = driver(
 )
 
 
+@pytest.mark.long
 @bounded
 @given(mutated(ASCII))
 @example(b"M,+999.9999,    0.00\r\n")

@@ -182,7 +182,7 @@ def made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     sys.modules.pop("made_up_presets", None)
 
 
-@pytest.mark.parametrize("name", sampled(MADE_UP, 3))
+@pytest.mark.parametrize("name", sampled(MADE_UP, 4))
 def test_a_yaml_file_and_its_transcript_are_a_new_gauge(made_up: Path, name: str) -> None:
     assert name in names(GAUGES)
     assert name in names(SIMULATED_GAUGES)

@@ -144,6 +144,8 @@ def test_distances_know_no_frame() -> None:
     assert not is_spread(place_mm[:2])
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_any_measurement_is_joined_rightly_or_refused() -> None:
     """Places visited again, repeats, a missing and a strange point, all at random: of 60, most are joined."""
     joined = 0

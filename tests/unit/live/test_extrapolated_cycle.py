@@ -84,6 +84,7 @@ def test_the_uncertainty_of_the_tip_grows_with_age_and_how_surely_the_motion_is_
     assert (as_read > 5 * known).all()
 
 
+@pytest.mark.long
 def test_the_uncertainty_by_age_is_that_of_each_length_changed_by_itself():
     u_mm_per_s, step_mm = 2.0, 1e-3
     live = with_noise(machine(), 0.1)

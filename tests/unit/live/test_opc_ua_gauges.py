@@ -242,6 +242,8 @@ def test_a_server_that_stands_still_is_lost_though_its_connection_is_open(server
         latest.wait_for_value("g.a", 1.6)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_user_and_password_out_of_a_file(tmp_path: Path) -> None:
     secret = tmp_path / "secret"
     secret.write_text("open sesame\n")

@@ -42,7 +42,7 @@ def record(run, name, cycles, every=1):
 
 @pytest.mark.parametrize(
     ("name", "on_stale", "on_limit"),
-    sampled(product(["tripod-cmm.yaml", "hexapod.yaml"], ["hold", "fade", "stop"], ["clamp", "refuse"]), 5),
+    sampled(product(["tripod-cmm.yaml", "hexapod.yaml"], ["hold", "fade", "stop"], ["clamp", "refuse"]), 7),
 )
 def test_a_recorded_run_replays_bit_for_bit(tmp_path, name, on_stale, on_limit):
     run = Run(machine(name, on_stale=on_stale, on_limit=on_limit), seed=11)

@@ -84,6 +84,7 @@ def test_while_comparators_are_held_their_age_is_skew_and_hold_s_limits_it():
     assert held.skew_s == pytest.approx(0.2, abs=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lost", ["joints.1", "cabinet.t1"])
 def test_degraded_groups_count_until_they_are_absent(lost):
     live = machine(on_stale="degrade")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import random
 
+import pytest
+
 from compd.page.moments import Moments
 
 
@@ -34,6 +36,7 @@ def test_before_the_first_there_is_none():
     assert Moments().nearest(1000.0) is None
 
 
+@pytest.mark.long
 def test_what_is_kept_does_not_grow_after_an_hour():
     moments, sizes = Moments(), []
     for second in range(3 * 3600):

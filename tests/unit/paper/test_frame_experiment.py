@@ -78,6 +78,7 @@ def test_the_slope_is_two_and_is_fitted(result: FrameResult) -> None:
     assert frame_experiment.order(replace(result, by_size=first_order)) == pytest.approx(1.0)
 
 
+@pytest.mark.long
 def test_at_the_crossing_the_difference_is_the_noise(configuration: Configuration, result: FrameResult) -> None:
     directions = np.random.default_rng([3, 45]).normal(size=(frame_experiment.DIRECTIONS, 9))
     directions /= np.abs(directions).max(axis=1, keepdims=True)
@@ -120,6 +121,7 @@ def test_a_warm_up_is_far_below_the_noise(result: FrameResult) -> None:
     assert 0 < result.warm_up.tip_mm.max() * 1e3 < 0.05 * result.noise_um
 
 
+@pytest.mark.long
 def test_directions_without_an_exact_frame_are_said_and_not_fitted(result: FrameResult) -> None:
     tip_mm = result.by_size.tip_mm.copy()
     tip_mm[-1, 0] = np.nan

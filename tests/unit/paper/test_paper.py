@@ -46,6 +46,7 @@ def test_figure_20_has_136_distances_and_the_joints_gain_most_of_it(tripod: Conf
     assert "32 %" in first.paper
 
 
+@pytest.mark.long
 def test_figure_20_gains_nothing_where_the_joints_are_perfect(
     tripod: Configuration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -55,6 +56,7 @@ def test_figure_20_gains_nothing_where_the_joints_are_perfect(
     assert abs(plate_experiment.reductions(result)[0].percent) < 5.0
 
 
+@pytest.mark.long
 def test_figure_21_the_ball_stands_still_once_the_frame_is_measured(tripod: Configuration) -> None:
     result = drift_experiment.run(tripod, 3)
     z, x, y = drift_experiment.reductions(result)

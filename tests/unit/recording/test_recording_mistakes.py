@@ -240,6 +240,8 @@ def test_file_of_another_kind(tmp_path: Path, content: bytes, wanted: str) -> No
     assert wanted in "\n".join(problems_of(write_recording_files(tmp_path, content)))
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(data=st.data())
 def test_nothing_but_words_comes_of_any_file(tmp_path: Path, data: st.DataObject) -> None:

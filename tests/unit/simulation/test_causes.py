@@ -91,6 +91,7 @@ def test_without_strength_a_cause_does_nothing(name: str) -> None:
     assert shown[0] == pytest.approx(shown[1], abs=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("geometry", [hexapod(), tripod_with_tool_on_plate()], ids=["hexapod", "tool on plate"])
 def test_other_machines_have_causes_too(geometry: Any) -> None:
     machine = Mechanism(geometry)

@@ -285,6 +285,7 @@ def test_the_command_hides_a_cause_that_was_stated() -> None:
         assert answer["effects"] == {"link_expansion": 8.0}
 
 
+@pytest.mark.long
 def test_the_machines_own_directory_is_refused_and_left_alone() -> None:
     with run_directory() as directory:
         own = directory / TRIPOD.name

@@ -64,7 +64,7 @@ def diagnose_with_cause(path: Path, cause: Cause, effects: dict[str, tuple[float
             (drag_at_one_side, "tip_x_mm", "knee"),
             (swing_in_time, "time_s", "periodic"),
         ],
-        3,
+        4,
     ),
 )
 def test_a_cause_outside_the_library_is_described_and_not_named(
@@ -91,6 +91,8 @@ def test_a_step_in_time_is_an_effect_that_makes_a_constant_and_begins_then(tmp_p
     assert first.explained_fraction > 0.95
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_the_proposed_formula_can_be_pasted_and_lowers_the_error_to_the_floor(tmp_path: Path) -> None:
     diagnosis = diagnose_with_cause(tmp_path, swell_with_humidity, {})
     finding = diagnosis.depends_on[0].as_json()

@@ -95,12 +95,18 @@ def test_what_cannot_be_read_is_shown_with_the_reason(client, recordings):
 
 @pytest.mark.parametrize(
     ("name", "keys"),
-    [
-        ("rest", BY_ORDER),
-        ("time", {"recording": GAUGES, "export": TRACK, "frame": "machine", "sigma_um": 0.25}),
-        ("moving", {"recording": GAUGES, "export": TRACK, "moving": True, "offset_s": 137.25}),
-        ("german", {"recording": GAUGES, "export": GERMAN_TRACK, "columns": ["time", "x", "y", "z"], "decimal": ","}),
-    ],
+    sampled(
+        [
+            ("moving", {"recording": GAUGES, "export": TRACK, "moving": True, "offset_s": 137.25}),
+            ("rest", BY_ORDER),
+            ("time", {"recording": GAUGES, "export": TRACK, "frame": "machine", "sigma_um": 0.25}),
+            (
+                "german",
+                {"recording": GAUGES, "export": GERMAN_TRACK, "columns": ["time", "x", "y", "z"], "decimal": ","},
+            ),
+        ],
+        4,
+    ),
 )
 def test_what_is_written_is_what_the_command_line_writes(client, recordings, name, keys):
     before = files(recordings)

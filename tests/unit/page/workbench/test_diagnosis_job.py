@@ -43,6 +43,8 @@ def test_its_steps_its_result_and_its_page(path):
     assert job.has_ended
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_effects_of_ones_own_are_tried_too(path, tmp_path):
     own = tmp_path / "own.effects.yaml"
     own.write_text(

@@ -51,6 +51,8 @@ def test_before_the_first_there_is_none(client):
     assert client.post(f"{BASE}/diagnosis", json={"cancel": True}).json() == {"state": "none"}
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_every_browser_gets_the_newest_and_is_told_that_the_model_has_changed_since(client):
     answer, revision = begun(client)
     running = answer.json()

@@ -74,7 +74,7 @@ def test_who_may_operate_saves_and_deletes(client_of, tmp_path):
     assert list(tmp_path.glob("*.yaml")) == []
 
 
-@pytest.mark.parametrize("declaration", sampled(JUNK, 3))
+@pytest.mark.parametrize("declaration", sampled(JUNK, 5))
 @pytest.mark.parametrize("path", ["formula", "own"])
 def test_what_is_no_effect_has_an_answer(client_of, path, declaration, tmp_path):
     assert post(client_of("operate"), path, {"declaration": declaration}).status_code in (200, 400, 409)

@@ -35,6 +35,7 @@ def test_rows_are_left_out_and_count_again(workbench, path):
     assert (again["used"], again["rms"], again["excluded"]) == (used, rms, {})
 
 
+@pytest.mark.long
 def test_very_many_rows_are_left_out_at_once(tmp_path):
     path = record(tmp_path, gauges(6_000, 1), [])
     workbench = Workbench(path, tmp_path / "tripod.model.yaml", None)
