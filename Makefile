@@ -76,6 +76,7 @@ IN_REAL_TIME := -n 2 --dist loadfile
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 PYTEST := $(ONE_THREAD) $(BIN)/pytest
 
+# Three at once: some of them wait for a process or a line.
 test: $(STAMP)
 	$(PYTEST) -n 3 --dist worksteal $(COMPUTED)
 	$(PYTEST) -rs $(IN_REAL_TIME) $(HIDDEN) $(REAL_TIME)

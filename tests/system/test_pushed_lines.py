@@ -111,6 +111,8 @@ def keep_old_value(broker: Broker) -> None:
         gateway.publish("cell/scale_1", json.dumps({"mm": 99.0, "t": when}), retain=True)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 @pytest.mark.timeout(120)
 def test_a_server_that_stops_and_is_started_again() -> None:
     line = {"kind": "opc_ua", "endpoint": "opc.tcp://192.0.2.1:4840"}

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
+
 from compd.live.service.requests import REQUESTS, SENT_MESSAGES
 from docs.generate.live_examples import exchanges
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_every_message_has_an_example_of_its_own_keys() -> None:
     examples = exchanges()
     assert {*REQUESTS, *SENT_MESSAGES} <= examples.keys()

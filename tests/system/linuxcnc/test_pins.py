@@ -13,7 +13,7 @@ from tests.support.setpoint_sender import SetpointSender
 from tests.support.simulated import run_directory
 from tests.support.watching import until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
+pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
 
 # What the daemon asks for with the base of config/hexapod.yaml up by 10 um at machine zero.
 UP_10_UM_MM = 0.00914
@@ -59,6 +59,7 @@ def settled_mm(controller: LinuxCnc, mm: float) -> None:
     until(f"{mm} mm are added", lambda: added_mm(controller) == pytest.approx([mm] * 6, abs=1e-7))
 
 
+@pytest.mark.sample
 def test_the_correction_is_added_to_the_command_and_the_controller_sees_no_following_error(
     armed: LinuxCnc, sender: SetpointSender
 ) -> None:

@@ -51,7 +51,6 @@ def diagnosed(tab):
     until(tab, DONE)
 
 
-@pytest.mark.sample
 def test_stages_then_the_verdict_then_the_evidence_and_its_buttons(open_tab, tmp_path):
     tab = open_tab("evidence.model.yaml")
     tab.locator("#diagnose").click()

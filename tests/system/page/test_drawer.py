@@ -10,7 +10,7 @@ from compd.client import connect
 from tests.support.live_models import file_with
 from tests.support.live_page import LivePage, opened, page_process, until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
+pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
 
 
 @pytest.fixture
@@ -36,6 +36,7 @@ def confirmed(tab, order, done):
     return command
 
 
+@pytest.mark.sample
 def test_a_model_is_chosen_tried_adopted_and_left(with_models, live, tmp_path):
     tab = with_models
     tab.keyboard.press("o")
@@ -63,6 +64,7 @@ def test_a_model_is_chosen_tried_adopted_and_left(with_models, live, tmp_path):
     until(tab, "compd.live.setpoint.sources_mm && !compd.live.setpoint.sources_mm.link_zero")
 
 
+@pytest.mark.sample
 def test_a_name_that_is_not_in_the_list_is_refused_and_so_is_a_path(with_models, tmp_path):
     tab = with_models
     tab.keyboard.press("o")

@@ -90,7 +90,6 @@ def test_a_column_is_named_by_a_click_and_one_that_is_not_measured_is_told(open_
     until(tab, f"{problem('#formula-id')} !== '' && !{problem('#formula-id')}.includes('is no name')")
 
 
-@pytest.mark.sample
 def test_it_is_kept_there_after_opening_anew_and_added_as_the_command_adds_it(open_tab, directory):
     tab = open_tab("kept.model.yaml")
     file = directory / "own.effects.yaml"

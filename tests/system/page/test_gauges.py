@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.live_page import opened, until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
+pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
 
 PAINTED = """[...document.querySelectorAll('.spark')].filter((canvas) =>
   canvas.width && canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((v) => v)).length"""
@@ -34,6 +34,7 @@ def test_the_minute_before_is_there_when_the_page_opens(tab, chromium, live):
         assert other.evaluate(f"{times}.every((time, k) => !k || time > {times}[k - 1])")
 
 
+@pytest.mark.sample
 def test_the_faults_of_a_gauge_are_counted_and_its_accept_button_stays_while_numbers_change(tab, live):
     tab.locator("#gauge-table button").click()
     live.machine.ask("FAULT", line="frame_u", fault="unplugged")

@@ -40,7 +40,6 @@ def test_every_part_shows_numbers(tab):
 
 
 @pytest.mark.long
-@pytest.mark.sample
 def test_dragging_and_keys_turn_the_machine(tab):
     until(tab, "compd.live.scene && !compd.unpainted")
     tab.keyboard.press(" ")  # one and the same moment
@@ -80,7 +79,6 @@ def test_space_freezes_all_but_the_banner(tab):
 
 
 @pytest.mark.long
-@pytest.mark.sample
 def test_scrubbing_shows_the_machine_links_tip_and_gauges_of_that_moment(tab, live):
     """A gauge of the frame is moved; then the page goes back to before that, and forth."""
     until(tab, "document.querySelector('#hour-chart canvas')")
@@ -108,7 +106,6 @@ def test_scrubbing_shows_the_machine_links_tip_and_gauges_of_that_moment(tab, li
 
 
 @pytest.mark.long
-@pytest.mark.sample
 def test_arrows_and_points_scrub_by_a_second_and_a_tenth(tab):
     until(tab, "document.querySelector('#hour-chart canvas') && compd.live.unix_s")
     unix_s = tab.evaluate("compd.live.unix_s")

@@ -11,7 +11,7 @@ from compd.errors import DaemonError
 from tests.support.live_models import file_with
 from tests.support.live_page import opened, until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
+pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
 
 # Where the computer has too much to do, a gauge may be late just when zero is taken; a person tries again, too.
 TRIES = 5
@@ -147,6 +147,7 @@ def choose(tab, file):
     tab.locator("#drawer input[aria-label^='Model file']").fill(file.name)
 
 
+@pytest.mark.sample
 def test_zero(tab, live, daemon):
     before = daemon.status()["zero"]["taken_at"]
     text = asked(tab, "zero")
@@ -224,6 +225,7 @@ def test_shadow(tab, live, daemon, model):
     until(tab, "document.querySelector('.strip small').textContent.includes('shadow')")
 
 
+@pytest.mark.sample
 def test_adopt(tab, live, daemon, model):
     daemon.model(str(model), shadow=True)
     until(tab, "compd.live.setpoint?.shadow?.correction_mm && compd.slow.status.model.shadow")
@@ -237,6 +239,7 @@ def test_adopt(tab, live, daemon, model):
     until(tab, "document.querySelector('#budget .legend').textContent.includes('link expansion')")
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("named", ["", "another"])
 def test_only_the_model_whose_change_was_told_is_adopted(tab, live, daemon, model, named):
     """Another file is refused, and so is none, which would be to run without effects."""
@@ -267,6 +270,7 @@ def test_no_model(tab, live, daemon, model):
     until(tab, "!document.querySelector('#budget .legend').textContent.includes('link expansion')")
 
 
+@pytest.mark.sample
 def test_arming_ends_with_the_connection(tab, chromium, live):
     with opened(chromium, live) as other:
         other.keyboard.press("o")
@@ -282,6 +286,7 @@ def test_arming_ends_with_the_connection(tab, chromium, live):
         assert answer == 403
 
 
+@pytest.mark.sample
 def test_disarming_ends_it_at_once(tab):
     tab.keyboard.press("o")
     arm(tab)

@@ -89,7 +89,6 @@ def chosen(tab, label):
     return tab.eval_on_selector_all(f"#plan select[aria-label^='{label}']", "selects => selects.map((s) => s.value)")
 
 
-@pytest.mark.sample
 def test_what_a_card_says_is_alike_is_planned_from_its_button(tab):
     tab.locator(".effect[data-effect=link_elasticity]").click()
     tab.get_by_role("button", name="Plan what tells them apart").click()

@@ -6,6 +6,7 @@ import pytest
 
 from compd.live.loop.states import State
 from tests.support.live_page import opened, until
+from tests.support.sampled import sampled
 from tests.support.scripted_page import scripted
 
 pytestmark = pytest.mark.timeout(180)
@@ -74,7 +75,7 @@ def page(tmp_path_factory):
         yield started
 
 
-@pytest.fixture(scope="module", params=["light", "dark"])
+@pytest.fixture(scope="module", params=sampled(["light", "dark"], 2))
 def tab(chromium, page, request):
     page.link.tell(State.OK, "")
     with opened(chromium, page, color_scheme=request.param, viewport=SIZES["monitor"]) as opened_tab:

@@ -110,7 +110,6 @@ def test_a_step_is_taken_back_and_keys_do_what_the_mouse_does(open_tab, director
     assert [step.kind for step in read_stored(directory / "keys.model.yaml").steps] == ["add", "undo"]
 
 
-@pytest.mark.sample
 def test_of_two_browsers_the_second_is_told(open_tab):
     first, second = open_tab("two.model.yaml"), open_tab("two.model.yaml")
     add_first(first)
@@ -134,7 +133,6 @@ def lasso(tab, corners):
     tab.mouse.up()
 
 
-@pytest.mark.sample
 def test_rows_are_chosen_in_one_picture_and_left_out_with_a_reason(open_tab, directory):
     tab = open_tab("rows.model.yaml")
     tab.locator("[role=tab]", has_text="time").click()

@@ -18,7 +18,6 @@ REAL = SHARED / "real"
 pytestmark = [
     pytest.mark.timeout(300),
     pytest.mark.long,
-    pytest.mark.sample,
     pytest.mark.skipif(not REAL.is_dir(), reason=f"{REAL} is not there: recordings of real machines"),
 ]
 

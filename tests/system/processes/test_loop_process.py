@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.support.daemon_process import Daemon
 from tests.support.live_models import file_with
@@ -56,6 +57,8 @@ def largest_gap(seen: list[Seen]) -> int:
     return max(int(b["seq"] - a["seq"] - 1) for a, b in itertools.pairwise(seen))
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_adopting_a_model_and_a_shadow_costs_no_cycle(machine: Machine, tmp_path: Path) -> None:
     rate_hz = 1000.0
     shift_um = [60.0, -45.0, 30.0]

@@ -32,7 +32,6 @@ OTHERS = [
 ]
 
 IDS = ["tripod", "hexapod", "under", "beside", "tool on plate"]
-arrangements = pytest.mark.parametrize(("geometry", "wires"), MACHINES + OTHERS, ids=IDS)
 machines = pytest.mark.parametrize(("geometry", "wires"), MACHINES, ids=["tripod", "hexapod"])
 
 
