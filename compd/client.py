@@ -186,13 +186,15 @@ class Client:
         tip_B0_mm: Sequence[float] | None = None,
         rotation_B0_rad: Sequence[float] | None = None,
         tip_P_mm: Sequence[float] | None = None,
+        time_s: float | None = None,
+        id: int | None = None,
     ) -> None:
         """Set the tip's target, as the controller; the next setpoint is computed for it.
 
-        The first client with a target is the controller until it disconnects or calls `release`. A target may be used
-        for `sockets.target.valid_for_s` (5 s unless configured): repeat it more often than that, also while the machine
-        stands still, or the setpoints become invalid. There is no answer: where the daemon refuses the target, the
-        method that reads next raises DaemonError.
+        The first client with a target is the controller until it disconnects or calls `release`. Of several targets
+        that wait the newest counts. A target may be used for `sockets.target.valid_for_s` (5 s unless configured):
+        repeat it more often than that, also while the machine stands still, or the setpoints become invalid. There is
+        no answer: where the daemon refuses the target, the method that reads next raises DaemonError.
 
         Parameters
         ----------
@@ -202,14 +204,20 @@ class Client:
             For a hexapod, the rotation vector of {P} in {B0}, rad; None for the attitude at machine zero.
         tip_P_mm : three floats, optional
             With the tool on the surface plate, instead of `tip_B0_mm`: the touched place in {P}, mm.
+        time_s : float, optional
+            When the target was made, s on the daemon's monotonic clock: on the same computer `time.monotonic()`. None
+            for when it comes to the daemon, which is later where the network has stalled.
+        id : int, optional
+            Any number from 0 to 2**53: setpoints that answer the target have it as `target_id`.
 
         Raises
         ------
         DaemonError
             Where the daemon has gone.
         """
-        keys = {"tip_B0_mm": tip_B0_mm, "rotation_B0_rad": rotation_B0_rad, "tip_P_mm": tip_P_mm}
-        given = {key: list(value) for key, value in keys.items() if value is not None}
+        vectors = {"tip_B0_mm": tip_B0_mm, "rotation_B0_rad": rotation_B0_rad, "tip_P_mm": tip_P_mm}
+        given: Message = {key: list(value) for key, value in vectors.items() if value is not None}
+        given |= {key: value for key, value in (("time_s", time_s), ("id", id)) if value is not None}
         self._connection.send({"class": "TARGET", **given})
 
     def release(self) -> None:

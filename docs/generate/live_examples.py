@@ -111,7 +111,8 @@ def _talk(client: Connection, other: Connection) -> Mapping[str, Exchange]:
     zero = _zero(client)
     setpoint = client.next_setpoint("ok")
     client.ask({"class": "WATCH", "rate_hz": 0}, "WATCH")
-    target = client.ask({"class": "TARGET", "tip_B0_mm": [round(number, 1) + 0.0 for number in setpoint["tip_B0_mm"]]})
+    tip_mm = [round(number, 1) + 0.0 for number in setpoint["tip_B0_mm"]]
+    target = client.ask({"class": "TARGET", "tip_B0_mm": tip_mm, "id": 1})
     watch = client.ask({"class": "WATCH", "rate_hz": 10}, "WATCH")
     driven = client.next_setpoint("ok", "slewing")
     # the answer to WATCH says that the target before it has been heard

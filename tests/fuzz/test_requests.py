@@ -123,7 +123,7 @@ def test_any_stream_of_bytes_is_lines_and_errors(pieces: list[bytes]) -> None:
         for piece in [*pieces, b'\n{"class":"VERSION"}\n']:
             other.sendall(piece)
             while select.select([one], [], [], 0)[0]:
-                client.receive()
+                client.receive(0.0)
                 while client.has_lines:
                     received.append(client.next_line())
         assert client.open

@@ -89,7 +89,8 @@ class Run:
         tip_mm = tip_mm + self.random.uniform(-20, 20, 3)
         turned = self.machine.model.attitude_is_free and self.random.random() < 0.5
         rotation = tuple(self.random.uniform(-0.05, 0.05, 3).tolist()) if turned else None
-        self.machine.commands.target = Target(tuple(tip_mm.tolist()), rotation)
+        now_s, number = self.machine.now_s, self.machine.tick
+        self.machine.commands.target = Target(tuple(tip_mm.tolist()), rotation, time_s=now_s, id=number)
 
     def release(self):
         self.machine.commands.target = None

@@ -21,11 +21,16 @@ class Target:
     rotation_B0_rad : (3), rotation vector of {P} in {B0}; None for the attitude at machine zero. The attitude of a
         tripod follows from its tip.
     valid_until_s : monotonic time (s) after which it is too old to be used; inf for never.
+    time_s : monotonic time (s) at which it was made or, where the controller does not say, came; nan where it was
+        recorded before targets had times.
+    id : what the controller calls it; None for nothing.
     """
 
     tip_mm: tuple[float, ...]
     rotation_B0_rad: tuple[float, ...] | None = None
     valid_until_s: float = math.inf
+    time_s: float = math.nan
+    id: int | None = None
 
 
 class Commands:

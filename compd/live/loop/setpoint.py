@@ -12,6 +12,7 @@ import orjson
 
 from compd.arrays import FloatArray
 from compd.compensation.values import CorrectionShares
+from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.packet_layout import (
     BODY,
@@ -99,7 +100,8 @@ class Setpoint(NamedTuple):
     values : None unless valid, so that no value can be taken for a good one.
     model : hash of the model file that was applied; "" without effects.
     skew_s : how much later than the oldest the newest length that was used was measured; nan where that is not known.
-    inputs, state_before : what it was computed from, for READINGS messages; they are no part of a SETPOINT.
+    inputs, state_before : what it was computed from, for READINGS messages; of them a SETPOINT has the target's time
+        and id.
     """
 
     seq: int
@@ -134,6 +136,8 @@ class Setpoint(NamedTuple):
             "valid_until": round(self.valid_until_s, _DECIMALS_S),
             "mode": self.mode,
         }
+        if self.inputs is not None and self.inputs.target is not None:
+            message |= _target_named(self.inputs.target)
         if self.model:
             message["model"] = self.model
         if math.isfinite(self.age_s):
@@ -189,6 +193,14 @@ class Setpoint(NamedTuple):
 def setpoint_line(message: Mapping[str, Any]) -> bytes:
     """A SETPOINT message as it is sent; orjson takes a tenth of the time of the standard library."""
     return orjson.dumps(message) + b"\n"
+
+
+def _target_named(target: Target) -> dict[str, Any]:
+    """Which target it is. One without a time was recorded by a release that did not tell it."""
+    if not math.isfinite(target.time_s):
+        return {}
+    named = {"target_time_s": round(target.time_s, _DECIMALS_S)}
+    return named if target.id is None else named | {"target_id": target.id}
 
 
 def _json_values(values: SetpointValues) -> dict[str, Any]:

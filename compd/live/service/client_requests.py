@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from compd.live.service.client_session import ClientSession, Stream
+from compd.live.service.client_session import ClientSession, Place, Stream
 from compd.live.service.message_keys.budget import BudgetKeys
 from compd.live.service.message_keys.machine import MachineKeys
 from compd.live.service.message_keys.message import Keys, SentMessage, VersionKeys
@@ -17,6 +17,8 @@ from compd.live.service.order import OrderRequest
 from compd.live.service.request import Asker, Request
 from compd.live.service.request_context import RequestContext, SendLater
 
+# Every program has whole numbers up to here exactly: 2 to the power of 53.
+LARGEST_ID = 2**53
 Coordinate = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
 Vector = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
@@ -71,11 +73,13 @@ class TargetRequest(Request):
     """Asks for setpoints that bring the tip to this target. There is no answer; the next setpoint is for it.
 
     The first client that sends a valid one is the controller, until it sends `RELEASE`, a client of the Unix socket
-    does, or its connection ends. A target may be used for `sockets.target.valid_for_s`: repeat it, also while the
-    machine stands still. Which of the two tips it gives depends on where the machine has its tool.
+    does, or its connection ends. Of several that wait the newest counts, and the others are not looked at. A target may
+    be used for `sockets.target.valid_for_s` from `time_s` on: repeat it, also while the machine stands still. Which of
+    the two tips it gives depends on where the machine has its tool.
     """
 
     wire_name = "TARGET"
+    place = Place.NEWEST
     tip_B0_mm: Vector | None = Field(default=None, description="the tip in {B0}, mm: [x, y, z]; tool on the platform")
     tip_P_mm: Vector | None = Field(
         default=None, description="the touched place in {P}, mm: [x, y, z]; tool on the surface plate"
@@ -83,6 +87,14 @@ class TargetRequest(Request):
     rotation_B0_rad: Vector | None = Field(
         default=None,
         description="hexapod: rotation vector of {P} in {B0}, rad; left out: the attitude at machine zero",
+    )
+    time_s: Coordinate | None = Field(
+        default=None,
+        description="when it was made, s on the daemon's monotonic clock, as in SETPOINT; left out, or later than it "
+        "comes: when it comes",
+    )
+    id: Annotated[int, Field(ge=0, le=LARGEST_ID)] | None = Field(
+        default=None, description="a number of your own; `target_id` of the setpoints that answer it"
     )
 
     @classmethod
@@ -93,11 +105,12 @@ class TargetRequest(Request):
         keys = context.target_keys
         if foreign := sorted(self.model_fields_set.difference(keys.names)):
             raise unknown_key(self.wire_name, foreign[0], keys.names)
+        made_s = client.arrived_s if self.time_s is None else min(self.time_s, client.arrived_s)
         tip_mm = getattr(self, keys.tip)
         if tip_mm is None:
             raise ProtocolError(ErrorCode.BAD_MESSAGE, f"needs {keys.tip}, three numbers")
         rotation = self.rotation_B0_rad
-        context.set_target(client, tuple(tip_mm), None if rotation is None else tuple(rotation))
+        context.set_target(client, tuple(tip_mm), None if rotation is None else tuple(rotation), made_s, self.id)
         return b""
 
 
@@ -115,6 +128,7 @@ class ReleaseRequest(OrderRequest):
     """
 
     wire_name = "RELEASE"
+    place = Place.FIXED
     reply = ReleaseKeys
     asker = Asker.CONTROLLER
     refusal = "only the controller, or a client of the Unix socket, can end the controller's role"

@@ -6,6 +6,7 @@ import math
 import socket
 import struct
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from enum import Enum, auto
 from typing import Any, NamedTuple
@@ -33,11 +34,30 @@ class Stream(Enum):
     READINGS = auto()
 
 
+class Place(Enum):
+    """What a line that comes does with those that still wait."""
+
+    OWN = auto()
+    NEWEST = auto()
+    """it takes the place of an earlier one of this kind"""
+    FIXED = auto()
+    """what came before it is answered before it"""
+
+
 class _ReceivedLine(NamedTuple):
-    """A line, or the error in the place of one that is too long, and the descriptor that came with it."""
+    """A line, or the error in the place of one that is too long; the descriptor that came with it, and when it came.
+
+    place : whether a newer one of its kind takes its place.
+    """
 
     content: bytes | ProtocolError
     descriptor: int | None
+    arrived_s: float
+    place: Place = Place.OWN
+
+
+def _own_place(line: bytes) -> Place:
+    return Place.OWN
 
 
 class ClientSession:
@@ -49,7 +69,9 @@ class ClientSession:
     Attributes
     ----------
     name : for the log: "unix, user 1000", or the address and port.
-    open : False once the connection has ended.
+    open : False once the connection has ended, and what came over it has been answered.
+    has_ended : whether the other end sends nothing any more.
+    arrived_s : monotonic time (s) at which the line that is being answered came.
     due_s : time of the next setpoint (s) that this client wants; inf while it watches none, -inf for the very next.
     stream : what this client watches.
     user : number of the user at the other end of the Unix socket; -1 over TCP.
@@ -66,9 +88,10 @@ class ClientSession:
         local: bool,
         now_s: float = 0.0,
         unwanted: DescriptorBin | None = None,
+        place_of: Callable[[bytes], Place] = _own_place,
     ) -> None:
         """`name`: of the other end; `local`: connected over the Unix socket, from this computer; `unwanted`: closes
-        descriptors."""
+        descriptors; `place_of`: of a line among those that wait."""
         connection.setblocking(False)
         self.connection = connection
         self.local = local
@@ -76,9 +99,10 @@ class ClientSession:
         self.name = f"{name}, user {self.user}" if local else name
         self.authorized = True
         self.lost_role = False
-        self.connected_s = self.asked_s = now_s
+        self.connected_s = self.asked_s = self.arrived_s = now_s
         self.dismissed_s = math.inf
         self.open = True
+        self.has_ended = False
         self.due_s = math.inf
         self.stream = Stream.SETPOINTS
         self._interval_s = math.inf
@@ -89,6 +113,7 @@ class ClientSession:
         self._descriptor: int | None = None  # of the line that is still coming
         self._answered_descriptor: int | None = None  # of the line that `next_line` has given
         self._skipping_line = False
+        self._place_of = place_of
         self._unsent = bytearray()
 
     def watch(self, rate_hz: float, stream: Stream) -> None:
@@ -115,16 +140,22 @@ class ClientSession:
             self.due_s = time_s + self._interval_s
         return True
 
-    def receive(self) -> None:
-        """Take what has arrived; whole lines wait for `next_line`. `open` is False afterwards when the stream ended."""
+    def receive(self, now_s: float) -> None:
+        """Take what has arrived; whole lines wait for `next_line`.
+
+        Where the stream has ended `has_ended` is True afterwards: lines that wait can still be answered, but what is
+        for a moment only has passed. `open` is False where the connection is broken.
+        """
         try:
             data, descriptor = self._receive_bytes()
         except BlockingIOError:
             return
         except OSError:
             data, descriptor = b"", None
-        if not data:
             self.open = False
+        if not data:
+            self.has_ended = True
+            self._remove_older()
             return
         self._received += data
         *lines, rest = self._received.split(b"\n")
@@ -140,14 +171,14 @@ class ClientSession:
                 self._unwanted.put(descriptor)
         self._descriptor = owned.pop()
         for line, of_line in zip(lines, owned, strict=True):
-            self._add_line(bytes(line), of_line)
+            self._add_line(bytes(line), of_line, now_s)
         if len(rest) > MAX_LINE_BYTES:
             self._received = bytearray()
             self._unwant(self._descriptor)
             self._descriptor = None
             if not self._skipping_line:
                 self._skipping_line = True
-                self._lines.append(_ReceivedLine(_too_long(), None))
+                self._lines.append(_ReceivedLine(_too_long(), None, now_s))
 
     def _receive_bytes(self) -> tuple[bytes, int | None]:
         """What has arrived, and the descriptor among it; TCP carries none. Of several the system closes the others."""
@@ -162,15 +193,28 @@ class ClientSession:
                 return data, _DESCRIPTOR.unpack_from(content)[0]
         return data, None
 
-    def _add_line(self, line: bytes, descriptor: int | None) -> None:
+    def _add_line(self, line: bytes, descriptor: int | None, now_s: float) -> None:
         if self._skipping_line:
             self._skipping_line = False
         elif len(line) > MAX_LINE_BYTES:
-            self._lines.append(_ReceivedLine(_too_long(), None))
+            self._lines.append(_ReceivedLine(_too_long(), None, now_s))
         elif line.strip():
-            self._lines.append(_ReceivedLine(line, descriptor))
+            place = self._place_of(line)
+            if place is Place.NEWEST:
+                self._remove_older()
+            self._lines.append(_ReceivedLine(line, descriptor, now_s, place))
             return
         self._unwant(descriptor)
+
+    def _remove_older(self) -> None:
+        """Forget the line that one of the kind NEWEST replaces, unless another had to be answered in between."""
+        for k in reversed(range(len(self._lines))):
+            if self._lines[k].place is Place.FIXED:
+                return
+            if self._lines[k].place is Place.NEWEST:
+                self._unwant(self._lines[k].descriptor)
+                del self._lines[k]
+                return
 
     def _unwant(self, descriptor: int | None) -> None:
         if descriptor is not None:
@@ -183,8 +227,14 @@ class ClientSession:
 
     @property
     def has_lines(self) -> bool:
-        """Whether whole lines wait. As long as they do, nothing more should be received: the client has to wait."""
+        """Whether whole lines wait."""
         return bool(self._lines)
+
+    @property
+    def is_read(self) -> bool:
+        """Whether more should be received: as long as lines wait that a newer one does not replace, the client waits."""
+        newest_only = all(line.place is Place.NEWEST for line in self._lines)
+        return self.is_heard and not self.has_ended and newest_only
 
     def next_line(self) -> bytes | ProtocolError:
         """The line that has waited longest, or an error in the place of one that is too long.
@@ -192,7 +242,7 @@ class ClientSession:
         The descriptor that came with it can be taken until `end_line`, or the next one, closes it.
         """
         self.end_line()
-        content, self._answered_descriptor = self._lines.popleft()
+        content, self._answered_descriptor, self.arrived_s, _ = self._lines.popleft()
         return content
 
     def take_descriptor(self) -> int | None:
@@ -244,8 +294,8 @@ class ClientSession:
         """Close the connection, and the descriptors that came over it."""
         self.open = False
         self.end_line()
-        for _, descriptor in self._lines:
-            self._unwant(descriptor)
+        for line in self._lines:
+            self._unwant(line.descriptor)
         self._lines.clear()
         self._unwant(self._descriptor)
         self._descriptor = None

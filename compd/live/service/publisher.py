@@ -140,7 +140,9 @@ class Publisher:
         if not local:
             prepare_tcp(connection)
         name = "unix" if local else f"{address[0]}:{address[1]}"
-        session = ClientSession(connection, name, local, self._clock.monotonic(), self._unwanted)
+        session = ClientSession(
+            connection, name, local, self._clock.monotonic(), self._unwanted, self._requests.place_of
+        )
         tcp_clients = sum(not other.local for other in self._sessions)
         if (refusal := seat_refused(local, len(self._sessions), tcp_clients)) is not None:
             session.send(refusal.to_json())
@@ -153,9 +155,11 @@ class Publisher:
     def _serve(self, session: ClientSession, events: int) -> None:
         if events & selectors.EVENT_WRITE:
             session.flush()
-        if events & selectors.EVENT_READ and not session.has_lines:
-            session.receive()
-            if session.has_lines:
+        if events & selectors.EVENT_READ and session.is_read:
+            session.receive(self._clock.monotonic())
+            if session.has_ended:
+                self._requests.context.release(session)
+            if session.has_lines and session not in self._waiting:
                 self._waiting.append(session)
         self._update_events(session)
 
@@ -288,15 +292,16 @@ class Publisher:
     def _update_events(self, session: ClientSession) -> None:
         """Ask for what a client is ready for; forget one that has gone.
 
-        That it can be written to matters only while data wait for it. As long as its lines wait, or it has been
-        dismissed, it is not read from.
+        That it can be written to matters only while data wait for it.
         """
         if session not in self._sessions:
             return
+        if session.has_ended and not session.has_lines:
+            session.open = False
         connection = session.connection
         registered = connection in self._selector.get_map()
         events = selectors.EVENT_WRITE if session.has_unsent else 0
-        if not session.has_lines and session.is_heard:
+        if session.is_read:
             events |= selectors.EVENT_READ
         if registered and (not session.open or not events):
             self._selector.unregister(connection)

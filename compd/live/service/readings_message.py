@@ -142,6 +142,10 @@ def _target(target: Target) -> dict[str, Any]:
         message["rotation_B0_rad"] = target.rotation_B0_rad
     if target.valid_until_s < math.inf:
         message["valid_until_s"] = target.valid_until_s
+    if math.isfinite(target.time_s):
+        message["time_s"] = target.time_s
+    if target.id is not None:
+        message["id"] = target.id
     return message
 
 
@@ -149,7 +153,11 @@ def _parsed_target(data: Mapping[str, Any]) -> Target:
     """The target; one that was recorded before targets grew old is never too old."""
     rotation = data.get("rotation_B0_rad")
     return Target(
-        tuple(data["tip_mm"]), None if rotation is None else tuple(rotation), data.get("valid_until_s", math.inf)
+        tuple(data["tip_mm"]),
+        None if rotation is None else tuple(rotation),
+        data.get("valid_until_s", math.inf),
+        data.get("time_s", math.nan),
+        data.get("id"),
     )
 
 

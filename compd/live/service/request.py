@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict
 
-from compd.live.service.client_session import ClientSession
+from compd.live.service.client_session import ClientSession, Place
 from compd.live.service.message_keys.message import SentMessage
 from compd.live.service.request_context import RequestContext, SendLater
 
@@ -26,6 +26,7 @@ class Request(BaseModel):
 
     wire_name : the message's "class".  reply : the keys of its answer; None where there is none.
     asker : who may ask.  refusal : the text of the error that anybody else gets.
+    place : what one that comes does with those of the same client that still wait.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
@@ -33,6 +34,7 @@ class Request(BaseModel):
     reply: ClassVar[type[SentMessage] | None] = None
     asker: ClassVar[Asker] = Asker.ANYBODY
     refusal: ClassVar[str] = ""
+    place: ClassVar[Place] = Place.OWN
 
     @classmethod
     def allowed_keys(cls, context: RequestContext) -> tuple[str, ...]:

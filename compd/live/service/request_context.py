@@ -36,7 +36,7 @@ class TargetKeys:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return (self.tip, "rotation_B0_rad") if self.rotation else (self.tip,)
+        return (self.tip, *(("rotation_B0_rad",) if self.rotation else ()), "time_s", "id")
 
 
 def _accept_nothing(gauge: str) -> Sequence[str]:
@@ -111,9 +111,17 @@ class RequestContext:
         client.authorized = True
 
     def set_target(
-        self, client: ClientSession, tip_mm: tuple[float, ...], rotation_B0_rad: tuple[float, ...] | None
+        self,
+        client: ClientSession,
+        tip_mm: tuple[float, ...],
+        rotation_B0_rad: tuple[float, ...] | None,
+        made_s: float,
+        target_id: int | None,
     ) -> None:
-        """Take a target, and with it `client` as the controller. Raises ProtocolError where it may not be."""
+        """Take a target that was made at `made_s`, and with it `client` as the controller.
+
+        Raises ProtocolError where it may not be.
+        """
         if self._targets.unix_only and not client.local:
             raise ProtocolError(
                 ErrorCode.UNIX_ONLY, "targets are given over the Unix socket only (sockets.target.unix_only)"
@@ -127,8 +135,8 @@ class RequestContext:
         if self.controller is None:
             _log.info("controller", client=client.name)
         self.controller = client
-        valid_until_s = self.clock.monotonic() + self._targets.valid_for_s
-        self.commands.target = Target(tip_mm, rotation_B0_rad, valid_until_s)
+        valid_until_s = made_s + self._targets.valid_for_s
+        self.commands.target = Target(tip_mm, rotation_B0_rad, valid_until_s, made_s, target_id)
 
     def end_role(self, client: ClientSession) -> None:
         """End the controller's role, which `client` has or, over the Unix socket, takes from whoever has it.

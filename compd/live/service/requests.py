@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from compd.live.service import local_requests
 from compd.live.service.client_requests import AuthKeys, AuthRequest
-from compd.live.service.client_session import ClientSession
+from compd.live.service.client_session import ClientSession, Place
 from compd.live.service.message_keys.message import ErrorKeys, SentMessage
 from compd.live.service.message_keys.readings import ReadingsKeys
 from compd.live.service.message_keys.setpoint import SetpointKeys
@@ -42,6 +42,8 @@ def _with_a_name(kind: type[Any]) -> Iterator[type[Request]]:
 # Those of any client first, whatever the order of the modules.
 _KINDS = sorted(_with_a_name(Request), key=lambda kind: kind.__module__ == local_requests.__name__)
 REQUESTS: Mapping[str, type[Request]] = {kind.wire_name: kind for kind in _KINDS}
+# Only a line with one of these can have a place that is not its own; most lines need not be decoded to know.
+_PLACED = tuple(f'"{name}"'.encode() for name, kind in REQUESTS.items() if kind.place is not Place.OWN)
 _SENT: tuple[type[SentMessage], ...] = (
     *(kind.reply for kind in REQUESTS.values() if kind.reply is not None),
     AuthKeys,
@@ -68,6 +70,16 @@ class Requests:
     def admits(self, address: str) -> bool:
         """Whether a client at this IP address may connect over TCP at all."""
         return self.context.access is None or self.context.access.admits(address)
+
+    def place_of(self, data: bytes) -> Place:
+        """Of a line among those of its client that wait."""
+        if not any(name in data for name in _PLACED):
+            return Place.OWN
+        try:
+            kind = REQUESTS.get(parse(data).name)
+        except ProtocolError:
+            return Place.OWN
+        return Place.OWN if kind is None else kind.place
 
     def answer(self, client: ClientSession, data: bytes, send_later: SendLater) -> bytes:
         """The answer to one line; b"" where there is none or it comes by `send_later`.

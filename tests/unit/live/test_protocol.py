@@ -120,7 +120,7 @@ def test_an_empty_line_is_ignored(service):
         ({"class": "TARGET", "tip_B0_mm": [1, 2]}, "tip_B0_mm must be a list of three numbers"),
         ({"class": "TARGET", "tip_B0_mm": [1, 2, None]}, "tip_B0_mm must be a number, is NoneType"),
         ({"class": "TARGET", "tip_B0_mm": [1, 2, -2e9]}, "tip_B0_mm must be within +-1e+09"),
-        ({"class": "TARGET", "tip_P_mm": [1, 2, 3]}, "TARGET: unknown key 'tip_P_mm', allowed: tip_B0_mm"),
+        ({"class": "TARGET", "tip_P_mm": [1, 2, 3]}, "TARGET: unknown key 'tip_P_mm', allowed: tip_B0_mm, time_s, id"),
         ({"class": "MODEL", "shadow": True}, "needs file, a text (shadow: true or false)"),
         (
             {"class": "MODEL", "file": "m.yaml"},

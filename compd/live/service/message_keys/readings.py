@@ -57,6 +57,10 @@ class RecordedTargetKeys(Keys):
     valid_until_s: float | None = Field(
         default=None, description="after this it is too old, s on the daemon's monotonic clock; absent: never"
     )
+    time_s: float | None = Field(
+        default=None, description="when it was made or came, s on the daemon's monotonic clock"
+    )
+    id: int | None = Field(default=None, description="as in `TARGET`")
 
 
 class ReadingsKeys(SentMessage):

@@ -48,6 +48,12 @@ class SetpointKeys(SentMessage):
     reason: str = Field(description='why the state is not `ok`, for a person; "" when it is')
     valid_until: float = Field(description="not to be used later than this, s; `time_s` itself when it is not valid")
     mode: Mode = Field(description="cmm: the scales say where the tip is; machine_tool: a `TARGET` does")
+    target_time_s: float | None = Field(
+        default=None,
+        description="mode machine_tool: when the target that it answers was made or, where `TARGET` does not say, came, "
+        "s on the daemon's monotonic clock",
+    )
+    target_id: int | None = Field(default=None, description="`id` of that target, where it has one")
     model: str | None = Field(
         default=None, description="hash of the model file that is applied; absent without effects"
     )

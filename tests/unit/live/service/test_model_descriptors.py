@@ -43,7 +43,7 @@ class Pair:
 
     def lines(self):
         """What has arrived: each line, and whether a descriptor came with it."""
-        self.session.receive()
+        self.session.receive(0.0)
         found = []
         while self.session.has_lines:
             line = self.session.next_line()
@@ -91,7 +91,7 @@ def test_a_line_in_two_pieces_keeps_the_descriptor_of_its_first(pair, file):
 
 def test_descriptors_are_inherited_by_no_process(pair, file):
     pair.send(b"a\n", file)
-    pair.session.receive()
+    pair.session.receive(0.0)
     pair.session.next_line()
     descriptor = pair.session.take_descriptor()
     assert not os.get_inheritable(descriptor)
@@ -110,14 +110,14 @@ def test_ten_thousand_lines_with_descriptors_leave_none_open(pair, file):
                 pair.send(b"\n", file, file, file)
             case 2:
                 pair.send(b"half", file)
-                pair.session.receive()
+                pair.session.receive(0.0)
                 pair.send(b" a line\n", file)
             case 3:
                 pair.send(b"x" * 5000 + b"\n", file)
             case 4:
                 pair.send(b"two\nlines\n", file)
         while True:
-            pair.session.receive()
+            pair.session.receive(0.0)
             if not pair.session.has_lines:
                 break
             while pair.session.has_lines:
@@ -135,9 +135,9 @@ def test_what_waits_when_a_client_goes_is_closed(file):
     before = open_descriptors()
     pair = Pair()
     pair.send(b"a\n", file)
-    pair.session.receive()
+    pair.session.receive(0.0)
     pair.send(b"b", file)
-    pair.session.receive()
+    pair.session.receive(0.0)
     thread_started = threading.Event()
     pair.bin.put(os.dup(file))
     thread_started.set()
