@@ -232,7 +232,7 @@ class ClientSession:
 
     @property
     def is_read(self) -> bool:
-        """Whether more should be received: as long as lines wait that a newer one does not replace, the client waits."""
+        """Whether more should be received: not as long as a line waits that a newer one does not replace."""
         newest_only = all(line.place is Place.NEWEST for line in self._lines)
         return self.is_heard and not self.has_ended and newest_only
 

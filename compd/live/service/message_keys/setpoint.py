@@ -50,8 +50,8 @@ class SetpointKeys(SentMessage):
     mode: Mode = Field(description="cmm: the scales say where the tip is; machine_tool: a `TARGET` does")
     target_time_s: float | None = Field(
         default=None,
-        description="mode machine_tool: when the target that it answers was made or, where `TARGET` does not say, came, "
-        "s on the daemon's monotonic clock",
+        description="mode machine_tool: when the target that it answers was made, s on the daemon's monotonic clock; "
+        "where `TARGET` does not say, when it came",
     )
     target_id: int | None = Field(default=None, description="`id` of that target, where it has one")
     model: str | None = Field(
