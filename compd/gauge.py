@@ -48,7 +48,7 @@ of the entry-point group ``compd.gauge_presets``.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeVar
 
@@ -234,6 +234,18 @@ LineT = TypeVar("LineT")
 LineKind = Literal["bytes", "registers", "nodes", "topics"]
 
 
+class OptionDoubt(NamedTuple):
+    """Something among a gauge's options that can be used and is probably a slip.
+
+    location : of it, below the gauge's entry. what, value, next_step : as of `Problem`.
+    """
+
+    location: tuple[str | int, ...]
+    what: str
+    value: str
+    next_step: str
+
+
 class Gauge(ABC, Generic[LineT]):
     """Base of all drivers: one device on a line, `class MyGauge(Gauge[ByteLine])` or `Gauge[RegisterLine]`.
 
@@ -282,6 +294,10 @@ class Gauge(ABC, Generic[LineT]):
         Returns one reading per channel, in their order, each with its own time and quality.
         Raises LineFault where the poll as a whole failed. Any other exception is reported as a defect of the driver.
         """
+
+    def doubts(self) -> Iterable[OptionDoubt]:
+        """What of its options is probably a slip: `compd check` warns of it."""
+        return ()
 
     @property
     def reply_identity(self) -> str | None:

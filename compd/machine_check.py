@@ -22,6 +22,7 @@ from compd.configuration.places import place_problems, place_warnings
 from compd.configuration.section import Section, readable
 from compd.errors import ConfigurationError, KinematicsError, Problem
 from compd.machine_builder import build_model
+from compd.machine_slips import slips
 from compd.model.machine import MachineModel
 
 SectionT = TypeVar("SectionT", bound=Section)
@@ -56,7 +57,10 @@ def examine_whole(path: Path) -> Examined:
         except (KinematicsError, ValueError) as error:
             problems += _at_machine_zero(error, document, warnings)
         else:
-            warnings += _stroke_warnings(document, examined.geometry, model)
+            warnings += [
+                *_stroke_warnings(document, examined.geometry, model),
+                *slips(document, examined.geometry, model),
+            ]
     sockets, state = _section(SocketSettings, document, "sockets"), _section(StateSettings, document, "state")
     effects = readable(SECTIONS["effects"], document.value(("effects",))) or ()
     problems = in_order(

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from compd.configuration.document import Location
-from compd.configuration.line_checks import line_problems
+from compd.configuration.line_checks import line_problems, line_warnings
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.configuration.sections import Sections
 from compd.errors import Problem
@@ -53,7 +53,13 @@ def warnings(sections: Sections) -> list[Problem]:
         for name in sections.gauges
         if whole and name not in wired_gauges
     ]
-    return [*unused, *_vote_warnings(sections), *_shared_process_warnings(sections)]
+    return [
+        *unused,
+        *line_warnings(sections),
+        *_option_warnings(sections),
+        *_vote_warnings(sections),
+        *_shared_process_warnings(sections),
+    ]
 
 
 def resolve_channel(
@@ -70,6 +76,14 @@ def resolve_channel(
     if not channel_name:
         return f"{gauge}.{names[0]}" if len(names) == 1 else None
     return channel if channel_name in names else None
+
+
+def _option_warnings(sections: Sections) -> Iterator[Problem]:
+    """What a driver finds doubtful about its gauge's options."""
+    for name, options in sections.gauges.items():
+        for location, what, value, next_step in sections.drivers[name](options).doubts():
+            where = sections.document.where(("gauges", name, *location))
+            yield Problem(where=where, what=what, value=value, next_step=next_step)
 
 
 def _vote_problems(sections: Sections) -> Iterator[Problem]:

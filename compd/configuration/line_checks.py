@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import ipaddress
+import re
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from typing import NamedTuple
+
+from serial import Serial
 
 from compd.configuration.document import Location
 from compd.configuration.lines import CARRIES
 from compd.configuration.sections import Sections
 from compd.errors import Problem
 from compd.text.number_text import join_words
+
+# A rate that is nearer than this to a usual one, and is not it, is a slip.
+_SLIP = 0.02
 
 
 class _Library(NamedTuple):
@@ -31,6 +38,43 @@ def line_problems(sections: Sections) -> Iterator[Problem]:
     yield from _signal_problems(sections)
     yield from _power_problems(sections)
     yield from _process_problems(sections)
+
+
+def line_warnings(sections: Sections) -> Iterator[Problem]:
+    """Slips in a port, a rate or an address, with which a line is never opened or opened wrongly."""
+    for name, line in sections.lines.items():
+        port, baud, host = (getattr(line, key, None) for key in ("port", "baud", "host"))
+        if isinstance(port, str) and "://" not in port and not port.startswith("/"):
+            yield Problem(
+                where=sections.document.where(("lines", name, "port")),
+                what="is no port of this computer",
+                value=port,
+                allowed="a path as /dev/serial/by-id/..., or socket://host:port, rfc2217://host:port",
+                next_step="`compd gauge scan` lists the ports",
+            )
+        usual = min(Serial.BAUDRATES, key=lambda rate: abs(rate - baud)) if baud else baud
+        if usual != baud and abs(usual - baud) < _SLIP * usual:
+            yield Problem(
+                where=sections.document.where(("lines", name, "baud")),
+                what="is no usual rate",
+                value=str(baud),
+                next_step=f"write {usual}, or ignore this where the device has its own",
+            )
+        if host is not None and re.fullmatch(r"[0-9.]+", host) and not _is_address(host):
+            yield Problem(
+                where=sections.document.where(("lines", name, "host")),
+                what="is no IP address: that has four numbers. The system may take it for another one",
+                value=host,
+                next_step="write all four",
+            )
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.IPv4Address(host)
+    except ValueError:
+        return False
+    return True
 
 
 def _port_problems(sections: Sections) -> Iterator[Problem]:

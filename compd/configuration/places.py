@@ -68,7 +68,43 @@ def place_warnings(document: Document, sockets: SocketSettings | None, state: St
                     next_step=f"as root: install -d -o USER {path}; USER is who runs the daemon",
                 )
             )
-    return [*warnings, *_open_socket_warnings(document, sockets)]
+    return [
+        *warnings,
+        *_public_directory_warnings(document, sockets, state),
+        *_own_port_warnings(document, sockets),
+        *_open_socket_warnings(document, sockets),
+    ]
+
+
+def _own_port_warnings(document: Document, sockets: SocketSettings | None) -> Iterator[Problem]:
+    """A line whose device is the daemon itself."""
+    lines = document.data.get("lines")
+    if sockets is None or sockets.tcp is None or not isinstance(lines, dict):
+        return
+    for name, line in lines.items():
+        if not isinstance(line, dict) or line.get("port") != sockets.tcp.port:
+            continue
+        if line.get("host") in ("localhost", "127.0.0.1", "::1", sockets.tcp.host):
+            yield Problem(
+                where=document.where(("lines", name, "port")),
+                what="is the daemon's own port, under sockets.tcp",
+                value=str(sockets.tcp.port),
+                next_step="write the device's address and port",
+            )
+
+
+def _public_directory_warnings(
+    document: Document, sockets: SocketSettings | None, state: StateSettings | None
+) -> Iterator[Problem]:
+    """A directory in which every user of the computer may put a file or take a name."""
+    for location, path, what_for in _directories(sockets, state):
+        if path.is_dir() and path.stat().st_mode & stat.S_IWOTH:
+            yield Problem(
+                where=document.where(location),
+                what=f"the directory for {what_for} is open to every user of this computer: anybody can put a file there",
+                value=str(path),
+                next_step="choose one of its own, such as /var/lib/compd and /run/compd",
+            )
 
 
 def _open_socket_warnings(document: Document, sockets: SocketSettings | None) -> Iterator[Problem]:

@@ -94,8 +94,8 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
         "no link moves that fast: this limit would find no jump",
     ),
     PlausibleRange(
-        "gauges.*.acceleration_mm_per_s2", 0.01, 50_000, "mm/s2",
-        "not even noise would be believed",
+        "gauges.*.acceleration_mm_per_s2", 1, 50_000, "mm/s2",
+        "no drive is that slow; in m/s2? then multiply it by 1000",
         "five times gravity: this limit would find no jump",
     ),
     PlausibleRange(
@@ -128,7 +128,7 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
     ),
     PlausibleRange("geometry.plate_thickness_mm", 2, 5000, "mm", "a sheet is no surface plate", "no plate is so thick"),
     PlausibleRange(
-        "geometry.scale_signal_period_mm", 1e-4, 20, "mm",
+        "geometry.scale_signal_period_mm", 1e-4, 10, "mm",
         "the finest scales have 128 nm",
         "the coarsest magnetic scales have 5 to 10 mm",
     ),

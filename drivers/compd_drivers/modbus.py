@@ -23,7 +23,7 @@ The four modules are presets too (icpdas_m7017c, adam_4017p, moxa_e1240, r4dcb08
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from compd.gauge import (
@@ -31,6 +31,7 @@ from compd.gauge import (
     Gauge,
     GaugeOptions,
     LineFault,
+    OptionDoubt,
     Quality,
     Reading,
     RegisterLine,
@@ -40,6 +41,7 @@ from compd.gauge import (
 )
 from compd_drivers.measured import not_measured
 from compd_drivers.modbus_description import ModbusChannel, ModbusOptions, ModbusWrite, Status
+from compd_drivers.modbus_doubts import doubts
 from compd_drivers.modbus_number import FLOATS, READ_BITS, decode
 
 # Less than Modbus allows: a serial master wants to ask for more.
@@ -110,6 +112,9 @@ class Modbus(Gauge[RegisterLine]):
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
+
+    def doubts(self) -> Iterable[OptionDoubt]:
+        return doubts(self._map)
 
     def traffic(self) -> Sequence[tuple[int, int]]:
         writes = [

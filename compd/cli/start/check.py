@@ -63,6 +63,7 @@ def check(
         *_print_cycle(configuration),
     ]
     print_problems(warnings, "warning: ", sys.stdout)
+    print_zero(configuration)
     wiring = configuration.wiring
     own_process = configuration.acquisition.own_process
     processes = f" (polled in processes of their own: {', '.join(own_process)})" if own_process else ""
@@ -71,6 +72,19 @@ def check(
         f"{len(wiring.joint)} joint and {len(wiring.frame)} frame comparators, {len(wiring.quantities)} quantities, "
         f"{len(configuration.gauges)} gauges on {len(configuration.lines)} lines{processes}; "
         f"hash {configuration.config_hash}"
+    )
+
+
+def print_zero(configuration: Configuration) -> None:
+    """Print the lengths at machine zero that a tape measure shows."""
+    from compd.configuration.operation import FRAME_DISTANCES
+    from compd.machine_builder import build_model
+
+    zero = build_model(configuration.geometry, configuration.wiring).zero
+    links = ", ".join(f"{number} {mm:.1f}" for number, mm in enumerate(zero.link_length_mm, start=1))
+    rods = ", ".join(f"{name} {mm:.1f}" for name, mm in zip(FRAME_DISTANCES, zero.distances_mm, strict=True))
+    typer.echo(
+        f"At machine zero, for a tape measure, mm between the centres of the joints: links {links}; rods {rods}."
     )
 
 

@@ -1,0 +1,71 @@
+"""What can be used of a described Modbus gauge and is probably a slip: registers that two numbers share, a factor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+from compd.gauge import OptionDoubt
+from compd_drivers.modbus_description import ModbusChannel
+from compd_drivers.modbus_number import FLOATS
+
+# Modbus's "reference numbers": in a manual 30001 is the first input register, 40001 the first holding register.
+_REFERENCES = {3: 40001, 4: 30001}
+_HIGHEST_REFERENCE = 9999
+# No sensor of a machine shows so much, in any unit; an ill factor is wrong by ten or more.
+_LARGEST = {"degC": 5e3, "hPa": 1e5, "pct": 1e4}
+
+
+def doubts(channels: Sequence[ModbusChannel]) -> Iterator[OptionDoubt]:
+    """What is doubtful about a register map."""
+    for (i, one), (k, other) in combinations(enumerate(channels), 2):
+        if _share(one, other):
+            yield OptionDoubt(
+                ("channels", k, "address"),
+                f"channels {one.name} and {other.name} share registers",
+                f"{one.name} {_span(one)}, {other.name} {_span(other)}",
+                "look the addresses up in the manual: a float32 takes two registers, a float64 four",
+            )
+    for k, channel in enumerate(channels):
+        first = _REFERENCES.get(channel.function, 0)
+        if first and first <= channel.address < first + _HIGHEST_REFERENCE:
+            yield OptionDoubt(
+                ("channels", k, "address"),
+                "is more likely the manual's number of a register than its address, which counts from 0",
+                str(channel.address),
+                f"write {channel.address - first}, as the manual counts from {first}",
+            )
+        largest = _largest(channel)
+        if largest > _LARGEST.get(channel.unit, largest):
+            yield OptionDoubt(
+                ("channels", k, "scale"),
+                f"is not plausible: the register's largest number would be {largest:g} {channel.unit}",
+                f"{channel.scale:g}",
+                f"write {channel.unit} per count: 0.1 where the register has tenths",
+            )
+
+
+def _span(channel: ModbusChannel) -> str:
+    last = channel.address + channel.length - 1
+    return f"{channel.address}" if last == channel.address else f"{channel.address} to {last}"
+
+
+def _share(one: ModbusChannel, other: ModbusChannel) -> bool:
+    """Whether two numbers have a register in common of which each takes the whole."""
+    if one.function != other.function or "bit" in (one.type, other.type):
+        return False
+    apart = one.address + one.length <= other.address or other.address + other.length <= one.address
+    return not apart and _takes_all(one) and _takes_all(other)
+
+
+def _takes_all(channel: ModbusChannel) -> bool:
+    return channel.mask is None and not channel.at_byte and channel.bytes == 2 * channel.length
+
+
+def _largest(channel: ModbusChannel) -> float:
+    """The largest number that a whole number's registers can hold, in the channel's unit; 0 where nobody can say."""
+    if channel.type in FLOATS or channel.linearisation is not None or channel.highest is not None:
+        return 0.0
+    bits = 8 * channel.bytes
+    # more than 16 bits are seldom used up
+    return abs(channel.scale) * (2 ** (bits - 1) - 1) if 8 < bits <= 16 else 0.0

@@ -1,0 +1,110 @@
+"""Slips that leave a configuration complete: `compd check` warns of each, with the key, and of nothing else."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from compd.configuration.document import read_document
+from compd.machine_check import examine_whole
+from tests.support.paths import CONFIG
+
+Data = Any
+
+
+def swapped(*keys: str, i: int = 1, k: int = 2) -> Callable[[Data], None]:
+    """Two entries of a list exchanged."""
+
+    def change(data):
+        for key in keys:
+            data = data[key]
+        data[i], data[k] = data[k], data[i]
+
+    return change
+
+
+def put(value: object, *keys: str | int) -> Callable[[Data], None]:
+    def change(data):
+        for key in keys[:-1]:
+            data = data[key]
+        data[keys[-1]] = value
+
+    return change
+
+
+def itself(data: Any) -> None:
+    data["lines"]["cabinet"] |= {"host": "localhost", "port": data["sockets"]["tcp"]["port"]}
+
+
+def warned(tmp_path: Path, name: str, change: Callable[[Data], None]) -> set[str]:
+    """The keys at which the changed configuration has warnings, or problems."""
+    data = copy.deepcopy(read_document(CONFIG / name).data)
+    change(data)
+    path = tmp_path / "machine.yaml"
+    path.write_text(yaml.safe_dump(data, sort_keys=False))
+    examined = examine_whole(path)
+    return {problem.where.partition(" ")[2] for problem in (*examined.problems, *examined.warnings)}
+
+
+BOTH = ("tripod-cmm.yaml", "hexapod.yaml")
+GEOMETRY = {
+    "platform joints exchanged": (swapped("geometry", "platform", "joints_P_mm"), "geometry.platform"),
+    "plate points exchanged": (swapped("geometry", "plate_points_M_mm"), "geometry.plate_points_M_mm"),
+    "supports of joints": (swapped("geometry", "base", "support_of_joint"), "geometry.base.support_of_joint"),
+    "signal period": (put(20.0, "geometry", "scale_signal_period_mm"), "geometry.scale_signal_period_mm"),
+    "acceleration in m/s2": (put(0.3, "gauges", "scale_1", "acceleration_mm_per_s2"), "gauges.scale_1.acceleration"),
+    "port of another system": (put("COM3", "lines", "scale_1", "port"), "lines.scale_1.port"),
+    "baud": (put(38401, "lines", "scale_1", "baud"), "lines.scale_1.baud"),
+    "everybody's directory": (put("/tmp", "state", "directory"), "state.directory"),
+    "everybody's socket": (put({"path": "/tmp/compd.sock"}, "sockets", "unix"), "sockets.unix.path"),
+}
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_the_shipped_machines_have_none(tmp_path: Path, name: str) -> None:
+    assert warned(tmp_path, name, lambda data: None) == set()
+
+
+@pytest.mark.parametrize("name", BOTH)
+@pytest.mark.parametrize("slip", GEOMETRY)
+def test_a_slip_is_found_and_named(tmp_path: Path, name: str, slip: str) -> None:
+    change, key = GEOMETRY[slip]
+    keys = warned(tmp_path, name, change)
+    assert any(warning.startswith(key) for warning in keys), keys
+
+
+LINES = {
+    "a register inside another": (put(1, "gauges", "frame_u", "channels", 1, "address"), "gauges.frame_u.channels[2]"),
+    "one register twice": (put(0, "gauges", "frame_u", "channels", 1, "address"), "gauges.frame_u.channels[2]"),
+    "wider than its place": (put("float64", "gauges", "frame_u", "channels", 0, "type"), "gauges.frame_u.channels[2]"),
+    "the manual's number": (put(30001, "gauges", "frame_u", "channels", 0, "address"), "gauges.frame_u.channels[1]"),
+    "a factor of ten thousand": (put(100, "gauges", "cabinet", "channels", 3, "scale"), "gauges.cabinet.channels[4]"),
+    "three numbers of four": (put("192.168.10", "lines", "cabinet", "host"), "lines.cabinet.host"),
+    "the daemon's own port": (itself, "lines.cabinet.port"),
+}
+
+
+@pytest.mark.parametrize("slip", LINES)
+def test_a_slip_of_a_line_or_a_register_map_is_found_and_named(tmp_path: Path, slip: str) -> None:
+    change, key = LINES[slip]
+    keys = warned(tmp_path, "tripod-cmm.yaml", change)
+    assert any(warning.startswith(key) for warning in keys), keys
+
+
+def test_parts_of_a_register_may_share_it(tmp_path: Path) -> None:
+    def change(data):
+        low = {"name": "a", "function": 4, "address": 40, "type": "uint16", "mask": 0xFF, "unit": "1"}
+        high = {**low, "name": "b", "mask": 0xFF00, "shift": 8}
+        data["gauges"]["frame_u"]["channels"] += [low, high]
+
+    assert warned(tmp_path, "tripod-cmm.yaml", change) == set()
+
+
+def test_exchanged_axes_turn_the_platform(tmp_path: Path) -> None:
+    keys = warned(tmp_path, "tripod-cmm.yaml", swapped("geometry", "platform", "revolute_axes_P"))
+    assert keys == {"geometry.platform"}
