@@ -101,7 +101,7 @@ def _public_directory_warnings(
         if path.is_dir() and path.stat().st_mode & stat.S_IWOTH:
             yield Problem(
                 where=document.where(location),
-                what=f"the directory for {what_for} is open to every user of this computer: anybody can put a file there",
+                what=f"the directory for {what_for} is everybody's: any user of this computer can put a file there",
                 value=str(path),
                 next_step="choose one of its own, such as /var/lib/compd and /run/compd",
             )

@@ -18,7 +18,7 @@ _LARGEST = {"degC": 5e3, "hPa": 1e5, "pct": 1e4}
 
 def doubts(channels: Sequence[ModbusChannel]) -> Iterator[OptionDoubt]:
     """What is doubtful about a register map."""
-    for (i, one), (k, other) in combinations(enumerate(channels), 2):
+    for (_, one), (k, other) in combinations(enumerate(channels), 2):
         if _share(one, other):
             yield OptionDoubt(
                 ("channels", k, "address"),

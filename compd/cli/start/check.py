@@ -83,9 +83,7 @@ def print_zero(configuration: Configuration) -> None:
     zero = build_model(configuration.geometry, configuration.wiring).zero
     links = ", ".join(f"{number} {mm:.1f}" for number, mm in enumerate(zero.link_length_mm, start=1))
     rods = ", ".join(f"{name} {mm:.1f}" for name, mm in zip(FRAME_DISTANCES, zero.distances_mm, strict=True))
-    typer.echo(
-        f"At machine zero, for a tape measure, mm between the centres of the joints: links {links}; rods {rods}."
-    )
+    typer.echo(f"Machine zero, for a tape measure, mm between centres of joints: links {links}; rods {rods}.")
 
 
 def print_blind_spots(configuration: Configuration) -> None:
