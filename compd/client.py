@@ -313,7 +313,8 @@ class Client:
         Returns
         -------
         dict
-            ACCEPT with `gauges`: the channels that were not believed until now.
+            ACCEPT, after a second, with `gauges`: the channels that are believed now and were not; `believed_for_s`: of
+            each, for how long, s; `not_believed`: the reason of each that is not believed after it either.
 
         Raises
         ------

@@ -52,8 +52,8 @@ def line_warnings(sections: Sections) -> Iterator[Problem]:
                 allowed="a path as /dev/serial/by-id/..., or socket://host:port, rfc2217://host:port",
                 next_step="`compd gauge scan` lists the ports",
             )
-        usual = min(Serial.BAUDRATES, key=lambda rate: abs(rate - baud)) if baud else baud
-        if usual != baud and abs(usual - baud) < _SLIP * usual:
+        usual = _usual_rate(baud) if isinstance(baud, int) else baud
+        if usual != baud:
             yield Problem(
                 where=sections.document.where(("lines", name, "baud")),
                 what="is no usual rate",
@@ -67,6 +67,12 @@ def line_warnings(sections: Sections) -> Iterator[Problem]:
                 value=host,
                 next_step="write all four",
             )
+
+
+def _usual_rate(baud: int) -> int:
+    """A usual rate that is very near, or the rate itself."""
+    nearest: int = min(Serial.BAUDRATES, key=lambda rate: abs(rate - baud))
+    return nearest if abs(nearest - baud) < _SLIP * nearest else baud
 
 
 def _is_address(host: str) -> bool:

@@ -41,6 +41,7 @@ from compd.live.processes.acquisition_process import AcquisitionProcess
 from compd.live.processes.control import Control
 from compd.live.processes.loop_process import LoopProcess
 from compd.live.processes.service_process import ServiceProcess, StateLog
+from compd.live.service.acceptance import Acceptance
 from compd.live.service.budget_message import BudgetMessage
 from compd.live.service.last_readings import LastReadings
 from compd.live.service.listeners import Listeners
@@ -188,7 +189,7 @@ class Daemon:
                 ReadingsMessage(self._wires, self.latest.channels),
                 model_switch.start,
                 lambda: adopted.summary,
-                self.trust.accept,
+                Acceptance(self.trust, clock).start,
                 sockets.target,
                 access,
                 clock,

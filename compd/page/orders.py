@@ -57,7 +57,7 @@ class Orders:
         }
         self._calls: Mapping[str, Callable[[Client, str], Mapping[str, Any]]] = {
             "zero": lambda client, subject: client.zero(replace=subject == "replace"),
-            "accept": lambda client, subject: client.accept(subject),
+            "accept": self._accept_gauges,
             "shadow": self._run_shadow,
             "adopt": lambda client, subject: client.adopt_shadow(subject),
             "no-model": lambda client, subject: client.model(""),
@@ -88,6 +88,15 @@ class Orders:
     def _ask(self, name: str, subject: str, by: str) -> Mapping[str, Any]:
         with connect(self._link.path, _TIMEOUT_S, by=by) as client:
             return self._calls[name](client, subject)
+
+    def _accept_gauges(self, client: Client, subject: str) -> Mapping[str, Any]:
+        """Raises DaemonError for those that are not believed after it either: the order is not done."""
+        answer = client.accept(subject)
+        if refused := answer.get("not_believed"):
+            raise DaemonError(
+                [Problem(where=channel, what=f"still not believed: {reason}") for channel, reason in refused.items()]
+            )
+        return answer
 
     def _run_shadow(self, client: Client, subject: str) -> Mapping[str, Any]:
         if not subject:

@@ -20,6 +20,7 @@ from compd.live.loop.states import Mode, State
 from compd.live.memory.poll_requests import PollRequests
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.service.listeners import Listeners
+from compd.live.service.messages import line
 from compd.live.service.publisher import Publisher
 from compd.live.service.request_context import RequestContext, TargetKeys
 from compd.live.service.requests import Requests
@@ -157,12 +158,13 @@ class Service:
     def status(self):
         return {"class": "STATUS"}
 
-    def accept(self, gauge):
+    def accept(self, gauge, answer):
         """In the place of the acquisition: believes the gauges of `distrusted` again."""
         if gauge != "all" and gauge not in self.distrusted:
             raise ValueError(f"no gauge {gauge}; there are {', '.join(self.distrusted)}")
         names = list(self.distrusted) if gauge == "all" else [gauge]
-        return [channel for name in names for channel in self.distrusted.pop(name)]
+        channels = [channel for name in names for channel in self.distrusted.pop(name)]
+        answer(line({"class": "ACCEPT", "gauges": channels}))
 
     def pass_time(self, step_s):
         """Let time pass, and the publisher look at what is overdue."""

@@ -24,16 +24,23 @@ def accept(
     """Believe a gauge again that jumped or came back with another value; look at it first, and reference it."""
     from compd.client import connect
 
+    failed = False
     with connect(unix_address(daemon), _TIMEOUT_S) as client:
         for gauge in gauges or ():
-            channels = client.accept(gauge)["gauges"]
-            typer.echo(
-                f"{gauge}: {', '.join(channels)} believed again" if channels else f"{gauge}: was believed already"
-            )
+            answer = client.accept(gauge)
+            for channel, for_s in answer.get("believed_for_s", {}).items():
+                typer.echo(f"{channel}: believed since {for_s:.1f} s")
+            for channel, reason in answer.get("not_believed", {}).items():
+                typer.echo(f"{channel}: still not believed: {reason}")
+                failed = True
+            if not answer["gauges"] and "not_believed" not in answer:
+                typer.echo(f"{gauge}: was believed already")
         if not gauges:
             setpoint = next(client.watch())
             for line in not_believed(client.status(), setpoint):
                 typer.echo(line)
+    if failed:
+        raise typer.Exit(1)
 
 
 def not_believed(status: dict[str, Any], setpoint: dict[str, Any]) -> list[str]:

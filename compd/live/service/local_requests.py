@@ -23,12 +23,20 @@ class AcceptKeys(SentMessage):
 
     wire_name = "ACCEPT"
     gauges: list[str] = Field(description="channels that are believed again by it; empty where all were already")
+    believed_for_s: dict[str, float] | None = Field(
+        default=None, description="of each of them, for how long it has been believed when this is sent, s"
+    )
+    not_believed: dict[str, str] | None = Field(
+        default=None, description="channels that are not believed after it either, each with the reason"
+    )
 
 
 class AcceptRequest(OrderRequest):
     """Makes the daemon believe a gauge again that jumped, or came back with another value.
 
-    A person asks it after looking at the gauge: what it reads from now on is taken as it is.
+    A person asks it after looking at the gauge: what it reads from now on is taken as it is. The answer comes after a
+    second, with what has become of it: a gauge that moves, or that other gauges contradict, is not believed. It does
+    not come in turn: other answers may come before it.
     """
 
     wire_name = "ACCEPT"
@@ -43,11 +51,10 @@ class AcceptRequest(OrderRequest):
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         try:
-            channels = list(context.accept(self.gauge))
+            context.accept(self.gauge, send_later)
         except ValueError as error:
             raise ProtocolError(ErrorCode.BAD_MESSAGE, str(error)) from error
-        _log.warning("gauges accepted", gauge=self.gauge, channels=channels, client=client.name)
-        return line({"class": self.wire_name, "gauges": channels})
+        return b""
 
 
 class PollKeys(SentMessage):

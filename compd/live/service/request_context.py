@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -39,8 +39,8 @@ class TargetKeys:
         return (self.tip, *(("rotation_B0_rad",) if self.rotation else ()), "time_s", "id")
 
 
-def _accept_nothing(gauge: str) -> Sequence[str]:
-    return ()
+def _accept_nothing(gauge: str, send_later: SendLater) -> None:
+    send_later(line({"class": "ACCEPT", "gauges": []}))
 
 
 def _tell_nobody(order: bytes) -> None:
@@ -66,7 +66,7 @@ class RequestContext:
         readings: ReadingsMessage | None = None,
         switch_model: Callable[[ModelWish, Callable[[], int | None], SendLater], None] | None = None,
         models: Callable[[], Mapping[str, Any]] = dict,
-        accept: Callable[[str], Sequence[str]] = _accept_nothing,
+        accept: Callable[[str, SendLater], None] = _accept_nothing,
         targets: TargetSettings | None = None,
         access: TcpAccess | None = None,
         clock: Clock | None = None,
@@ -79,8 +79,8 @@ class RequestContext:
         `take_zero` (whether to replace one that differs) starts to take machine zero, `switch_model` (what is asked
         for, what gives the descriptor that came with it) to adopt a model; both answer later, and raise ProtocolError
         (busy) while another such request is being worked on. `accept` makes the acquisition believe a gauge,
-        "gauge.channel" or "all" again, and returns the channels that it did not believe; it raises ValueError, with a
-        text for the client, for a name that is none. `access`: who may use TCP; None: everybody who reaches it. `poll`
+        "gauge.channel" or "all" again, and answers later; it raises ValueError, with a text for the client, for a name
+        that is none. `access`: who may use TCP; None: everybody who reaches it. `poll`
         has a gauge polled at once; it raises ValueError, with a text for the client, for a name that is none.
         `tell_order` gets an ORDER line for whoever records, from any thread.
         """
