@@ -87,4 +87,5 @@ def _in_another_order(document: Document, location: Location, what: str, order: 
 
 def _squares(one_mm: FloatArray, other_mm: FloatArray) -> FloatArray:
     """(n, m) squared distances between (n, 3) and (m, 3) points, mm2."""
-    return ((one_mm[:, None] - other_mm[None]) ** 2).sum(axis=2)
+    squares: FloatArray = ((one_mm[:, None] - other_mm[None]) ** 2).sum(axis=2)
+    return squares
