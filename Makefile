@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help docs demo demo-linuxcnc live test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
+.PHONY: help docs demo demo-linuxcnc live test long service pages pages-sample walks hidden hidden-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -96,10 +96,17 @@ SERVICE := tests/system/test_service_in_container.py
 service: $(STAMP)
 	$(PYTEST) -m long -rsP $(SERVICE)
 
-# Every command and every piece of Python of README and docs/; the pages that run machines in real time beside no others.
+# Every command and every piece of Python of README and docs/; those with a machine in real time one after the other.
+PAGES := tests/system/test_pages.py
+
 pages: $(STAMP)
-	$(PYTEST) -m sample -n 2 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_runs
-	$(PYTEST) -m sample -n 2 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_with_a_machine_runs
+	$(PYTEST) -m long -n 2 --dist worksteal $(PAGES) -k test_everything_on_a_page_runs
+	$(PYTEST) -m long $(PAGES) -k test_everything_on_a_page_with_a_machine_runs
+
+# Without the longest.
+pages-sample: $(STAMP)
+	$(PYTEST) -m sample -n 2 --dist worksteal $(PAGES) -k test_everything_on_a_page_runs
+	$(PYTEST) -m sample $(PAGES) -k test_everything_on_a_page_with_a_machine_runs
 
 # The worked examples of CONTRIBUTING.md.
 walks: $(STAMP)
@@ -131,8 +138,8 @@ wheel: $(STAMP) docs
 	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
 
-SAMPLE := kinematics cycle compare diagnose
-BENCH := $(SAMPLE) loop latency flood throughput page gateway stream fleet kilohertz
+SAMPLE := kinematics cycle diagnose
+BENCH := $(SAMPLE) compare loop latency flood throughput page gateway stream fleet kilohertz
 
 bench: $(STAMP)
 	@for name in $(BENCH); do $(BIN)/python -m tests.benchmarks.bench_$$name || exit 1; done
