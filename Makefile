@@ -18,7 +18,7 @@ help:
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
-	@echo "make pages   every command and piece of Python of README and docs, run (8 min)"
+	@echo "make pages   every command and piece of Python of README and docs, run (15 min; make pages-sample 6)"
 	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (6 min)"
 	@echo "make service the daemon under systemd in a container: sandbox, restart, watchdog, reload, stop (root; 3 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
