@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help docs demo demo-linuxcnc live test long service pages pages-sample walks hidden hidden-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
+.PHONY: help docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -110,12 +110,16 @@ pages-sample: $(STAMP)
 
 # The worked examples of CONTRIBUTING.md.
 walks: $(STAMP)
+	$(PYTEST) -m long tests/system/test_contributing.py
+
+# All of them together, without what takes minutes.
+walks-sample: $(STAMP)
 	$(PYTEST) -m sample tests/system/test_contributing.py
 
 hidden: $(STAMP)
 	$(PYTEST) -m '' -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
 
-# The tutorial, a cause, a pair and a cause outside the library.
+# The tutorial, and a cause outside the library.
 hidden-sample: $(STAMP)
 	$(PYTEST) -m sample -n 2 --dist worksteal $(HIDDEN)
 
