@@ -89,7 +89,7 @@ long: $(STAMP)
 # Of the long ones those that .ci/run runs, but for the targets below.
 sample: $(STAMP)
 	$(PYTEST) -m sample -n 2 $(COMPUTED) $(DOCUMENTED:%=--ignore=%)
-	$(PYTEST) -m sample $(IN_REAL_TIME) $(REAL_TIME) $(ALONE:%=--ignore=%)
+	$(PYTEST) -m sample $(IN_REAL_TIME) $(filter-out $(ALONE),$(REAL_TIME)) $(ALONE:%=--ignore=%)
 	$(PYTEST) -m sample $(ALONE)
 
 # The unit under systemd, in a container; -rP prints the times of restart and stop. Skipped but for root with the
