@@ -69,8 +69,6 @@ DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py
 REAL_TIME := $(addprefix tests/system/,page processes linuxcnc test_chain.py test_fault_matrix.py \
   test_half_open_connections.py test_pushed_lines.py test_reference_examples.py test_simultaneous_sampling.py)
 COMPUTED := $(REAL_TIME:%=--ignore=%) $(HIDDEN:%=--ignore=%)
-# Of them what is late as soon as a browser runs beside it, and attacks, beside which others would be.
-ALONE := $(addprefix tests/system/,linuxcnc test_fault_matrix.py page/test_open_connections.py page/test_workers.py)
 # Files are shared out whole: what the tests of one share is made once.
 IN_REAL_TIME := -n 2 --dist loadfile
 
@@ -86,11 +84,10 @@ test: $(STAMP)
 long: $(STAMP)
 	$(PYTEST) -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) --ignore=$(SERVICE)
 
-# Of the long ones those that .ci/run runs, but for the targets below.
+# Of the long ones those that .ci/run runs, but for the targets below. Attacks and browsers have the computer for themselves.
 sample: $(STAMP)
 	$(PYTEST) -m sample -n 2 $(COMPUTED) $(DOCUMENTED:%=--ignore=%)
-	$(PYTEST) -m sample $(IN_REAL_TIME) $(filter-out $(ALONE),$(REAL_TIME)) $(ALONE:%=--ignore=%)
-	$(PYTEST) -m sample $(ALONE)
+	$(PYTEST) -m sample $(REAL_TIME)
 
 # The unit under systemd, in a container; -rP prints the times of restart and stop. Skipped but for root with the
 # packages debootstrap and systemd-container.
