@@ -6,20 +6,20 @@ STAMP  := $(VENV)/.installed
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help docs demo demo-linuxcnc live test long service pages walks hidden hidden-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
+.PHONY: help docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo    the main job on a simulated machine: gauges in, corrected setpoints out (20 s)"
 	@echo "make demo-linuxcnc  LinuxCNC corrected, a hidden effect probed, diagnosed, adopted (ten minutes; Debian's linuxcnc-uspace)"
 	@echo "make live    the same machine live in the browser, until Ctrl-C"
-	@echo "make test    the tests; a hidden cause is found on wires among them (10 to 15 min)"
-	@echo "make sample  some of the longer ones: the page in a real browser, drivers that misbehave, worked examples (7 min)"
+	@echo "make test    the tests; a hidden cause is found on wires among them (9 min)"
+	@echo "make sample  some of the longer ones: the page in a real browser, LinuxCNC, the fault matrix, fuzzers (12 min)"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
-	@echo "make pages   every command and piece of Python of README and docs, run (8 min)"
-	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (6 min)"
+	@echo "make pages   every command and piece of Python of README and docs, run (15 min; make pages-sample 6)"
+	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (8 min; make walks-sample 1)"
 	@echo "make service the daemon under systemd in a container: sandbox, restart, watchdog, reload, stop (root; 3 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make soak    a running daemon and random faults, held against the truth (4 min; OPTIONS=\"--minutes 60 --seed 7\")"
@@ -84,10 +84,10 @@ test: $(STAMP)
 long: $(STAMP)
 	$(PYTEST) -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) --ignore=$(SERVICE)
 
-# Of the long ones those that .ci/run runs, but for the targets below.
+# Of the long ones those that .ci/run runs, but for the targets below. Attacks and browsers have the computer for themselves.
 sample: $(STAMP)
 	$(PYTEST) -m sample -n 2 $(COMPUTED) $(DOCUMENTED:%=--ignore=%)
-	$(PYTEST) -m sample $(IN_REAL_TIME) $(REAL_TIME)
+	$(PYTEST) -m sample $(REAL_TIME)
 
 # The unit under systemd, in a container; -rP prints the times of restart and stop. Skipped but for root with the
 # packages debootstrap and systemd-container.
@@ -96,21 +96,32 @@ SERVICE := tests/system/test_service_in_container.py
 service: $(STAMP)
 	$(PYTEST) -m long -rsP $(SERVICE)
 
-# Every command and every piece of Python of README and docs/; the pages that run machines in real time beside no others.
+# Every command and every piece of Python of README and docs/; those with a machine in real time one after the other.
+PAGES := tests/system/test_pages.py
+
 pages: $(STAMP)
-	$(PYTEST) -m sample -n 2 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_runs
-	$(PYTEST) -m sample -n 2 --dist worksteal tests/system/test_pages.py -k test_everything_on_a_page_with_a_machine_runs
+	$(PYTEST) -m long -n 2 --dist worksteal $(PAGES) -k test_everything_on_a_page_runs
+	$(PYTEST) -m long $(PAGES) -k test_everything_on_a_page_with_a_machine_runs
+
+# Without the longest.
+pages-sample: $(STAMP)
+	$(PYTEST) -m sample -n 2 --dist worksteal $(PAGES) -k test_everything_on_a_page_runs
+	$(PYTEST) -m sample $(PAGES) -k test_everything_on_a_page_with_a_machine_runs
 
 # The worked examples of CONTRIBUTING.md.
 walks: $(STAMP)
+	$(PYTEST) -m long tests/system/test_contributing.py
+
+# All of them together, without what takes minutes.
+walks-sample: $(STAMP)
 	$(PYTEST) -m sample tests/system/test_contributing.py
 
 hidden: $(STAMP)
 	$(PYTEST) -m '' -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
 
-# The tutorial, a cause, a pair and a cause outside the library.
+# The tutorial, and a cause outside the library.
 hidden-sample: $(STAMP)
-	$(PYTEST) -m sample -n $(SIDE_BY_SIDE) --dist worksteal $(HIDDEN)
+	$(PYTEST) -m sample -n 2 --dist worksteal $(HIDDEN)
 
 lint: $(STAMP)
 	$(BIN)/ruff check
@@ -131,8 +142,8 @@ wheel: $(STAMP) docs
 	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
 
-SAMPLE := kinematics cycle compare diagnose
-BENCH := $(SAMPLE) loop latency flood throughput page gateway stream fleet kilohertz
+SAMPLE := kinematics cycle diagnose
+BENCH := $(SAMPLE) compare loop latency flood throughput page gateway stream fleet kilohertz
 
 bench: $(STAMP)
 	@for name in $(BENCH); do $(BIN)/python -m tests.benchmarks.bench_$$name || exit 1; done

@@ -112,7 +112,6 @@ def keep_old_value(broker: Broker) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.sample
 @pytest.mark.timeout(120)
 def test_a_server_that_stops_and_is_started_again() -> None:
     line = {"kind": "opc_ua", "endpoint": "opc.tcp://192.0.2.1:4840"}

@@ -63,7 +63,6 @@ def samplings(configuration: Configuration, directory: Path) -> tuple[list[int],
 
 
 @pytest.mark.long
-@pytest.mark.sample
 @pytest.mark.parametrize(("line", "samplings_of_a_cycle"), [({}, 9), ({"round_trigger": TRIGGER}, 1)])
 def test_a_cycle_has_one_latch_behind_a_trigger_and_nine_samplings_without(tmp_path, line, samplings_of_a_cycle):
     with run_directory() as directory:

@@ -40,7 +40,7 @@ class ModelWish(NamedTuple):
     hash: str = ""
 
 
-class _Read(NamedTuple):
+class _ReadModel(NamedTuple):
     """What became of reading the file of request `number`: its text, or why there is none."""
 
     number: int
@@ -62,7 +62,7 @@ class ModelSwitch:
         self._number = 0
         self._wish = ModelWish()
         self._answer: Callable[[bytes], None] | None = None
-        self._read: queue.SimpleQueue[_Read] = queue.SimpleQueue()
+        self._read: queue.SimpleQueue[_ReadModel] = queue.SimpleQueue()
         self._read_until_s = math.inf
         self._readers: list[threading.Thread] = []
 
@@ -118,13 +118,13 @@ class ModelSwitch:
     def _read_file(self, number: int, file: str, descriptor: int) -> None:
         """On a thread of its own."""
         try:
-            read = _Read(number, ModelText(file, read_descriptor(descriptor, LARGEST_BYTES)), "")
+            read = _ReadModel(number, ModelText(file, read_descriptor(descriptor, LARGEST_BYTES)), "")
         except OSError as error:
-            read = _Read(number, None, f"{file} cannot be read: {error.strerror or error}")
+            read = _ReadModel(number, None, f"{file} cannot be read: {error.strerror or error}")
         self._read.put(read)
         self._wake()
 
-    def _take(self, read: _Read) -> None:
+    def _take(self, read: _ReadModel) -> None:
         if read.number != self._number or self._answer is None:  # it came too late
             return
         if read.text is None:

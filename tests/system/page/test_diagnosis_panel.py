@@ -104,7 +104,6 @@ def test_rivals_and_formulas_are_handed_to_the_panels_that_plan_and_try(open_tab
     assert tab.evaluate("window.handed") == [["a", "b"], "f"]
 
 
-@pytest.mark.sample
 def test_it_is_cancelled_and_seen_in_another_browser_and_after_a_reload(open_tab):
     first, second = open_tab("two.model.yaml"), open_tab("two.model.yaml")
     first.locator("#diagnose").click()

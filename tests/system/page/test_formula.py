@@ -59,7 +59,6 @@ def fill_in_growth(tab):
     until(tab, "bench.trial && bench.tried_rms")
 
 
-@pytest.mark.sample
 def test_a_mistake_stands_under_the_formula_and_when_it_is_mended_the_residual_moves(open_tab):
     tab = open_tab("mistake.model.yaml")
     tab.locator("#formula-text").fill("k * link_mm * (temperature_link - 20")

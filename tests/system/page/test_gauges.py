@@ -34,7 +34,6 @@ def test_the_minute_before_is_there_when_the_page_opens(tab, chromium, live):
         assert other.evaluate(f"{times}.every((time, k) => !k || time > {times}[k - 1])")
 
 
-@pytest.mark.sample
 def test_the_faults_of_a_gauge_are_counted_and_its_accept_button_stays_while_numbers_change(tab, live):
     tab.locator("#gauge-table button").click()
     live.machine.ask("FAULT", line="frame_u", fault="unplugged")

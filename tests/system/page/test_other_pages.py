@@ -34,7 +34,6 @@ def test_who_may_look_only_can_order_nothing_and_the_end_of_the_daemon_is_seen(c
         assert tab.locator("#tip").inner_text() == "", "no number of what was"
 
 
-@pytest.mark.sample
 def test_a_daemon_that_is_killed_and_started_again_is_found_again(chromium):
     with served() as page, opened(chromium, page) as tab:
         with connect(page.socket) as daemon:

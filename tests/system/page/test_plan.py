@@ -44,7 +44,6 @@ def choose(tab, *rivals):
         tab.locator(f"#plan select[aria-label^='Rivals, number {k + 1}']").select_option(name)
 
 
-@pytest.mark.sample
 def test_the_rows_and_files_are_those_of_the_command(tab, directory, tmp_path):
     choose(tab, "link_elasticity", "joint_contact")
     tab.locator("#plan-rows").fill("12")

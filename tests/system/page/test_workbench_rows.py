@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
 SLOW_S = 200.0
 
 
-@pytest.mark.parametrize("rows", [pytest.param(5_000, marks=pytest.mark.sample), 100_000])
+@pytest.mark.parametrize("rows", [5_000, 100_000])
 def test_numbers_are_of_all_rows_and_pictures_of_some(chromium, tmp_path, rows):
     (tmp_path / "recordings").mkdir()
     path = record(tmp_path / "recordings", gauges(rows, 1), [hidden("link_expansion", 4.0)], name="long-1")

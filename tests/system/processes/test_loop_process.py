@@ -58,7 +58,6 @@ def largest_gap(seen: list[Seen]) -> int:
 
 
 @pytest.mark.long
-@pytest.mark.sample
 def test_adopting_a_model_and_a_shadow_costs_no_cycle(machine: Machine, tmp_path: Path) -> None:
     rate_hz = 1000.0
     shift_um = [60.0, -45.0, 30.0]

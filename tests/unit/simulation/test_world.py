@@ -32,6 +32,7 @@ OTHERS = [
 ]
 
 IDS = ["tripod", "hexapod", "under", "beside", "tool on plate"]
+arrangements = pytest.mark.parametrize(("geometry", "wires"), MACHINES + OTHERS, ids=IDS)
 machines = pytest.mark.parametrize(("geometry", "wires"), MACHINES, ids=["tripod", "hexapod"])
 
 

@@ -7,7 +7,9 @@ import json
 import os
 import signal
 import threading
+from multiprocessing import forkserver
 from multiprocessing.connection import wait
+from pathlib import Path
 
 import pytest
 
@@ -183,6 +185,23 @@ def test_of_a_group_the_free_one_that_knows_the_file_is_taken(workers):
     ask(second, "count", 1)
     first.end()
     assert group.free("a") in (first, second)
+
+
+def test_threads_that_ask_and_end_leave_the_process_that_workers_are_forked_from(workers):
+    """A server answers requests in threads that come and go; its imports take seconds."""
+    forkserver._forkserver._stop()  # the first of these threads starts it
+    forked_from = []
+
+    def ask_a_new_one():
+        worker = workers.worker("counter", COUNTER, (), LIMITS)
+        ask(worker, "count", 1)
+        forked_from.append(Path(f"/proc/{worker.pid}/stat").read_text().rpartition(")")[2].split()[1])
+
+    for _ in range(2):
+        thread = threading.Thread(target=ask_a_new_one)
+        thread.start()
+        thread.join()
+    assert forked_from[0] == forked_from[1]
 
 
 def test_at_the_end_no_process_is_left(workers):
