@@ -22,7 +22,7 @@ from compd.configuration.places import place_problems, place_warnings
 from compd.configuration.section import Section, readable
 from compd.errors import ConfigurationError, KinematicsError, Problem
 from compd.machine_builder import build_model
-from compd.machine_slips import slips
+from compd.machine_slips import axes_along_links, slips
 from compd.model.machine import MachineModel
 
 SectionT = TypeVar("SectionT", bound=Section)
@@ -55,7 +55,8 @@ def examine_whole(path: Path) -> Examined:
             with np.errstate(all="ignore"):
                 model = build_model(examined.geometry, examined.wiring)
         except (KinematicsError, ValueError) as error:
-            problems += _at_machine_zero(error, document, warnings)
+            along = list(axes_along_links(document, examined.geometry))
+            problems += _at_machine_zero(error, document, warnings, along)
         else:
             warnings += [
                 *_stroke_warnings(document, examined.geometry, model),
@@ -84,7 +85,9 @@ def _has_problem(problems: list[Problem]) -> bool:
     return any(problem.where.rpartition(" ")[2].startswith(("geometry", "wiring")) for problem in problems)
 
 
-def _at_machine_zero(error: Exception, document: Document, warnings: list[Problem]) -> Iterator[Problem]:
+def _at_machine_zero(
+    error: Exception, document: Document, warnings: list[Problem], along: list[Problem]
+) -> Iterator[Problem]:
     """What the kinematics finds impossible at machine zero, at the key that most likely is the reason."""
     found = error.problems if isinstance(error, KinematicsError) else (Problem(where="machine zero", what=str(error)),)
     in_metres = [warning for warning in warnings if warning.next_step.startswith(_IN_METRES)]
@@ -96,6 +99,8 @@ def _at_machine_zero(error: Exception, document: Document, warnings: list[Proble
         if in_metres:
             where, value = in_metres[0].where, in_metres[0].value
             next_step = "in metres? all lengths are in mm" + (f"; or {next_step}" if next_step else "")
+        elif along:
+            where, value, next_step = along[0].where, along[0].value, f"mend the axis: {along[0].next_step}"
         yield Problem(where=where, what=f"{problem.where}: {problem.what}", value=value, next_step=next_step)
 
 

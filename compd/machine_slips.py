@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
 from compd.configuration.document import Document, Location
-from compd.configuration.geometry import Geometry
+from compd.configuration.geometry import Geometry, ToolOnPlatformSettings
 from compd.errors import Problem
 from compd.model.machine import MachineModel
 
@@ -27,11 +27,33 @@ _TURNED_RAD = 0.1
 _RODS = ((0, 0), (0, 2), (1, 0), (1, 1), (2, 1), (2, 2))
 
 
+# Base joints lie beside their supports: no further than this part of the way from one support to the next, beyond what
+# the others do.
+_FAR = 0.1
+# A revolute axis is across its link: at most this is their scalar product, as unit vectors.
+_ALONG = 0.3
+# Half of the right angle to which a platform might be tilted at machine zero, rad: far more than any link allows.
+_TILTED_RAD = 0.8
+
+
 def slips(document: Document, geometry: Geometry, model: MachineModel) -> Iterator[Problem]:
     """A warning for each."""
     yield from _crossed_links(document, model)
     yield from _crossed_rods(document, geometry)
     yield from _far_joints(document, geometry)
+    yield from _base_beside_plate(document, geometry)
+    yield from axes_along_links(document, geometry)
+    upright = Rotation.from_rotvec(geometry.base.rotation_B0_in_M_rad).inv() * Rotation.from_matrix(
+        model.zero.rotation_M_P
+    )
+    tilted_rad = float(np.arccos(min(abs(upright.as_matrix()[2, 2]), 1.0)))
+    if tilted_rad > _TILTED_RAD:
+        yield Problem(
+            where=document.where(("geometry", "tool", "zero_rotation_P_in_M_rad")),
+            what="is not plausible: at machine zero the platform is tilted against the base",
+            value=f"{tilted_rad:.3g} rad",
+            next_step="in degrees? Rotation vectors are in rad",
+        )
     drawn = Rotation.from_rotvec(geometry.tool.zero_rotation_P_in_M_rad)
     turned_rad = (drawn.inv() * Rotation.from_matrix(model.zero.rotation_M_P)).magnitude()
     if turned_rad > _TURNED_RAD:
@@ -65,7 +87,12 @@ def _crossed_rods(document: Document, geometry: Geometry) -> Iterator[Problem]:
 
 
 def _far_joints(document: Document, geometry: Geometry) -> Iterator[Problem]:
-    squares = _squares(np.array(geometry.base.joints_B_mm), np.array(geometry.base.supports_B_mm))
+    supports_mm = np.array(geometry.base.supports_B_mm)
+    squares = _squares(np.array(geometry.base.joints_B_mm), supports_mm)
+    own_mm = np.sqrt([squares[joint, support - 1] for joint, support in enumerate(geometry.base.support_of_joint)])
+    allowed_mm = float(
+        np.median(own_mm) + _FAR * np.sqrt(_squares(supports_mm, supports_mm)[np.triu_indices(3, 1)].min())
+    )
     for joint, support in enumerate(geometry.base.support_of_joint):
         nearest = int(squares[joint].argmin())
         if squares[joint, nearest] < _CLEARLY * squares[joint, support - 1]:
@@ -74,6 +101,50 @@ def _far_joints(document: Document, geometry: Geometry) -> Iterator[Problem]:
                 what=f"is not plausible: base joint {joint + 1} is nearer to support {nearest + 1}",
                 value=str(support),
                 next_step=f"write {nearest + 1}, or look whether joints_B_mm and supports_B_mm are in order",
+            )
+        elif own_mm[joint] > allowed_mm:
+            yield Problem(
+                where=document.where(("geometry", "base", "joints_B_mm", joint)),
+                what=f"is not plausible: base joint {joint + 1} is far from its support {support}",
+                value=f"{own_mm[joint]:.1f} mm",
+                allowed=f"{allowed_mm:.1f} mm, after the other joints",
+                next_step="look into the drawing, or ignore this where the machine is so",
+            )
+
+
+def _base_beside_plate(document: Document, geometry: Geometry) -> Iterator[Problem]:
+    """The base's centre is above the triangle of the plate points, or the rods lean all to one side."""
+    corners_mm = np.array(geometry.plate_points_M_mm)
+    base_mm = np.array(geometry.base.origin_B0_in_M_mm)
+    normal = np.cross(corners_mm[1] - corners_mm[0], corners_mm[2] - corners_mm[0])
+    inside = [np.cross(corners_mm[(k + 1) % 3] - corners_mm[k], base_mm - corners_mm[k]) @ normal > 0 for k in range(3)]
+    if not all(inside):
+        yield Problem(
+            where=document.where(("geometry", "plate_points_M_mm")),
+            what="is not plausible: the base platform is not above the triangle of these points",
+            next_step="look at the signs of the points and of base.origin_B0_in_M_mm",
+        )
+
+
+def axes_along_links(document: Document, geometry: Geometry) -> Iterator[Problem]:
+    """A warning for each revolute axis that is not across its link, with the platform upright at machine zero."""
+    tool, base, platform = geometry.tool, geometry.base, geometry.platform
+    if not platform.revolute_axes_P or not isinstance(tool, ToolOnPlatformSettings):
+        return
+    turned = Rotation.from_rotvec(base.rotation_B0_in_M_rad)
+    base_mm = base.origin_B0_in_M_mm + turned.apply(base.joints_B_mm)
+    upright = Rotation.from_rotvec(tool.zero_rotation_P_in_M_rad)
+    joints_mm = tool.zero_tip_M_mm + upright.apply(np.array(platform.joints_P_mm) - tool.at_P_mm)
+    for k, axis in enumerate(platform.revolute_axes_P):
+        link = (base_mm[k] - joints_mm[k]) / np.linalg.norm(base_mm[k] - joints_mm[k])
+        along = abs(float(upright.apply(axis) @ link))
+        if along > _ALONG:
+            yield Problem(
+                where=document.where(("geometry", "platform", "revolute_axes_P", k)),
+                what=f"is not plausible: the axis is not across link {k + 1}, which turns about it",
+                value=f"{np.degrees(np.arccos(min(along, 1.0))):.0f} deg between them",
+                allowed="90 deg at an upright platform",
+                next_step="axes are tangential: (-sin, cos, 0) of the joint's angle",
             )
 
 

@@ -186,17 +186,15 @@ def _exchanged(figures: Figures) -> str:
 def _late(figures: Figures) -> str:
     gauges = figures.configuration.gauges
     late = [
-        (jump.poll_s * (gauges[jump.gauge].fastest_mm_per_s or _USUAL_SPEED_MM_PER_S), jump)
+        (jump.quiet.poll_s * (gauges[jump.gauge].fastest_mm_per_s or _USUAL_SPEED_MM_PER_S), jump)
         for jump in figures.jumps
-        if any(length.startswith("scale") for length in jump.measures) and math.isfinite(jump.poll_s)
+        if any(length.startswith("scale") for length in jump.measures) and math.isfinite(jump.quiet.poll_s)
     ]
     if not late:
         return ""
     late_mm, jump = max(late, key=lambda entry: entry[0])
     error_mm = late_mm * figures.leverage("scale")
-    return (
-        f"{jump.gauge}, {jump.poll_s * 1e3:.3g} ms late at {late_mm / jump.poll_s:g} mm/s: {error_mm:.2f} mm at the tip"
-    )
+    return f"{jump.gauge}, {jump.quiet.poll_s * 1e3:.3g} ms late at {late_mm / jump.quiet.poll_s:g} mm/s: {error_mm:.2f} mm at the tip"
 
 
 def _small_jump(figures: Figures) -> str:

@@ -89,6 +89,16 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
                 next_step="raise the baud rate, read registers in one block, or spread the gauges over more lines",
             )
         )
+    elif budget.line.poll_every_s + budget.usual_s > stale_after_s:
+        problems.append(
+            Problem(
+                where=where,
+                what="readings are stale before the next ones come, time and again",
+                value=f"poll_every_s {budget.line.poll_every_s:g}, {stale_after_s:g} s until stale",
+                allowed=f"poll_every_s below {max(stale_after_s - budget.usual_s, 0.0):.3g} s",
+                next_step="in ms? It is in seconds. Poll more often, or raise `stale_after_s` of the line's gauges",
+            )
+        )
     if budget.line.poll_every_s and budget.usual_s > budget.line.poll_every_s:
         problems.append(
             Problem(

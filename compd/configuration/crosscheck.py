@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from compd.configuration.document import Location
-from compd.configuration.line_checks import line_problems, line_warnings
+from compd.configuration.line_checks import line_problems
+from compd.configuration.line_slips import line_slips
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.configuration.sections import Sections
 from compd.errors import Problem
@@ -55,7 +56,7 @@ def warnings(sections: Sections) -> list[Problem]:
     ]
     return [
         *unused,
-        *line_warnings(sections),
+        *line_slips(sections),
         *_option_warnings(sections),
         *_vote_warnings(sections),
         *_shared_process_warnings(sections),

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import ipaddress
-import re
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from typing import NamedTuple
-
-from serial import Serial
 
 from compd.configuration.document import Location
 from compd.configuration.lines import CARRIES
 from compd.configuration.sections import Sections
 from compd.errors import Problem
 from compd.text.number_text import join_words
-
-# A rate that is nearer than this to a usual one, and is not it, is a slip.
-_SLIP = 0.02
 
 
 class _Library(NamedTuple):
@@ -40,49 +33,6 @@ def line_problems(sections: Sections) -> Iterator[Problem]:
     yield from _process_problems(sections)
 
 
-def line_warnings(sections: Sections) -> Iterator[Problem]:
-    """Slips in a port, a rate or an address, with which a line is never opened or opened wrongly."""
-    for name, line in sections.lines.items():
-        port, baud, host = (getattr(line, key, None) for key in ("port", "baud", "host"))
-        if isinstance(port, str) and "://" not in port and not port.startswith("/"):
-            yield Problem(
-                where=sections.document.where(("lines", name, "port")),
-                what="is no port of this computer",
-                value=port,
-                allowed="a path as /dev/serial/by-id/..., or socket://host:port, rfc2217://host:port",
-                next_step="`compd gauge scan` lists the ports",
-            )
-        usual = _usual_rate(baud) if isinstance(baud, int) else baud
-        if usual != baud:
-            yield Problem(
-                where=sections.document.where(("lines", name, "baud")),
-                what="is no usual rate",
-                value=str(baud),
-                next_step=f"write {usual}, or ignore this where the device has its own",
-            )
-        if host is not None and re.fullmatch(r"[0-9.]+", host) and not _is_address(host):
-            yield Problem(
-                where=sections.document.where(("lines", name, "host")),
-                what="is no IP address: that has four numbers. The system may take it for another one",
-                value=host,
-                next_step="write all four",
-            )
-
-
-def _usual_rate(baud: int) -> int:
-    """A usual rate that is very near, or the rate itself."""
-    nearest: int = min(Serial.BAUDRATES, key=lambda rate: abs(rate - baud))
-    return nearest if abs(nearest - baud) < _SLIP * nearest else baud
-
-
-def _is_address(host: str) -> bool:
-    try:
-        ipaddress.IPv4Address(host)
-    except ValueError:
-        return False
-    return True
-
-
 def _port_problems(sections: Sections) -> Iterator[Problem]:
     """A port or an address that two lines name: behind one address a gateway's units wait for each other."""
     line_of_port: dict[str, str] = {}
@@ -90,7 +40,7 @@ def _port_problems(sections: Sections) -> Iterator[Problem]:
         port = getattr(line, "port", None)
         if port is None or getattr(line, "kind", None) in (None, "mqtt"):  # a broker takes many connections
             continue
-        port = _endpoint(f"//{line.host}:{port}" if line.kind in ("tcp", "modbus_tcp") else port)
+        port = endpoint(f"//{line.host}:{port}" if line.kind in ("tcp", "modbus_tcp") else port)
         if port in line_of_port:
             yield Problem(
                 where=sections.document.where(("lines", name, "port")),
@@ -102,7 +52,7 @@ def _port_problems(sections: Sections) -> Iterator[Problem]:
         line_of_port[port] = name
 
 
-def _endpoint(port: str) -> str:
+def endpoint(port: str) -> str:
     """A port by one spelling: host:port for any that is reached by TCP, whatever is spoken there."""
     scheme, slashes, address = port.partition("//")
     if not slashes or scheme not in ("", "socket:", "rfc2217:"):

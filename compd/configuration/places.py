@@ -15,6 +15,19 @@ from compd.errors import Problem
 _OF_SERVICE_MANAGER = tuple(map(Path, ("/run", "/var/lib")))
 # File systems of the kernel, in which nobody can make a directory.
 _OF_KERNEL = tuple(map(Path, ("/proc", "/sys")))
+# In memory, as a rule.
+_EMPTIED = tuple(map(Path, ("/run", "/var/run", "/dev/shm")))
+# Directories of the Filesystem Hierarchy Standard 3.0 that no program has for itself.
+_SYSTEMS = frozenset(
+    map(
+        Path,
+        (
+            *("/bin", "/boot", "/dev", "/etc", "/home", "/lib", "/media", "/mnt", "/opt", "/root", "/run", "/sbin"),
+            *("/srv", "/usr", "/usr/bin", "/usr/lib", "/usr/local", "/usr/share"),
+            *("/var", "/var/cache", "/var/lib", "/var/log", "/var/run", "/var/spool"),
+        ),
+    )
+)
 
 
 def place_problems(document: Document, sockets: SocketSettings | None, state: StateSettings | None) -> list[Problem]:
@@ -70,40 +83,30 @@ def place_warnings(document: Document, sockets: SocketSettings | None, state: St
             )
     return [
         *warnings,
-        *_public_directory_warnings(document, sockets, state),
-        *_own_port_warnings(document, sockets),
+        *_directory_slips(document, sockets, state),
         *_open_socket_warnings(document, sockets),
     ]
 
 
-def _own_port_warnings(document: Document, sockets: SocketSettings | None) -> Iterator[Problem]:
-    """A line whose device is the daemon itself."""
-    lines = document.data.get("lines")
-    if sockets is None or sockets.tcp is None or not isinstance(lines, dict):
-        return
-    for name, line in lines.items():
-        if not isinstance(line, dict) or line.get("port") != sockets.tcp.port:
-            continue
-        if line.get("host") in ("localhost", "127.0.0.1", "::1", sockets.tcp.host):
-            yield Problem(
-                where=document.where(("lines", name, "port")),
-                what="is the daemon's own port, under sockets.tcp",
-                value=str(sockets.tcp.port),
-                next_step="write the device's address and port",
-            )
-
-
-def _public_directory_warnings(
+def _directory_slips(
     document: Document, sockets: SocketSettings | None, state: StateSettings | None
 ) -> Iterator[Problem]:
-    """A directory in which every user of the computer may put a file or take a name."""
+    """A directory that is everybody's, the system's, or emptied when the computer starts."""
     for location, path, what_for in _directories(sockets, state):
-        if path.is_dir() and path.stat().st_mode & stat.S_IWOTH:
+        existing = _nearest(path)
+        why = ""
+        if existing.is_dir() and existing.stat().st_mode & stat.S_IWOTH:
+            why = f"is everybody's, as {existing} is: any user of this computer can put a file there"
+        elif path in _SYSTEMS or path.parent == path:
+            why = "is the system's: its files would lie among others, and its rights would be changed"
+        elif location[0] == "state" and any(path.is_relative_to(place) for place in _EMPTIED):
+            why = "is emptied when the computer starts"
+        if why:
             yield Problem(
                 where=document.where(location),
-                what=f"the directory for {what_for} is everybody's: any user of this computer can put a file there",
+                what=f"the directory for {what_for} {why}",
                 value=str(path),
-                next_step="choose one of its own, such as /var/lib/compd and /run/compd",
+                next_step="choose one of its own, such as /var/lib/compd for files and /run/compd for the socket",
             )
 
 

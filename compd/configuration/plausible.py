@@ -17,6 +17,9 @@ from compd.gauge import GaugeOptions
 # A coordinate below this, with all others of its list, is more likely in metres than of a machine for a watchmaker.
 _SMALLEST_MACHINE_MM = 5.0
 _LARGEST_MACHINE_MM = 1e5
+# Of a rotation vector, rad, as people round it up.
+_PI = 3.15
+_DEGREES = "a rotation vector is no longer than pi. In degrees?"
 
 
 class PlausibleRange(NamedTuple):
@@ -76,6 +79,10 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
         "a line that is gone would be opened without a pause",
         "a cable that is plugged in again would be found only after that time",
     ),
+    PlausibleRange(
+        "lines.*.baud", 110, 1_000_000, "baud",
+        "slower than a teleprinter", "no gauge on RS-232 or RS-485 is so fast",
+    ),
     PlausibleRange("lines.*.pause_s", 0, 1, "s", "", "devices are deaf for milliseconds after a reply"),
     PlausibleRange("lines.*.poll_every_s", 0, 60, "s", "", "readings would be a minute old and more"),
     PlausibleRange(
@@ -126,6 +133,8 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
     PlausibleRange(
         "geometry.link_length_mm.*", 20, 20_000, "mm", "shorter than its own joints", "longer than any machine's"
     ),
+    PlausibleRange("geometry.base.rotation_B0_in_M_rad.*", -_PI, _PI, "rad", _DEGREES, _DEGREES),
+    PlausibleRange("geometry.tool.zero_rotation_P_in_M_rad.*", -_PI, _PI, "rad", _DEGREES, _DEGREES),
     PlausibleRange("geometry.plate_thickness_mm", 2, 5000, "mm", "a sheet is no surface plate", "no plate is so thick"),
     PlausibleRange(
         "geometry.scale_signal_period_mm", 1e-4, 10, "mm",

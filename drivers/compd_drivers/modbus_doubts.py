@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 
@@ -9,11 +10,16 @@ from compd.gauge import OptionDoubt
 from compd_drivers.modbus_description import ModbusChannel
 from compd_drivers.modbus_number import FLOATS
 
-# Modbus's "reference numbers": in a manual 30001 is the first input register, 40001 the first holding register.
-_REFERENCES = {3: 40001, 4: 30001}
+# Modbus's "reference numbers": in a manual 10001 is the first discrete input, 30001 the first input register, 40001 the
+# first holding register.
+_REFERENCES = {10001: 2, 30001: 4, 40001: 3}
 _HIGHEST_REFERENCE = 9999
 # No sensor of a machine shows so much, in any unit; an ill factor is wrong by ten or more.
 _LARGEST = {"degC": 5e3, "hPa": 1e5, "pct": 1e4}
+# No sensor of a machine has a digit as coarse as that; a float's digit is fine, and its factor turns kelvin or
+# fahrenheit into degC at most.
+_COARSEST = {"mm": 0.1, "degC": 2.0}
+_FLOATS_FACTOR = {"degC": 1.0}
 
 
 def doubts(channels: Sequence[ModbusChannel]) -> Iterator[OptionDoubt]:
@@ -27,22 +33,40 @@ def doubts(channels: Sequence[ModbusChannel]) -> Iterator[OptionDoubt]:
                 "look the addresses up in the manual: a float32 takes two registers, a float64 four",
             )
     for k, channel in enumerate(channels):
-        first = _REFERENCES.get(channel.function, 0)
-        if first and first <= channel.address < first + _HIGHEST_REFERENCE:
-            yield OptionDoubt(
-                ("channels", k, "address"),
-                "is more likely the manual's number of a register than its address, which counts from 0",
-                str(channel.address),
-                f"write {channel.address - first}, as the manual counts from {first}",
-            )
-        largest = _largest(channel)
-        if largest > _LARGEST.get(channel.unit, largest):
+        for first, function in _REFERENCES.items():
+            if first <= channel.address < first + _HIGHEST_REFERENCE:
+                yield OptionDoubt(
+                    ("channels", k, "address"),
+                    "is more likely the manual's number of a register than its address, which counts from 0",
+                    f"{channel.address}, by function {channel.function}",
+                    f"write {channel.address - first} and function {function}, as the manual counts from {first}",
+                )
+        if why := _why_no_factor(channel):
             yield OptionDoubt(
                 ("channels", k, "scale"),
-                f"is not plausible: the register's largest number would be {largest:g} {channel.unit}",
+                f"is not plausible: {why}",
                 f"{channel.scale:g}",
                 f"write {channel.unit} per count: 0.1 where the register has tenths",
             )
+
+
+def _why_no_factor(channel: ModbusChannel) -> str:
+    """What is wrong with a channel's `scale`; "" where nothing is, or nobody can say."""
+    if channel.scale == 0:
+        return "the value would never change"
+    if channel.linearisation is not None or channel.type == "bit":
+        return ""
+    if channel.scale < 0 and channel.unit == "degC":
+        return "it would fall where it becomes warmer"
+    digit = abs(channel.scale)
+    if channel.type in FLOATS:
+        return "a float is in the unit itself" if digit > _FLOATS_FACTOR.get(channel.unit, digit) else ""
+    if digit >= _COARSEST.get(channel.unit, math.inf):
+        return f"one count would be {digit:g} {channel.unit}"
+    largest = _largest(channel)
+    if largest > _LARGEST.get(channel.unit, largest):
+        return f"the register's largest number would be {largest:g} {channel.unit}"
+    return ""
 
 
 def _span(channel: ModbusChannel) -> str:
@@ -64,7 +88,7 @@ def _takes_all(channel: ModbusChannel) -> bool:
 
 def _largest(channel: ModbusChannel) -> float:
     """The largest number that a whole number's registers can hold, in the channel's unit; 0 where nobody can say."""
-    if channel.type in FLOATS or channel.linearisation is not None or channel.highest is not None:
+    if channel.highest is not None:
         return 0.0
     bits = 8 * channel.bytes
     # more than 16 bits are seldom used up

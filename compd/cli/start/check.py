@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from compd.commissioning.feigned_jumps import FeignedJump
+    from compd.commissioning.feigned_jumps import BelievedJump, FeignedJump
     from compd.commissioning.line_budget import LineBudget
     from compd.configuration import Configuration
     from compd.errors import Problem
@@ -219,16 +219,32 @@ def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
     from compd.commissioning.feigned_jumps import named_together
     from compd.report.terminal_table import keep_words_whole
 
-    title = "Largest jump that is believed"
-    table = Table("gauge", "measures", "ms to the next reading", "jump, um", title=title, title_justify="left")
+    title = "Largest jump that is believed of a machine at rest; on the move it is larger"
+    table = Table(
+        "gauge",
+        "measures",
+        "ms to the next reading",
+        "jump, um",
+        "ms, four busy processes",
+        "jump, um",
+        title=title,
+        title_justify="left",
+    )
     for column in table.columns[2:]:
         column.justify = "right"
     for jump in jumps:
-        poll = "?" if math.isnan(jump.poll_s) else f"{jump.poll_s * 1e3:.1f}"
-        size = "any" if math.isinf(jump.jump_mm) else "?" if math.isnan(jump.jump_mm) else f"{jump.jump_mm * 1e3:.3g}"
-        table.add_row(jump.gauge, named_together(jump.measures), poll, size)
+        cells = [cell for believed in (jump.quiet, jump.busy) for cell in _believed_cells(believed)]
+        table.add_row(jump.gauge, named_together(jump.measures), *cells)
     console = Console()
     console.print(keep_words_whole(table, console.width))
+
+
+def _believed_cells(believed: BelievedJump) -> tuple[str, str]:
+    """Milliseconds and micrometres; "?" where they are not known."""
+    poll = "?" if math.isnan(believed.poll_s) else f"{believed.poll_s * 1e3:.1f}"
+    if math.isinf(believed.jump_mm):
+        return poll, "any"
+    return poll, "?" if math.isnan(believed.jump_mm) else f"{believed.jump_mm * 1e3:.3g}"
 
 
 def _rates(usual_hz: float, ideal_hz: float) -> str:

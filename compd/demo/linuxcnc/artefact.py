@@ -101,7 +101,7 @@ def write_probed_recording(path: Path, gauges: Sequence[Path], rounds: Sequence[
 
     gauges : the parts that `compd record` has written meanwhile. rounds : the motion log of each run of the probing
     program. Returns the number of rows. Corners of a round that was not finished are left out, and so are those for
-    which the gauges were not recorded.
+    which the gauges were not recorded, or at which the feed was held: the corrections stood.
     """
     recorded = [_recorded(part) for part in gauges]
     rows: list[dict[str, float]] = []
@@ -110,7 +110,8 @@ def write_probed_recording(path: Path, gauges: Sequence[Path], rounds: Sequence[
             zip(reading_times_s(samples), CORNERS_mm, strict=False), 1
         ):
             found = [row for times_s, table in recorded for row in _between(times_s, table, start_s, end_s)]
-            if found:
+            held = any(sample.inhibited for sample in samples if start_s <= sample.time_s <= end_s)
+            if found and not held:
                 reference = {
                     f"reference_{axis}_mm": place + CLEAR_mm for axis, place in zip("xyz", corner_mm, strict=True)
                 }

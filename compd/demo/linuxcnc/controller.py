@@ -10,7 +10,7 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -26,8 +26,12 @@ POLL_S = 0.05
 # How often a person presses a switch that does nothing, and waits for it, s.
 PRESSES, PRESSED_S = 3, 1.0
 # Longer than anything the panel waits for by itself.
-ANSWER_S = 30.0
+ANSWER_S = 90.0
 LINKS = 6
+# In a message that the servo thread was late, which stops no program.
+LATENESS = "realtime delay"
+# How often somebody looks whether a program still runs, s.
+LOOK_S = 1.0
 # Corrections have arrived within so much of what is asked for, which changes all the time; and that takes at most, s.
 ARRIVED_MM, ARRIVED_S = 2e-4, 10.0
 # There can be one LinuxCNC on a computer.
@@ -150,14 +154,24 @@ class LinuxCnc:
 
     def arm(self) -> None:
         """Press the bridge's switch until it is armed. Raises DaemonError with its reason where it refuses."""
-        for tries_left in reversed(range(PRESSES)):
-            self.do("press", name="compd-arm")
-            try:
-                self.wait_for("compd.armed", True, PRESSED_S)
+        for _ in range(PRESSES):
+            if self.arms():
                 return
-            except DaemonError:  # a setpoint was late just then
-                if not tries_left:
-                    raise
+        raise self._problem(f"the bridge does not arm: {self.held_by() or 'a setpoint was late'}")
+
+    def arms(self) -> bool:
+        """Press the bridge's switch once: whether it is armed then. It refuses where a setpoint was late just then."""
+        self.do("press", name="compd-arm")
+        try:
+            self.wait_for("compd.armed", True, PRESSED_S)
+        except DaemonError:
+            return False
+        return True
+
+    def held_by(self) -> str:
+        """Why the feed is held; "" where it is not. A program stands then until the bridge is armed again."""
+        reason: str = self.ask("held_by")
+        return reason
 
     def without_corrections(self) -> None:
         """Let the machine move although the bridge is not armed."""
@@ -165,7 +179,10 @@ class LinuxCnc:
         self.set_signal("compd-required", "0")
 
     def with_corrections(self) -> None:
-        """Let the machine move only while the bridge is armed, arm it, and wait until the corrections have arrived."""
+        """Let the machine move only while the bridge is armed, arm it, and wait until the corrections have arrived.
+
+        Raises DaemonError where it cannot be armed, or is not armed so long.
+        """
         self.set_signal("compd-required", "1")
         self.arm()
         asked = [f"compd.link.{link}.offset" for link in range(LINKS)]
@@ -173,6 +190,8 @@ class LinuxCnc:
         end_s = time.monotonic() + ARRIVED_S
         while True:
             values = self.values([*asked, *applied])
+            if reason := self.held_by():
+                raise self._problem(f"the bridge does not stay armed: {reason}")
             if all(abs(values[a] - values[b]) < ARRIVED_MM for a, b in zip(asked, applied, strict=True)):
                 return
             if time.monotonic() > end_s:
@@ -202,16 +221,25 @@ class LinuxCnc:
         """Begin a G-code program."""
         self.do("start", program=str(program))
 
-    def run(self, program: Path, timeout_s: float) -> tuple[float, float]:
+    def run(self, program: Path, timeout_s: float, attend: Callable[[str], None] | None = None) -> tuple[float, float]:
         """Run a G-code program to its end; returns when it began and ended, s on CLOCK_MONOTONIC.
+
+        attend : called with the reason, about once a second, while the feed is held: what an operator does then.
 
         Raises DaemonError where it does not come to its end, or LinuxCNC shows an error.
         """
         shown, start_s = len(self.errors), time.monotonic()
         self.start(program)
-        self.do("wait_for_end", timeout_s + ANSWER_S, seconds=timeout_s)
-        if self.errors[shown:]:
-            raise self._problem(f"stopped {program.name}: {self.errors[shown:]}")
+        while not self.ask("wait_for_end", seconds=LOOK_S):
+            held_by = self.held_by()
+            if time.monotonic() - start_s > timeout_s:
+                stands = f"the feed is held: {held_by}" if held_by else "the feed is not held"
+                raise self._problem(f"{program.name} has not ended within {timeout_s:g} s; {stands}")
+            if held_by and attend is not None:
+                attend(held_by)
+        errors = [error for error in self.errors[shown:] if LATENESS not in error]
+        if errors:
+            raise self._problem(f"stopped {program.name}: {errors}")
         return start_s, time.monotonic()
 
     # --- process --------------------------------------------------------------------------------------

@@ -22,7 +22,8 @@ from compd.demo.linuxcnc.motion_log import MotionSample, TipErrors, read_motion_
 from compd.demo.live import take_zero
 from compd.demo.processes import Command, run_commands
 from compd.demo.simulated_daemon import simulated_daemon
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError, DaemonError, Problem
+from compd.gauge import Quality
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.wires.control_client import ControlClient
 
@@ -37,6 +38,8 @@ ROUNDS_W = (3.0, 3.0, 0.3, 3.0)
 # The rest of the machine's heat, as after switch-on: base ring, cabinet by column, platform, tool, lamps.
 _OTHER_HEAT = {"ring_W": 12.0, "cabinet_W": [8.0, 3.0, 4.0], "platform_W": 0.4, "tool_W": 0.0, "lamps_W": 3.0}
 LONGEST_PROGRAM_S = 600.0
+# A computer that is busy disarms the bridge: how often corrections are switched on, before that is an error.
+ARMINGS = 20
 # An error below so many times the noise is not worth a further effect in the model.
 NOISE_RATIO = 2.0
 # The correction of another model is reached at `limits.slew_mm_per_s`: 0.2 mm in 0.4 s.
@@ -88,16 +91,16 @@ def run_linuxcnc_demo(
         write_artefact(directory / "artefact.json")
         take_zero(directory / "compd.sock")
         with LinuxCnc(directory / "controller", directory) as controller:
-            session = _Session(configuration, directory, controller, program)
+            session = _Session(configuration, directory, controller, program, tell)
             controller.switch_on()
-            controller.with_corrections()
+            session.correct()
             tell(f"LinuxCNC is homed. Probing {len(CORNERS_mm)} calibrated corners while the machine warms up ...")
             recording = out / "probed.csv"
-            demo.rows = session.probe(recording, tell)
+            demo.rows = session.probe(recording)
             controller.without_corrections()
             tell("The program, without corrections ...")
             demo.errors[OFF] = session.run_program()
-            controller.with_corrections()
+            session.correct()
             tell("The program, with corrections ...")
             demo.errors[ON] = session.run_program()
             tell(f"compd diagnose {recording}")
@@ -115,8 +118,15 @@ def run_linuxcnc_demo(
 class _Session:
     """A controller on a simulated machine with its daemon, and what is done there more than once."""
 
-    def __init__(self, configuration: Configuration, directory: Path, controller: LinuxCnc, program: Path) -> None:
-        self._directory, self._controller = directory, controller
+    def __init__(
+        self,
+        configuration: Configuration,
+        directory: Path,
+        controller: LinuxCnc,
+        program: Path,
+        tell: Callable[[str], None],
+    ) -> None:
+        self._directory, self._controller, self._tell = directory, controller, tell
         self._mechanism = Mechanism(configuration.geometry)
         self._links = configuration.geometry.links
         self._program = self._copied("program.ngc", program.read_text())
@@ -125,7 +135,18 @@ class _Session:
     def run_program(self) -> TipErrors:
         return tip_errors(self._mechanism, self._run(self._program))
 
-    def probe(self, recording: Path, tell: Callable[[str], None]) -> int:
+    def correct(self) -> None:
+        """Switch the corrections on. Raises DaemonError where they do not stay on, ARMINGS times."""
+        for tries_left in reversed(range(ARMINGS)):
+            try:
+                self._controller.with_corrections()
+                return
+            except DaemonError:
+                if not tries_left:
+                    raise
+                self._acknowledge()
+
+    def probe(self, recording: Path) -> int:
         """Probe every corner some times beside a recorder; write the recording, and return its rows."""
         stem = self._directory / "gauges"
         rounds = []
@@ -135,7 +156,7 @@ class _Session:
         )
         with run_commands([record], log=self._directory / "record.log"):
             for number, drive_W in enumerate(ROUNDS_W, 1):
-                tell(f"  round {number} of {len(ROUNDS_W)}, {drive_W:g} W in each drive")
+                self._tell(f"  round {number} of {len(ROUNDS_W)}, {drive_W:g} W in each drive")
                 self.heat(drive_W)
                 rounds.append(self._run(self._probing))
         return write_probed_recording(recording, sorted(self._directory.glob("gauges-*.csv")), rounds)
@@ -155,8 +176,22 @@ class _Session:
                     return
 
     def _run(self, program: Path) -> list[MotionSample]:
-        start_s, end_s = self._controller.run(program, LONGEST_PROGRAM_S)
+        start_s, end_s = self._controller.run(program, LONGEST_PROGRAM_S, self._go_on)
         return read_motion_log(self._controller.motion_log, start_s, end_s)
+
+    def _go_on(self, held_by: str) -> None:
+        """What an operator does whose machine stands: acknowledge what waits for it, and arm."""
+        acknowledged = self._acknowledge()
+        outcome = "armed again" if self._controller.arms() else "not armed yet"
+        self._tell(f"  The feed was held: {held_by}. {', '.join([*acknowledged, outcome])}.")
+
+    def _acknowledge(self) -> list[str]:
+        """Accept every gauge that waits for a person; what was accepted, in words. In this machine none is wrong."""
+        with connect(self._directory / "compd.sock", ADOPTED_S) as daemon:
+            gauges = [gauge["channel"] for gauge in daemon.status()["gauges"] if gauge["quality"] == Quality.DISTRUSTED]
+            for gauge in gauges:
+                daemon.accept(gauge)
+        return [f"{gauge} accepted" for gauge in gauges]
 
     def _copied(self, name: str, text: str) -> Path:
         path = self._controller.directory / name

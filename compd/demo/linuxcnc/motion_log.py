@@ -85,8 +85,8 @@ def wanted_tips_mm(mechanism: Mechanism, nominal_mm: Iterable[FloatArray]) -> li
 
 
 def tip_errors(mechanism: Mechanism, samples: Sequence[MotionSample]) -> TipErrors:
-    """Of every sample that has the true tip."""
-    with_tip = [number for number, sample in enumerate(samples) if sample.tip_mm is not None]
+    """Of every sample that has the true tip, but for those at which the feed was held: the program stood."""
+    with_tip = [number for number, sample in enumerate(samples) if sample.tip_mm is not None and not sample.inhibited]
     wanted_mm = wanted_tips_mm(mechanism, (samples[number].nominal_mm for number in with_tip))
     true_mm = np.array([samples[number].tip_mm for number in with_tip]).reshape(-1, 3)
     time_s = np.array([samples[number].time_s for number in with_tip])

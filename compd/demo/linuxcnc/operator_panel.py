@@ -18,11 +18,12 @@ from typing import Any
 
 import hal
 import linuxcnc
+from compd_arming import REASONS
 
 POLL_S = 0.01
 PRESS_S = 0.1
 # LinuxCNC's own answer to one command.
-COMMAND_S = 5.0
+COMMAND_S = 15.0
 SOCKET = Path("panel.sock")
 
 
@@ -78,6 +79,14 @@ class Operator:
     def values(self, names: list[str]) -> dict[str, Any]:
         """Of pins and signals."""
         return {name: hal.get_value(name) for name in names}
+
+    def held_by(self) -> str:
+        """Why the feed is held, in the bridge's words; "" where it is not."""
+        if not hal.get_value("compd-inhibit"):
+            return ""
+        if hal.get_value("compd.armed"):
+            return "the watchdog has bitten: no good setpoint came in time"
+        return REASONS[hal.get_value("compd.reason")]
 
     def set_signal(self, name: str, value: str) -> bool:
         return subprocess.run(["halcmd", "sets", name, value], check=False).returncode == 0

@@ -10,12 +10,20 @@ import pytest
 
 from compd.commissioning.blind_spots import BLIND_SPOTS, drift_costs, figures_of
 from compd.commissioning.cycle_time import CycleTime, cycle_warnings, measure_cycle, python_effect_times
-from compd.commissioning.feigned_jumps import feigned_jumps, jump_warnings, named_together, reply_warnings
+from compd.commissioning.feigned_jumps import (
+    LATE_BUSY_S,
+    LATE_S,
+    feigned_jumps,
+    jump_warnings,
+    named_together,
+    reply_warnings,
+)
 from compd.commissioning.line_budget import line_budgets
 from compd.configuration import Configuration, load
-from compd.gauge import Gauge
-from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
-from compd.live.acquisition.reading_trust import tolerance_mm
+from compd.gauge import Gauge, GaugeOptions, Quality, Reading, good
+from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample, MotionLimits, unseen_jump_mm
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.memory.trust_memory import TrustMemory
 from tests.support.command import run_in_process
 from tests.support.live_models import file_with
 from tests.support.paths import CONFIG
@@ -37,7 +45,7 @@ def changed(tmp_path: Path, *pairs: tuple[str, str]) -> Configuration:
 def test_the_shipped_machines_have_limits_and_no_warnings(name: str) -> None:
     configuration = load(CONFIG / f"{name}.yaml")
     jumps = feigned_jumps(configuration, line_budgets(configuration))
-    assert all(0 < jump.jump_mm < 0.1 for jump in jumps)
+    assert all(0 < jump.quiet.jump_mm < 0.12 and jump.quiet.jump_mm < jump.busy.jump_mm < 1.0 for jump in jumps)
     assert [*jump_warnings(configuration, jumps), *reply_warnings(configuration)] == []
 
 
@@ -49,8 +57,38 @@ def test_a_jump_is_believed_up_to_acceleration_and_noise(tmp_path: Path) -> None
     budgets = line_budgets(configuration)
     poll_s = next(budget.usual_s for budget in budgets if budget.name == "joints")
     jump = next(jump for jump in feigned_jumps(configuration, budgets) if jump.gauge == "joints")
-    assert jump.jump_mm == unseen_jump_mm(MotionLimits(acceleration=10), poll_s, tolerance_mm(0.5))
+    for believed, late_s in ((jump.quiet, LATE_S), (jump.busy, LATE_BUSY_S)):
+        assert believed.poll_s == poll_s + late_s
+        assert believed.jump_mm == unseen_jump_mm(MotionLimits(acceleration=10), poll_s + late_s, tolerance_mm(0.5))
     assert named_together(jump.measures) == "joint 1 to 9"
+
+
+@pytest.mark.parametrize("name", ["tripod-cmm", "hexapod"])
+@pytest.mark.parametrize("column", ["quiet", "busy"])
+def test_a_larger_jump_than_the_table_has_is_never_believed(name: str, column: str) -> None:
+    """Readings as far apart as the table says, up to the last digit of the display, in either direction."""
+    configuration = load(CONFIG / f"{name}.yaml")
+    for jump in feigned_jumps(configuration, line_budgets(configuration)):
+        options = configuration.gauges[jump.gauge]
+        believed = getattr(jump, column)
+        for share in (1.02, 1.5, 10.0, -1.02, -10.0):
+            found = after_a_jump(options, believed.poll_s, share * believed.jump_mm)
+            assert found.quality is Quality.DISTRUSTED, (jump.gauge, share)
+        assert after_a_jump(options, believed.poll_s, 0.5 * believed.jump_mm).ok, "and the table is no guess"
+
+
+def after_a_jump(options: GaugeOptions, poll_s: float, jump_mm: float) -> Reading:
+    """What a gauge's judge makes of a jump of a part at rest that two answers show, the second one exchange later."""
+    limits = MotionLimits(options.fastest_mm_per_s or math.inf, options.acceleration_mm_per_s2 or math.inf)
+    memory = TrustMemory(["gauge.value"], [tolerance_mm(options.noise_um)])
+    trust = ReadingTrust(memory, "gauge.value", TrustSettings(limits, False, 0.5))
+    for k in range(20):
+        reading = good(0.0, 1000.0 + k * poll_s)
+        first = None if k else reading
+        assert trust.judge(reading, WINDOW_S, first).ok
+    first, second = (good(jump_mm, 1000.0 + (k + 20) * poll_s) for k in range(2))
+    assert trust.surprises(GaugeSample(first.value, first.time_s, WINDOW_S))
+    return trust.judge(second, WINDOW_S, first)
 
 
 def test_without_a_limit_any_jump_is_believed_and_the_key_is_named(tmp_path: Path) -> None:

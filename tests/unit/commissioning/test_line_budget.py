@@ -122,6 +122,14 @@ def warning_text(budget: LineBudget, stale_after_s: float) -> str:
     return "\n".join(str(problem) for problem in line_warnings(budget, stale_after_s, "lines.x"))
 
 
+@pytest.mark.parametrize("poll_every_s", [20.0, 0.5, 0.49])
+def test_a_line_that_is_polled_too_seldom_is_stale_time_and_again(poll_every_s: float) -> None:
+    seldom = budget_of_line("x", rtu(115200, poll_every_s=poll_every_s), {"a": INT16})
+    assert "stale before the next ones come" in warning_text(seldom, 0.5)
+    often = budget_of_line("x", rtu(115200, poll_every_s=0.4), {"a": INT16})
+    assert warning_text(often, 0.5) == ""
+
+
 def test_warnings_where_they_belong() -> None:
     nine = {f"g{i}": [(8, 7)] for i in range(9)}
     slow = budget_of_line("x", rtu(19200), nine)
