@@ -51,17 +51,17 @@ def examine_whole(path: Path) -> Examined:
     document, warnings = examined.document, list(examined.warnings)
     problems = list(examined.problems)
     if examined.geometry is not None and examined.wiring is not None and not _has_problem(problems):
-        try:
-            with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"):
+            try:
                 model = build_model(examined.geometry, examined.wiring)
-        except (KinematicsError, ValueError) as error:
-            along = list(axes_along_links(document, examined.geometry))
-            problems += _at_machine_zero(error, document, warnings, along)
-        else:
-            warnings += [
-                *_stroke_warnings(document, examined.geometry, model),
-                *slips(document, examined.geometry, model),
-            ]
+            except (KinematicsError, ValueError) as error:
+                along = list(axes_along_links(document, examined.geometry))
+                problems += _at_machine_zero(error, document, warnings, along)
+            else:
+                warnings += [
+                    *_stroke_warnings(document, examined.geometry, model),
+                    *slips(document, examined.geometry, model),
+                ]
     sockets, state = _section(SocketSettings, document, "sockets"), _section(StateSettings, document, "state")
     effects = readable(SECTIONS["effects"], document.value(("effects",))) or ()
     problems = in_order(

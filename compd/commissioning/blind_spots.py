@@ -194,13 +194,14 @@ def _late(figures: Figures) -> str:
         return ""
     late_mm, jump = max(late, key=lambda entry: entry[0])
     error_mm = late_mm * figures.leverage("scale")
-    return f"{jump.gauge}, {jump.quiet.poll_s * 1e3:.3g} ms late at {late_mm / jump.quiet.poll_s:g} mm/s: {error_mm:.2f} mm at the tip"
+    poll_s = jump.quiet.poll_s
+    return f"{jump.gauge}, {poll_s * 1e3:.3g} ms late at {late_mm / poll_s:g} mm/s: {error_mm:.2f} mm at the tip"
 
 
 def _small_jump(figures: Figures) -> str:
     parts = []
     for kind in ("scale", "joint", "frame"):
-        jumps = [j.jump_mm for j in figures.jumps if any(length.startswith(kind) for length in j.measures)]
+        jumps = [j.quiet.jump_mm for j in figures.jumps if any(length.startswith(kind) for length in j.measures)]
         largest_mm = max((jump for jump in jumps if not math.isnan(jump)), default=math.nan)
         if math.isinf(largest_mm):
             parts.append(f"{kind}: any")

@@ -87,7 +87,8 @@ def jump_warnings(configuration: Configuration, jumps: Sequence[FeignedJump]) ->
     largest_mm = configuration.limits.correction_mm
     warnings = []
     for jump in jumps:
-        if math.isinf(jump.quiet.jump_mm):
+        poll_s, jump_mm = jump.quiet
+        if math.isinf(jump_mm):
             warnings.append(
                 Problem(
                     where=configuration.where("gauges", jump.gauge),
@@ -95,12 +96,12 @@ def jump_warnings(configuration: Configuration, jumps: Sequence[FeignedJump]) ->
                     next_step="write `acceleration_mm_per_s2:`, the largest acceleration of what it measures",
                 )
             )
-        elif jump.quiet.jump_mm > largest_mm:
+        elif jump_mm > largest_mm:
             warnings.append(
                 Problem(
                     where=configuration.where("gauges", jump.gauge),
-                    what=f"a jump of {named_together(jump.measures)} of {jump.quiet.jump_mm:.3g} mm is believed",
-                    value=f"{_limits_text(configuration.gauges[jump.gauge])}, read every {jump.quiet.poll_s * 1e3:.3g} ms",
+                    what=f"a jump of {named_together(jump.measures)} of {jump_mm:.3g} mm is believed",
+                    value=f"{_limits_text(configuration.gauges[jump.gauge])}, read every {poll_s * 1e3:.3g} ms",
                     allowed=f"what is believed should be below limits.correction_mm, {largest_mm:g} mm",
                     next_step="write `acceleration_mm_per_s2:` as small as it really is, or poll it more often",
                 )
