@@ -63,7 +63,8 @@ class RtuMaster(SerialMaster):
     def _receive_rest(self, head: bytes) -> bytes:
         """The bytes that follow the shortest frame `head`: as many as its byte count says, or as a write confirms."""
         try:
-            return self._stream.receive(CONFIRMATION - SHORTEST_FRAME if head[1] in WRITES else head[2])
+            count = CONFIRMATION - SHORTEST_FRAME if head[1] in WRITES else head[2]
+            return self._stream.receive(count, self._stream.rest_timeout_s)
         except LineFault as fault:
             if fault.quality is not Quality.TIMEOUT:
                 raise

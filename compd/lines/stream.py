@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections import deque
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality
@@ -15,6 +16,11 @@ SHOWN_BYTES = 40  # of a broken reply, in a fault's detail
 MOST_DRAIN_TIMEOUTS = 10
 # If the rest of a reply takes longer than this on the wire, s, it is waited for as a whole instead of byte by byte.
 WORTH_SLEEPING_S = 1e-3
+# Replies of which the longest pause is kept in mind, and so many of them are needed.
+RESTS_IN_MIND, FEWEST_RESTS = 256, 20
+# The rest of a reply may take so much longer than it ever did beyond its time on the wire, and so much, s: an adapter
+# hands over what has come after its latency timer.
+SLOWER_REST, LATER_REST_S = 1.25, 10e-3
 
 
 def shown(data: bytes) -> str:
@@ -50,6 +56,8 @@ class StreamLine:
         self._no_event = threading.Event()  # never set: the clock waits for it to pause
         self._received = bytearray()
         self._last_byte_s = clock.monotonic()
+        self._rests_s: deque[float] = deque(maxlen=RESTS_IN_MIND)  # of whole replies, beyond their time on the wire
+        self._given_up = False  # on the last reply, before the timeout
 
     def send(self, request: bytes) -> float:
         """Write `request` once the line is quiet; the monotonic time (s) at which its last bit will have left.
@@ -138,11 +146,23 @@ class StreamLine:
         self._next_line_s = ended_s - (len(line) + len(terminator)) * self._port.character_s
         return line, time_s
 
+    @property
+    def rest_timeout_s(self) -> float:
+        """How long the rest of a reply is waited for, beyond its time on the wire, s.
+
+        At most the timeout; less where the rest of so many replies has come sooner. After a reply that was given up
+        sooner it is the timeout again: a device that has become slower is waited for.
+        """
+        if self._given_up or len(self._rests_s) < FEWEST_RESTS:
+            return self._timeout_s
+        return min(self._timeout_s, SLOWER_REST * max(self._rests_s) + LATER_REST_S)
+
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes. Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST."""
-        deadline_s = self._wait_for_first_byte(timeout_s) + count * self._port.character_s
+        first_s = self._wait_for_first_byte(timeout_s)
         while len(self._received) < count:
-            self._read_more(count, deadline_s)
+            self._read_more(count, first_s)
+        self._whole(first_s, count)
         return self._take(count)
 
     def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
@@ -150,16 +170,17 @@ class StreamLine:
 
         Raises LineFault: MISMATCH beyond `limit` bytes, TIMEOUT, INCOMPLETE, LINE_LOST.
         """
-        deadline_s = self._wait_for_first_byte(timeout_s) + limit * self._port.character_s
+        first_s = self._wait_for_first_byte(timeout_s)
         searched = 0
         while True:
             end = self._received.find(terminator, searched)
             if 0 <= end <= limit - len(terminator):
+                self._whole(first_s, end + len(terminator))
                 return self._take(end + len(terminator))
             if len(self._received) >= limit:
                 raise LineFault(Quality.MISMATCH, f"no end within {limit} bytes: {shown(bytes(self._received))}")
             searched = max(0, len(self._received) - len(terminator) + 1)
-            self._read_more(limit, deadline_s)
+            self._read_more(limit, first_s)
 
     def drain(self, quiet_s: float | None = None) -> bytes:
         """Wait until nothing has come for `quiet_s`, the line's timeout if None; all that came, also before."""
@@ -232,7 +253,7 @@ class StreamLine:
         return self._take(end + len(terminator))[:end], self._looks_s[0]
 
     def _wait_for_first_byte(self, timeout_s: float | None) -> float:
-        """Wait for a reply's first byte; the time (s) by which the rest must be here, without its time on the wire."""
+        """Wait for a reply's first byte; the time (s) at which it was there."""
         if not self._received:
             wait_s = self._timeout_s if timeout_s is None else timeout_s
             leaving_s = max(0.0, self._left_s - self._clock.monotonic())  # of a long request, at a low baud rate
@@ -240,15 +261,25 @@ class StreamLine:
             if not data:
                 raise LineFault(Quality.TIMEOUT, f"no byte within {wait_s:g} s")
             self._store(data)
-        return self._last_byte_s + self._timeout_s
+        return self._last_byte_s
 
-    def _read_more(self, count: int, deadline_s: float) -> None:
-        """Wait for more of a reply of at most `count` bytes. Raises LineFault: INCOMPLETE, LINE_LOST."""
+    def _whole(self, first_s: float, count: int) -> None:
+        """Note how long the rest of a reply of `count` bytes took, whose first byte was there at `first_s` (s)."""
+        self._given_up = False
+        self._rests_s.append(max(0.0, self._last_byte_s - first_s - count * self._port.character_s))
+
+    def _read_more(self, count: int, first_s: float) -> None:
+        """Wait for more of a reply of at most `count` bytes, whose first was there at `first_s` (s).
+
+        Raises LineFault: INCOMPLETE, LINE_LOST.
+        """
+        deadline_s = first_s + self.rest_timeout_s + count * self._port.character_s
         on_the_wire_s = (count - len(self._received)) * self._port.character_s
         if on_the_wire_s > WORTH_SLEEPING_S:
             self._clock.wait(self._no_event, on_the_wire_s)
         data = self._port.read(deadline_s - self._clock.monotonic())
         if not data:
+            self._given_up = self.rest_timeout_s < self._timeout_s
             raise LineFault(Quality.INCOMPLETE, f"only {len(self._received)} bytes: {shown(bytes(self._received))}")
         self._store(data)
 

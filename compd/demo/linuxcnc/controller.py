@@ -70,6 +70,10 @@ def _ordinary_user() -> dict[str, Any]:
     return {"user": ORDINARY_USER, "group": pwd.getpwnam(ORDINARY_USER).pw_gid, "extra_groups": []}
 
 
+class ProgramStopped(DaemonError):
+    """LinuxCNC has ended a program with a message before its end; it can be run again."""
+
+
 class LinuxCnc:
     """The shipped LinuxCNC machine in a directory of its own. A context manager: it runs in the block.
 
@@ -226,7 +230,7 @@ class LinuxCnc:
 
         attend : called with the reason, about once a second, while the feed is held: what an operator does then.
 
-        Raises DaemonError where it does not come to its end, or LinuxCNC shows an error.
+        Raises DaemonError where it does not come to its end; ProgramStopped where LinuxCNC shows an error.
         """
         shown, start_s = len(self.errors), time.monotonic()
         self.start(program)
@@ -239,7 +243,7 @@ class LinuxCnc:
                 attend(held_by)
         errors = [error for error in self.errors[shown:] if LATENESS not in error]
         if errors:
-            raise self._problem(f"stopped {program.name}: {errors}")
+            raise ProgramStopped(self._problem(f"stopped {program.name}: {errors}").problems)
         return start_s, time.monotonic()
 
     # --- process --------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from compd.gauge import LineFault, Quality, Reading
 from compd.lines.echo import explained
 from compd.lines.stream import shown
 from compd.live.acquisition.absent_gauges import AbsentGauges
-from compd.live.acquisition.polled_gauge import LONGEST_REST_S, BackOff, PolledGauge
+from compd.live.acquisition.polled_gauge import DAMAGED, LONGEST_REST_S, BackOff, PolledGauge
 from compd.live.acquisition.reply_order import ReplyOrder
 from compd.live.acquisition.round_trigger import RoundBuffer, send_trigger
 from compd.live.memory.poll_requests import PollRequests
@@ -197,9 +197,10 @@ class PolledRound:
         in_step = self._order.in_step
         listen_s = self._order.listen_s(self._clock.monotonic() - line.last_request_s)
         came = line.drain(listen_s)
-        if came or dropped:
+        if (came or dropped) and not self._order.is_noise(len(came) + dropped):
             seen = shown(came) if came else f"{dropped} bytes"
             self._discard_waiting(f"{seen} came that nobody asked for: replies may belong to other requests")
+            self._order.missed(self._clock.monotonic())
             if self._order.asks_twice():
                 line.drain(self._order.pause_s())
                 return
@@ -219,7 +220,6 @@ class PolledRound:
         """Count the polls whose readings wait as failed: they may be those of other requests."""
         now_s = self._clock.monotonic()
         waiting, self._waiting = self._waiting, []
-        self._order.missed(now_s)
         for gauge, _, _ in waiting:
             gauge.fail(Quality.MISMATCH, why, now_s)
             gauge.resume()  # the silence has been kept
@@ -250,12 +250,17 @@ class PolledRound:
         # A silence as long as the timeout has been kept already. It is kept once more where nothing else would tell a
         # late reply from the next, but not for a unit that has been absent before: the others would wait for it.
         absent = gauge.failures > 0 and len(self._gauges) > 1
-        self._order.missed(failed_s, absent)
-        if quality is not Quality.TIMEOUT:
-            line.drain()
+        if quality in DAMAGED:
+            line.drain(self._order.rest_s(failed_s - line.last_request_s))
+            self._order.damaged(self._clock.monotonic())
             self._discard_waiting(f"does not count: {gauge.name}, in the same round, had {quality} {detail}".rstrip())
-        elif not self._order.guarded and not absent:
-            line.drain()
+        else:
+            self._order.missed(failed_s, absent)
+            if quality is not Quality.TIMEOUT:
+                line.drain()
+                self._discard_waiting(f"does not count: {gauge.name}, in the same round, had {quality} {detail}")
+            elif not self._order.guarded and not absent:
+                line.drain()
         gauge.fail(quality, detail, failed_s)
         if len(self._gauges) == 1 and gauge.fresh(failed_s):
             gauge.resume()  # asked again at once: it delays nobody, and a late reply is noticed

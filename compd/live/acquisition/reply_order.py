@@ -57,6 +57,8 @@ class ReplyOrder:
         self._on_bytes = any(gauge.line_kind == "bytes" for gauge in gauges)
         self._several = self._on_bytes and len(gauges) > 1 and not replies_tell_whose(gauges)
         self._one = self._on_bytes and len(gauges) == 1
+        received = [length for gauge in gauges for _, length in gauge.traffic() or [(0, 0)]]
+        self._shortest = min(received, default=0)  # of the replies, bytes; 0 where that is not known
         self._timeout_s = timeout_s
         self._durations_s: deque[float] = deque(maxlen=POLLS_IN_MIND)
         self._fewest_polls = max(FEWEST_POLLS, len(gauges))
@@ -136,6 +138,26 @@ class ReplyOrder:
         self._in_doubt_until_s = now_s + LATEST_REPLY_S
         self._in_step = self._in_step and absent
         self._quick = False
+
+    def damaged(self, now_s: float) -> None:
+        """A reply came damaged, and after it nothing more within `rest_s`.
+
+        Where the line was in step it was that of the last request, and the line still is. Readings wait as after a
+        missed reply, in case that it was noise, and the reply is later than any before.
+        """
+        if self._in_step and len(self._durations_s) >= self._fewest_polls:
+            self._in_doubt_until_s = now_s + LATEST_REPLY_S
+            self._quick = False
+        else:
+            self.missed(now_s)
+
+    def is_noise(self, count: int) -> bool:
+        """Whether so many bytes more than wanted are no reply of a line with one gauge: they are too few."""
+        return self._one and count < self._shortest
+
+    def rest_s(self, passed_s: float) -> float:
+        """Time (s) within which what belongs to the last reply will have come. passed_s : since its request, s."""
+        return self.listen_s(passed_s) if self._in_step else self._timeout_s
 
     def kept_silent(self) -> None:
         """After an answer nothing more came for `listen_s`: no reply is under way any more."""
