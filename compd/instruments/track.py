@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from compd.arrays import FloatArray
 from compd.instruments.export import ATTITUDE_AXES, InstrumentExport
 from compd.instruments.export_problems import ExportProblems, lines_text
+from compd.instruments.time_stamps import set_back_at
 
 LENGTH = "length"
 # 1 / 0.6745: the standard deviation of a normal distribution over its median absolute deviation.
@@ -88,7 +89,15 @@ def track_of(export: InstrumentExport) -> Track:
         problems.check()
     assert export.time_s is not None
     not_rising = 1 + np.flatnonzero(np.diff(export.time_s) <= 0)
-    if len(not_rising):
+    set_back = set_back_at(export.time_s)
+    if set_back is not None:
+        problems.ask(
+            "the clock was set back by an hour (end of summer time?)",
+            f"{-np.diff(export.time_s)[set_back - 1]:.3f} s earlier than the row above",
+            ["--clock-set-back (the rows from here on get an hour more)"],
+            int(export.line[set_back]),
+        )
+    elif len(not_rising):
         lines = export.line[not_rising].tolist()
         problems.add(
             lines[0],

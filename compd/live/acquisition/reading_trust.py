@@ -122,6 +122,8 @@ class ReadingTrust:
         memory, i = self._memory, self._i
         sample = GaugeSample(reading.value, reading.time_s, window_s)
         self._count(sample)
+        self._scatter.note(sample)
+        memory.scatter_mm[i] = self._scatter.mm
         memory.shown[i], memory.shown_s[i] = sample.value, sample.time_s
         # one that was accepted while it was asked is asked twice at the next poll
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
@@ -169,8 +171,6 @@ class ReadingTrust:
         self._before_silence = None
         self._remember(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
-        self._scatter.note(sample)
-        self._memory.scatter_mm[self._i] = self._scatter.mm
         if self._memory.suspected[self._i]:
             return bad(reading.time_s, Quality.STALE, "stands while all others move")
         motion = estimated_motion(self._history, self._tolerance_mm)

@@ -1,9 +1,9 @@
 """How far the readings of a length scatter while it stands, by themselves: nothing that is declared enters.
 
-The standard deviation about a straight line in windows of a second or more, so that a drift does not count. A window
-counts where the readings stay within their tolerance, or go to and fro: motion from one place to another leaves the
-line two or three times, noise and hum many times. The median of the last windows counts, so that one in which the
-machine has moved all the same does no harm.
+The standard deviation about a straight line in windows of a second or more, so that a drift does not count, without
+single readings that are damaged. A window counts where the readings stay within their tolerance, or go to and fro about
+the same place: motion from one place to another crosses the line two or three times, noise and hum many times. The
+median of the last windows counts, so that one in which the machine has moved all the same does no harm.
 
 A hum that the polls alias to less than three periods in a window looks like motion, and does not count.
 """
@@ -28,6 +28,10 @@ _FEWEST_WINDOWS = 3
 # periods. The residual of a move with one reversal has three or four such changes, that of noise 0.3 for each reading.
 _FEWEST_CHANGES = 6
 _BEYOND = 0.5
+# About one place, where the line goes no further than so many standard deviations.
+_STAYS = 2.0
+# A reading so many medians of the deviations from the middle is damaged: of noise 7 is 5 sigma, of hum 1.4 is the most.
+_DAMAGED = 7.0
 # A recording has it as text: 1 pm is less than anybody knows of it.
 _DECIMALS_MM = 9
 
@@ -55,22 +59,28 @@ class Scatter:
         if len(self._times_s) < FEWEST or sample.time_s - self._times_s[0] < WINDOW_S:
             return
         value_mm = np.array(self._values_mm)
-        off_mm = _off_line(np.array(self._times_s), value_mm)
+        time_s = np.array(self._times_s)
         self._times_s.clear()
         self._values_mm.clear()
+        off_mm = value_mm - np.median(value_mm)
+        whole = np.abs(off_mm) <= _DAMAGED * max(float(np.median(np.abs(off_mm))), self._tolerance_mm)
+        off_mm, went_mm = _off_line(time_s[whole], value_mm[whole])
+        if len(off_mm) <= 2:
+            return
         deviation_mm = math.sqrt(float(off_mm @ off_mm) / (len(off_mm) - 2))
-        stands = float(np.ptp(value_mm)) <= self._tolerance_mm
-        if stands or _changes_of_side(off_mm, _BEYOND * deviation_mm) >= _FEWEST_CHANGES:
+        stands = float(np.ptp(value_mm[whole])) <= self._tolerance_mm
+        stays = went_mm <= max(self._tolerance_mm, _STAYS * deviation_mm)
+        if stands or (stays and _changes_of_side(off_mm, _BEYOND * deviation_mm) >= _FEWEST_CHANGES):
             self._windows.append(deviation_mm)
             if len(self._windows) >= _FEWEST_WINDOWS:
                 self.mm = round(float(np.median(self._windows)), _DECIMALS_MM)
 
 
-def _off_line(time_s: FloatArray, value_mm: FloatArray) -> FloatArray:
-    """Distances (mm) from the straight line that fits best."""
+def _off_line(time_s: FloatArray, value_mm: FloatArray) -> tuple[FloatArray, float]:
+    """Distances (mm) from the straight line that fits best, and how far that goes (mm)."""
     time_s, value_mm = time_s - time_s.mean(), value_mm - value_mm.mean()
-    off_mm: FloatArray = value_mm - time_s * (float(time_s @ value_mm) / float(time_s @ time_s))
-    return off_mm
+    slope = float(time_s @ value_mm) / max(float(time_s @ time_s), 1e-12)
+    return value_mm - slope * time_s, abs(slope) * float(np.ptp(time_s))
 
 
 def _changes_of_side(off_mm: FloatArray, beyond_mm: float) -> int:

@@ -95,13 +95,14 @@ class SignalPeriods:
         self._steps[i] = steps
         sum_mm = sum(step.height_mm for step in steps)
         tolerance_mm = float(view.memory.tolerance_mm[i])
-        if not steps or abs(sum_mm) <= tolerance_mm:
+        if abs(sum_mm) <= tolerance_mm:
+            self._steps.pop(i)
             return
         controlled = self._looks[-1].setpoint_mm is not None
         enough = len(steps) >= (1 if controlled else FEWEST_STEPS)
         text = self._text(steps, sum_mm, tolerance_mm, controlled)
         if enough and abs(sum_mm) >= self._period_mm - tolerance_mm:
-            del self._steps[i]
+            self._steps.pop(i)
             yield Contradiction(i, f"{text}: it has lost signal periods, or this link was moved alone")
         else:
             yield Remark(i, f"{text}: has it lost a signal period, or was this link moved alone?")
