@@ -54,7 +54,9 @@ DatesOption = Annotated[
 RateOption = Annotated[float | None, typer.Option("--rate-hz", help="Rows in a second, where rows have no time.")]
 ClockSetBackOption = Annotated[
     bool,
-    typer.Option("--clock-set-back", help="The times fall by an hour, as summer time ended: the rows after it get one."),
+    typer.Option(
+        "--clock-set-back", help="The times fall by an hour, as summer time ended: the rows after it get one."
+    ),
 ]
 GroupOption = Annotated[
     str | None, typer.Option("--group", help="The group of points to take, where there are several; all for all.")

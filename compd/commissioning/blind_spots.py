@@ -344,7 +344,7 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
     BlindSpot(
         "scatter",
         "the readings of a length scatter more than its noise: hum, a bad contact, coarse digits",
-        f"a warning, where the scatter at rest is more than {RATIO:g} times `noise_um`, or less than 1 / {RATIO:g} of it",
+        f"a warning, where the scatter at rest is over {RATIO:g} times `noise_um`, or less than 1 / {RATIO:g} of it",
         "",
         "less than that; what comes in motion alone; hum that the polls alias to less than three periods a second",
         _scatter,

@@ -84,9 +84,7 @@ def daemon_status(address: str, timeout_s: float = 5.0) -> DaemonStatus:
     state = state_named(setpoint["state"])
     health = Health.CRITICAL if not setpoint["valid"] else Health.OK if state is State.OK else Health.WARNING
     gauges = (*worst_gauges(status["gauges"]), *warnings_of(status["gauges"]))
-    return DaemonStatus(
-        health, machine, setpoint["state"], setpoint.get("reason", ""), gauges, setpoint, status
-    )
+    return DaemonStatus(health, machine, setpoint["state"], setpoint.get("reason", ""), gauges, setpoint, status)
 
 
 def worst_gauges(gauges: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:

@@ -154,7 +154,7 @@ class VoteSettings(Section):
     )
     signal_periods: bool = Field(
         default=True,
-        description="a scale that steps at rest by `geometry.scale_signal_period_mm` or more in all, alone and twice or "
+        description="a scale that steps alone at rest, by `geometry.scale_signal_period_mm` or more in all, twice or "
         "more within an hour (in machine-tool mode: once, while its setpoint stands), has lost signal periods; needs "
         "that period",
     )

@@ -83,9 +83,8 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     if not complete.all():
         left_out["with an empty cell"] = int((~complete).sum())
     complete = complete & ~markers
-    if not complete.all():
-        if names is not None:
-            names = tuple(name for name, whole in zip(names, complete.tolist(), strict=True) if whole)
+    if not complete.all() and names is not None:
+        names = tuple(name for name, whole in zip(names, complete.tolist(), strict=True) if whole)
     return InstrumentExport(
         path=table.path,
         shape=table.shape,

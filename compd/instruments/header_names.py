@@ -65,7 +65,7 @@ def understand(name: str) -> HeaderName:
 
 
 def is_not_measured(name: str) -> bool:
-    """Whether a column's name says that it is a nominal value, a deviation or an uncertainty, also in one word: xnom."""
+    """Whether a column's name says that it is nominal, a deviation or an uncertainty, also in one word: xnom."""
     parts = [part for stem in split_unit(name)[0].split("_") for part in (stem, stem[1:], stem[:-1])]
     return any(_MEANING.get(part) == "not measured" for part in parts)
 

@@ -145,7 +145,7 @@ class Broadcast:
         }
 
 
-def gauges(readings: Event, columns: list[dict[str, Any]], status: Event | None) -> list[dict[str, Any]]:
+def gauges(readings: Event, columns: list[dict[str, Any]], status: Event | None = None) -> list[dict[str, Any]]:
     """What each wired channel shows in the cycle of a READINGS message, in the order of MACHINE's wiring.
 
     `value` : a length in mm since machine zero, or another quantity in its unit; absent where there is none, or no

@@ -182,7 +182,7 @@ class ReadingTrust:
         step = None if self._steps is None else self._steps.note(sample)
         if step is not None:
             memory, i = self._memory, self._i
-            memory.stepped_mm[i] += step.height_mm
+            memory.stepped_mm[i] += 0.0 if step.is_seen else step.height_mm
             memory.stepped_s[i] = step.time_s
             memory.stepped[i] += 1  # last: it tells that the others are there
 

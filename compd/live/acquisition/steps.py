@@ -1,7 +1,8 @@
 """Steps of a length: it stands, then stands elsewhere, and no reading shows it on the way.
 
 A count that is lost looks so. A part that moves by 20 um takes 16 ms with 300 mm/s2, and many times that with the
-acceleration that drives have for so short a way: of several such motions, readings show one on the way.
+acceleration that drives have for so short a way: of several such motions, readings show one on the way. Such a one
+is a step as well, and says that the part is moved.
 """
 
 from __future__ import annotations
@@ -18,10 +19,15 @@ _LONGEST_GAP_S = 0.1
 
 
 class Step(NamedTuple):
-    """height_mm : the last value minus the one before, mm. time_s : of the last reading before it, s."""
+    """From one place at which a length stands to the next.
+
+    height_mm : the later value minus the one before, mm. time_s : of the last reading before it, s.
+    is_seen : whether readings show it on the way.
+    """
 
     height_mm: float
     time_s: float
+    is_seen: bool
 
 
 class Steps:
@@ -31,22 +37,27 @@ class Steps:
         """`least_mm`: of a step that counts; `tolerance_mm`: readings that differ by no more agree."""
         self._least_mm = max(least_mm, tolerance_mm)
         self._tolerance_mm = tolerance_mm
-        self._before: list[GaugeSample] = []  # readings that agree, until the last one that did not
-        self._now: list[GaugeSample] = []  # readings since then, which agree with each other
+        self._run: list[GaugeSample] = []  # the last readings, which agree with each other
+        self._stood: tuple[float, float] | None = None  # where it stood before (mm), and until when (s)
+        self._is_seen = False  # on the way from there
 
     def note(self, sample: GaugeSample) -> Step | None:
         """A reading, in the order of time; the step that it completes, where it completes one."""
-        if self._now and abs(sample.value - self._now[0].value) > self._tolerance_mm:
-            self._before, self._now = self._now, []
-        self._now.append(sample)
-        if not _stands(self._now):
+        run = self._run
+        if run and abs(sample.value - run[0].value) > self._tolerance_mm:
+            if _stands(run):
+                self._stood, self._is_seen = (_middle(run), run[-1].time_s), False
+            else:
+                self._is_seen = True
+            run.clear()
+        run.append(sample)
+        if self._stood is None or not _stands(run):
+            del run[1:-_FEWEST]
             return None
-        before, self._before = self._before, []
-        del self._now[1:-_FEWEST]
-        if not _stands(before) or self._now[0].time_s - before[-1].time_s > _LONGEST_GAP_S:
-            return None
-        height_mm = _middle(self._now) - _middle(before)
-        return Step(height_mm, before[-1].time_s) if abs(height_mm) >= self._least_mm else None
+        (stood_mm, until_s), self._stood = self._stood, None
+        height_mm = _middle(run) - stood_mm
+        unknown = not self._is_seen and run[0].time_s - until_s > _LONGEST_GAP_S
+        return None if unknown or abs(height_mm) < self._least_mm else Step(height_mm, until_s, self._is_seen)
 
 
 def _stands(samples: list[GaugeSample]) -> bool:
@@ -55,4 +66,4 @@ def _stands(samples: list[GaugeSample]) -> bool:
 
 def _middle(samples: list[GaugeSample]) -> float:
     last = sorted(sample.value for sample in samples[-_FEWEST:])
-    return last[_FEWEST // 2]
+    return last[len(last) // 2]

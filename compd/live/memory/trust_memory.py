@@ -54,8 +54,8 @@ class TrustMemory:
     first_change_s, last_change_s : when the first and the last of these were, s.
     step_mm : the smallest change seen; inf before the first.
     scatter_mm : standard deviation of its readings at rest, as measured, mm; nan before it is known.
-    stepped, stepped_mm, stepped_s : how many steps at rest it has made, without a reading in between; their sum, mm;
-        and when the last one began, s; nan before the first.
+    stepped, stepped_mm, stepped_s : how often it has gone from one place where it stood to the next; the sum of those
+        steps that no reading shows on the way, mm; and when the last one began, s; nan before the first.
     accepted, obeyed : how often a person has accepted the channel, and how often its thread has followed.
     voted, heard : how often a vote has named the channel, and how often its thread has followed.
     suspected : 1 while a vote waits for more evidence against the channel: it has no value meanwhile.

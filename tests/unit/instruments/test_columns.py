@@ -171,7 +171,7 @@ def test_two_triples_of_like_names_are_asked_about(tmp_path: Path, names: tuple[
     [
         ("X", "Y", "Z", "Nominal X", "Nominal Y", "Nominal Z"),
         ("X", "Y", "Z", "Xnom", "Ynom", "Znom"),
-        ("X", "Y", "Z", "temperature_x", "temperature_y", "temperature_w"),
+        ("X", "Y", "Z", "xa", "ya", "wa"),
     ],
 )
 def test_what_a_name_says_is_not_asked(tmp_path: Path, names: tuple[str, ...]) -> None:

@@ -64,3 +64,21 @@ def test_a_clock_that_was_set_back_is_told_and_mended(tmp_path: Path) -> None:
 )
 def test_an_hour_is_added_nowhere_else(tmp_path: Path, times: list[str]) -> None:
     assert "its clock was not set back by an hour" in refused(tmp_path, stamped(times), clock_set_back=True)
+
+
+def test_two_hours_sorted_into_one_are_no_track(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    time_s = np.sort(rng.uniform(0.0, 20.0, 400))
+    places_mm = np.where(rng.random(400)[:, None] < 0.5, 100.0, -80.0) + rng.normal(0.0, 1e-3, (400, 3))
+    text = "time_s,x_mm,y_mm,z_mm\n" + "".join(
+        f"{t:.4f},{x:.5f},{y:.5f},{z:.5f}\n" for t, (x, y, z) in zip(time_s, places_mm, strict=True)
+    )
+    with pytest.raises(RecordingError, match="of two tracks in turn"):
+        track_of(read(tmp_path, text))
+
+
+def test_a_track_with_single_wild_samples_is_one(tmp_path: Path) -> None:
+    time_s = np.arange(600) / 20
+    x_mm = 50 * np.sin(time_s) + np.where(np.arange(600) % 29 == 3, 5.0, 0.0)
+    text = "time_s,x_mm\n" + "".join(f"{t:.4f},{x:.5f}\n" for t, x in zip(time_s, x_mm, strict=True))
+    assert len(track_of(read(tmp_path, text)).time_s) == 600

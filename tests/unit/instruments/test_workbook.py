@@ -274,12 +274,10 @@ def test_hidden_rows_are_told(tmp_path: Path, attributes: str, hidden: bool) -> 
 def test_a_hidden_row_of_a_long_sheet_is_told(tmp_path: Path) -> None:
     """The sheet is read in parts of a megabyte: a row is found wherever it stands."""
     rows = [("name", "X [mm]"), *((f"P{k}", k + 0.5) for k in range(40_000))]
-    hidden = {number for number in range(2, 40_000, 7)}
+    hidden = set(range(2, 40_000, 7))
 
     def hide(text: str) -> str:
-        return re.sub(
-            r'<row r="(\d+)"', lambda match: match[0] + ' hidden="1"' * (int(match[1]) in hidden), text
-        )
+        return re.sub(r'<row r="(\d+)"', lambda match: match[0] + ' hidden="1"' * (int(match[1]) in hidden), text)
 
     table = read(edit(book(tmp_path, rows), "xl/worksheets/sheet1.xml", hide))
     assert table.assumed["hidden rows"].startswith(f"{len(hidden)} rows between 2 and {max(hidden)} are hidden")

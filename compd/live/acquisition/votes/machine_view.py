@@ -65,7 +65,7 @@ class Contradiction(NamedTuple):
 
 
 class Remark(NamedTuple):
-    """A channel, by its number, that is believed and to be looked at, and why; made anew at each look while it lasts."""
+    """A channel, by its number, that is believed and to be looked at, and why; made at each look while it lasts."""
 
     channel: int
     text: str

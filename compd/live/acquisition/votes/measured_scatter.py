@@ -1,4 +1,4 @@
-"""The scatter of each length at rest against its declared noise: one of the two is wrong where they differ by 2 or more.
+"""The scatter of each length at rest against its declared noise: where they differ by a factor of 2, one is wrong.
 
 A display with coarse digits scatters less than what it measures. So its smallest step counts as scatter, too, before a
 noise is said to be declared too large.

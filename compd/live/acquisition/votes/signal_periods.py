@@ -1,8 +1,9 @@
 """Steps of one scale at rest, while all other lengths stand: signal periods that its interpolator has lost.
 
-In machine-tool mode the setpoint says whether the link was to move. In CMM mode a link may be moved on purpose, by itself
+In machine-tool mode the setpoint says whether the link was to move. In CMM mode a link may be moved on purpose, alone
 and by such a step: a second step without a reading on the way is needed, and until then there is a warning. Steps are
-summed with their sign, and compared with the signal period: what is lost and found again does no harm.
+summed with their sign, and compared with the signal period: what is lost and found again does no harm. A link that
+readings show on the way, while all others stand, is moved on purpose: the sum begins anew.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class SignalPeriods:
                 continue
             if known is not None and known[0][i] != self._known[0][i]:
                 height_mm = float(self._known[1][i] - known[1][i])
-                self._waiting[i] = Step(height_mm, float(memory.stepped_s[i]))
+                self._waiting[i] = Step(height_mm, float(memory.stepped_s[i]), height_mm == 0.0)
             if i in self._waiting:
                 self._judge(view, i, self._waiting[i])
             yield from self._sum(view, i)
@@ -78,7 +79,10 @@ class SignalPeriods:
         moved_mm = np.abs(view.value - before.value)[others]
         if not (moved_mm <= view.memory.tolerance_mm[others]).all() or self._was_told(view, i, step):
             return
-        self._steps.setdefault(i, []).append(step)
+        if step.is_seen:  # somebody moves this link alone
+            self._steps.pop(i, None)
+        else:
+            self._steps.setdefault(i, []).append(step)
 
     def _was_told(self, view: MachineView, i: int, step: Step) -> bool:
         """Whether the setpoint of this scale has moved in the time in which a controller follows."""
@@ -113,7 +117,9 @@ class SignalPeriods:
         of = f"whole quarters of its signal period of {self._period_mm * UM_PER_MM:g} um, " if whole else ""
         times = "once" if len(steps) == 1 else f"{len(steps)} times"
         told = " and its setpoint stood" if controlled else ""
-        return f"stepped at rest {times}, by {sum_mm * UM_PER_MM:+.1f} um, {of}while all other lengths{told or ' stood'}"
+        return (
+            f"stepped at rest {times}, by {sum_mm * UM_PER_MM:+.1f} um, {of}while all other lengths{told or ' stood'}"
+        )
 
 
 def _setpoint_mm(view: MachineView) -> FloatArray | None:

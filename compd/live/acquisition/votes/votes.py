@@ -87,9 +87,9 @@ class Votes:
         if remarks == self._remarks:
             return
         for channel in remarks.keys() - self._remarks.keys():
-            log.warning("gauge is to be looked at", channel=channel, why=remarks[channel])
+            log.warning("gauge is to be looked at", channel=channel, reason=remarks[channel])
         for channel in self._remarks.keys() - remarks.keys():
-            log.info("gauge is as it should be again", channel=channel, was=self._remarks[channel])
+            log.info("gauge has no warning any more", channel=channel, reason=self._remarks[channel])
         self._remarks = remarks
         self._memory.warnings.write(remarks)
 
