@@ -42,7 +42,7 @@ class SignalPeriods:
     def __init__(self, period_mm: float) -> None:
         self._period_mm = period_mm
         self._looks: deque[_Look] = deque()
-        self._known: tuple[FloatArray, FloatArray] | None = None  # how often each has stepped, and how far
+        self._known: dict[int, tuple[float, float]] = {}  # how often each has stepped until now, and how far, mm
         self._waiting: dict[int, Step] = {}
         self._steps: dict[int, list[Step]] = {}
         self._accepted: list[int] = []
@@ -53,15 +53,19 @@ class SignalPeriods:
         self._looks.append(_Look(view.now_s, view.value.copy(), _setpoint_mm(view)))
         while self._looks[0].now_s < view.now_s - LASTING_S - 2 * _WAIT_S:
             self._looks.popleft()
-        known, self._known = self._known, (memory.stepped[:n].copy(), memory.stepped_mm[:n].copy())
+        # how often first: a step whose height is there already is then taken at the next look
+        stepped, stepped_mm = memory.stepped[:n].tolist(), memory.stepped_mm[:n].tolist()
         for i in view.of_kind("scale"):
             if not view.believed[i] or (accepted and accepted[i] != self._accepted[i]):
                 self._waiting.pop(i, None)
                 self._steps.pop(i, None)
+                self._known[i] = stepped[i], stepped_mm[i]
                 continue
-            if known is not None and known[0][i] != self._known[0][i]:
-                height_mm = float(self._known[1][i] - known[1][i])
+            number, sum_mm = self._known.setdefault(i, (stepped[i], stepped_mm[i]))
+            if stepped[i] != number:
+                height_mm = stepped_mm[i] - sum_mm
                 self._waiting[i] = Step(height_mm, float(memory.stepped_s[i]), height_mm == 0.0)
+                self._known[i] = stepped[i], stepped_mm[i]
             if i in self._waiting:
                 self._judge(view, i, self._waiting[i])
             yield from self._sum(view, i)
