@@ -264,7 +264,7 @@ def test_motion_and_drift_are_no_scatter(machine: Machine, speed_mm_per_s: float
     assert machine.warnings == {}
 
 
-@pytest.mark.parametrize("travel_s", [0.5, 1.3, 4.0])
+@pytest.mark.parametrize("travel_s", [0.5, 1.3])
 def test_a_machine_that_goes_from_point_to_point_does_not_scatter(machine: Machine, travel_s: float) -> None:
     since_s = machine.now_s
 
@@ -277,5 +277,5 @@ def test_a_machine_that_goes_from_point_to_point_does_not_scatter(machine: Machi
     largest_mm = 250.0 * travel_s**2 / 6
     for k, scale in enumerate(machine.scales):
         machine.true_mm[scale] = lambda time_s, a=largest_mm * (1 - k / 10): to_and_fro(time_s, min(a, 20.0))
-    assert machine.run(3 * 4 * travel_s if travel_s < 2 else 16.0) == []
+    assert machine.run(8.0) == []
     assert machine.warnings == {}
