@@ -22,7 +22,7 @@ REFERENCE_UNITS: Mapping[str, str] = {
 # Factor to the first unit of each kind (SI brochure, 9th edition; kgf, inch and foot by definition).
 UNIT_KINDS: tuple[Mapping[str, float], ...] = (
     {"mm": 1.0, "nm": 1e-6, "um": 1e-3, "cm": 10.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "ft": 304.8},
-    {"s": 1.0, "us": 1e-6, "ms": 1e-3, "min": 60.0, "h": 3600.0},
+    {"s": 1.0, "us": 1e-6, "ms": 1e-3, "min": 60.0, "h": 3600.0, "day": 86400.0},
     {"rad": 1.0, "urad": 1e-6, "mrad": 1e-3, "deg": 0.017453292519943295, "arcsec": 4.84813681109536e-6},
     {"N": 1.0, "mN": 1e-3, "kN": 1000.0, "kgf": 9.80665},
     {"hPa": 1.0, "Pa": 0.01, "kPa": 10.0, "mbar": 1.0, "bar": 1000.0, "mmHg": 1.33322387415},
@@ -57,6 +57,7 @@ _SPELLINGS: Mapping[str, str] = {
     **dict.fromkeys(("us", "usec", "\u00b5s", "\u03bcs", "microsecond", "microseconds", "mikrosekunden"), "us"),
     **dict.fromkeys(("min", "minute", "minutes", "minuten"), "min"),
     **dict.fromkeys(("hour", "hours", "stunde", "stunden"), "h"),
+    **dict.fromkeys(("day", "days", "tag", "tage"), "day"),
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("mrad", "milliradian", "milliradians"), "mrad"),
     **dict.fromkeys(("deg", "degree", "degrees", "\u00b0"), "deg"),

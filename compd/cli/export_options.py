@@ -52,6 +52,12 @@ DatesOption = Annotated[
     DateOrder | None, typer.Option("--dates", help="Order of day, month and year, where the file leaves it open.")
 ]
 RateOption = Annotated[float | None, typer.Option("--rate-hz", help="Rows in a second, where rows have no time.")]
+ClockSetBackOption = Annotated[
+    bool,
+    typer.Option(
+        "--clock-set-back", help="The times fall by an hour, as summer time ended: the rows after it get one."
+    ),
+]
 GroupOption = Annotated[
     str | None, typer.Option("--group", help="The group of points to take, where there are several; all for all.")
 ]
@@ -69,6 +75,7 @@ def read_options(
     rate_hz: float | None,
     group: str | None,
     sheet: str | None,
+    clock_set_back: bool = False,
 ) -> ReadOptions:
     """The options as the reader takes them. Raises typer.BadParameter where the decimal mark is none.
 
@@ -89,6 +96,7 @@ def read_options(
         rate_hz=rate_hz,
         group=group,
         sheet=sheet,
+        clock_set_back=clock_set_back,
     )
 
 

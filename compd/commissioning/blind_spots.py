@@ -22,6 +22,7 @@ from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.errors import KinematicsError
+from compd.live.acquisition.votes.measured_scatter import RATIO
 from compd.machine_builder import build_model
 from compd.model.machine import MachineModel
 from compd.model.tool import ToolOnPlate
@@ -211,6 +212,34 @@ def _small_jump(figures: Figures) -> str:
     return "; ".join(parts)
 
 
+def _lost_periods(figures: Figures) -> str:
+    period_mm = figures.configuration.geometry.scale_signal_period_mm
+    if period_mm is None:
+        return "no `geometry.scale_signal_period_mm`, so that steps are not summed"
+    period_um = period_mm * UM_PER_MM
+    one = f"each period of {period_um:g} um that is lost: {period_um * figures.leverage('scale'):.3g} um at the tip"
+    jumps = [j.jump_mm for j in figures.jumps if any(length.startswith("scale") for length in j.measures)]
+    largest_mm = max((jump for jump in jumps if math.isfinite(jump)), default=math.nan)
+    if math.isnan(largest_mm):
+        return one
+    largest_um = largest_mm * UM_PER_MM
+    return f"{one}; one step at rest: {largest_um:.3g} um, {largest_um * figures.leverage('scale'):.3g} um at the tip"
+
+
+def _scatter(figures: Figures) -> str:
+    gauges = figures.configuration.gauges
+    kinds = {d.gauge: d.length.partition(" ")[0] for d in figures.drifts}
+    declared = {g: options.noise_um for g in kinds if (options := gauges[g]).noise_um is not None}
+    parts = [
+        f"{gauge}: {RATIO * noise_um:.3g} um, {RATIO * noise_um * figures.leverage(kinds[gauge]):.3g} um at the tip"
+        for gauge, noise_um in declared.items()
+    ]
+    silent = [gauge for gauge in kinds if gauge not in declared]
+    if silent:
+        parts.append(f"no `noise_um`, so that any scatter passes: {', '.join(silent)}")
+    return "; ".join(parts)
+
+
 def _power_cut(figures: Figures) -> str:
     configuration = figures.configuration
     counting = [jump.gauge for jump in figures.jumps if not _is_absolute(configuration, jump.gauge)]
@@ -301,6 +330,23 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "",
         "jumps up to that size",
         _small_jump,
+    ),
+    BlindSpot(
+        "lost_signal_periods",
+        "a scale's interpolator loses signal periods, or quarters of them",
+        "at rest, while all other lengths stand: two steps or more within an hour that come to a signal period; in "
+        "machine-tool mode one step, while its setpoint stands",
+        "signal_periods",
+        "one step in CMM mode, for which there is a warning; steps of less than a quarter; all that are lost in motion",
+        _lost_periods,
+    ),
+    BlindSpot(
+        "scatter",
+        "the readings of a length scatter more than its noise: hum, a bad contact, coarse digits",
+        f"a warning, where the scatter at rest is over {RATIO:g} times `noise_um`, or less than 1 / {RATIO:g} of it",
+        "",
+        "less than that; what comes in motion alone; hum that the polls alias to less than three periods a second",
+        _scatter,
     ),
     BlindSpot(
         "gauge_that_runs_away",

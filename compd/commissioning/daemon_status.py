@@ -31,7 +31,8 @@ class DaemonStatus:
 
     health : OK; WARNING, valid but not ok; CRITICAL, invalid or stopped; UNKNOWN, no answer.
     state, reason : of the last setpoint; "" without one.
-    gauges : those that are not good, in words; where all are, the one whose reading is oldest.
+    gauges : those that are not good, in words; where all are, the one whose reading is oldest; then those with a
+        warning.
     setpoint, status : the messages.
     """
 
@@ -82,9 +83,8 @@ def daemon_status(address: str, timeout_s: float = 5.0) -> DaemonStatus:
         return DaemonStatus(Health.UNKNOWN, address, "", error.problems[0].what)
     state = state_named(setpoint["state"])
     health = Health.CRITICAL if not setpoint["valid"] else Health.OK if state is State.OK else Health.WARNING
-    return DaemonStatus(
-        health, machine, setpoint["state"], setpoint.get("reason", ""), worst_gauges(status["gauges"]), setpoint, status
-    )
+    gauges = (*worst_gauges(status["gauges"]), *warnings_of(status["gauges"]))
+    return DaemonStatus(health, machine, setpoint["state"], setpoint.get("reason", ""), gauges, setpoint, status)
 
 
 def worst_gauges(gauges: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
@@ -104,4 +104,11 @@ def worst_gauges(gauges: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
         who = f"{name}.{channels[0]}" if len(channels) == 1 else f"{name}, {len(channels)} channels"
         words.append(f"{who}: {quality}" + (f" ({detail})" if detail else ""))
     more = [f"and {len(words) - _MOST_GAUGES} more"] if len(words) > _MOST_GAUGES else []
+    return (*words[:_MOST_GAUGES], *more)
+
+
+def warnings_of(gauges: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """What is to be looked at, of gauges that are believed all the same."""
+    words = [f"{gauge['channel']}: warning: {gauge['warning']}" for gauge in gauges if gauge.get("warning")]
+    more = [f"and {len(words) - _MOST_GAUGES} more warnings"] if len(words) > _MOST_GAUGES else []
     return (*words[:_MOST_GAUGES], *more)

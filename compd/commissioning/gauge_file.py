@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from compd.commissioning.open_gauge import GaugeTarget, PortArguments, line_settings
+from compd.commissioning.open_gauge import STALE_AFTER_S, GaugeTarget, PortArguments, line_settings
 from compd.configuration import load
 from compd.configuration.document import CONFIGURATION, Document, read_document
 from compd.configuration.lines import LineSettings, powered
@@ -52,7 +52,9 @@ def gauge_of_file(path: Path, name: str | None, port: PortArguments) -> GaugeTar
     document = read_document(path, GAUGE_FILE)
     if set(document.data) - _SECTIONS:
         configuration = load(path)
-        return _target(document, name, port, configuration.gauges, configuration.drivers, configuration.lines)
+        stale_after_s = configuration.loop.stale_after_s
+        gauges, drivers = configuration.gauges, configuration.drivers
+        return _target(document, name, port, gauges, drivers, configuration.lines, stale_after_s)
     problems: list[Problem] = []
     lines = validate(SECTIONS["lines"], document, ("lines",), problems) if "lines" in document.data else {}
     gauges, drivers = gauges_of(document, problems)
@@ -68,6 +70,7 @@ def _target(
     gauges: Mapping[str, GaugeOptions],
     drivers: Mapping[str, type[Gauge[Any]]],
     lines: Mapping[str, LineSettings],
+    stale_after_s: float = STALE_AFTER_S,
 ) -> GaugeTarget:
     if name is None and len(gauges) == 1:
         (name,) = gauges
@@ -94,4 +97,4 @@ def _target(
     if line is None:
         line = line_settings(port, drivers[name].line_kind == "registers")
     on_line = [drivers[other](gauges[other]) for other in gauges if gauges[other].line == options.line]
-    return GaugeTarget(name, drivers[name](options), powered(line, on_line))
+    return GaugeTarget(name, drivers[name](options), powered(line, on_line), options.stale_after_s or stale_after_s)

@@ -38,6 +38,10 @@ SettingsT = TypeVar(
 )
 
 
+# Where nothing says how old a reading may be: one that is older is no measurement of now.
+STALE_AFTER_S = 10.0
+
+
 @dataclass(frozen=True)
 class PortArguments:
     """A port as it is given on the command line; `baud` and `format` (8N1 ...) are None over TCP.
@@ -54,11 +58,12 @@ class PortArguments:
 
 @dataclass(frozen=True)
 class GaugeTarget:
-    """One gauge and the line that it hangs on."""
+    """One gauge and the line that it hangs on. stale_after_s : age from which its readings are not used, s."""
 
     name: str
     gauge: Gauge[Any]
     line: LineSettings
+    stale_after_s: float = STALE_AFTER_S
 
 
 def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]) -> GaugeTarget:
@@ -82,8 +87,10 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
             ]
         ) from error
     if kind.line_kind in ("nodes", "topics"):
-        return GaugeTarget(driver, gauge, pushed_line_settings(port, kind.line_kind))
-    return GaugeTarget(driver, gauge, powered(line_settings(port, kind.line_kind == "registers"), [gauge]))
+        line: LineSettings = pushed_line_settings(port, kind.line_kind)
+    else:
+        line = powered(line_settings(port, kind.line_kind == "registers"), [gauge])
+    return GaugeTarget(driver, gauge, line, gauge.options.stale_after_s or STALE_AFTER_S)
 
 
 def line_settings(port: PortArguments, registers: bool) -> LineSettings:
@@ -252,6 +259,22 @@ def read_gauge(target: GaugeTarget, clock: Clock, listener: ByteListener) -> Seq
         raise explained(fault, line) from fault
     finally:
         line.close()
+
+
+def aged(reading: Reading, now_s: float, stale_after_s: float) -> Reading:
+    """The reading, or that it is stale, as the daemon has it at the monotonic time `now_s` (s)."""
+    age_s = now_s - reading.time_s
+    if not reading.ok or age_s <= stale_after_s:
+        return reading
+    detail = f"{reading.value:.6f} was measured {_age_text(age_s)} ago; a reading counts for {stale_after_s:g} s"
+    return bad(reading.time_s, Quality.STALE, detail)
+
+
+def _age_text(age_s: float) -> str:
+    for unit, seconds in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if age_s >= 2 * seconds:
+            return f"{age_s / seconds:.3g} {unit}"
+    return f"{age_s:.3g} s"
 
 
 def poll_gauge(target: GaugeTarget, clock: Clock, polls: int | None) -> Iterator[Sequence[Reading]]:

@@ -28,6 +28,8 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "rts": None,
     "rs485": None,
     "ask_one_more": True,
+    "skip_bytes": 0,
+    "signal_periods": True,
     "break_s": None,
     "line_needs": {},
     "dtr_pulse_s": None,

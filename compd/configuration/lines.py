@@ -113,6 +113,11 @@ class ModbusRtuLine(_ModbusSerialSettings):
     """Modbus RTU on a serial port, or over TCP with port: socket://host:port."""
 
     kind: Literal["modbus_rtu"] = Field(description="Modbus RTU registers")
+    skip_bytes: Annotated[int, Field(ge=0, le=3)] = Field(
+        default=0,
+        description="so many bytes before a reply are damage of a transceiver that changes its direction: they are "
+        "skipped where the checksum of the rest fits; left out: such a reply counts as damaged",
+    )
 
 
 class ModbusAsciiLine(_ModbusSerialSettings):

@@ -152,6 +152,12 @@ class VoteSettings(Section):
         default=2.0,
         description="a scale that stands while all others depart from rest by this much is stuck; null: not looked at",
     )
+    signal_periods: bool = Field(
+        default=True,
+        description="a scale that steps alone at rest, by `geometry.scale_signal_period_mm` or more in all, twice or "
+        "more within an hour (in machine-tool mode: once, while its setpoint stands), has lost signal periods; needs "
+        "that period",
+    )
     following_mm: Positive | None = Field(
         default=None,
         description="machine-tool mode: a scale that is further from the setpoint for 1 s does not follow; left out: "

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from compd.arrays import rms
 from compd.instruments.cells import is_number_column, numbers
 from compd.instruments.export import ATTITUDE_AXES, LENGTH_AXES, POSITION_AXES, ReadOptions
 from compd.instruments.export_problems import ExportProblems
-from compd.instruments.header_names import split_unit, understand
+from compd.instruments.header_names import is_not_measured, split_unit, understand
 from compd.instruments.raw_table import RawTable
 from compd.instruments.time_stamps import is_clock, is_date, is_stamp
 from compd.units import unit_named
@@ -18,6 +20,8 @@ from compd.units import unit_named
 AXES = (*POSITION_AXES, *ATTITUDE_AXES, *LENGTH_AXES)
 # `collection` and `date` go with `group` and `time`; "-" is a column that is not used.
 ROLES = ("time", "date", *AXES, "name", "group", "collection", "-")
+# What the distances between rows of two triples differ by, rms, as a share of them: nominal and measured ones.
+_ALIKE = 0.1
 _HALF_DAY = frozenset(("AM", "PM"))
 
 
@@ -61,6 +65,8 @@ def find_roles(table: RawTable, options: ReadOptions, problems: ExportProblems) 
         _take_numbers(table, options, roles, problems)
     if not problems.problems:
         _check(table, roles, problems)
+        if not options.columns and not set(options.names) & set(AXES):
+            _ask_for_one_triple(table, roles, problems)
     return roles
 
 
@@ -261,6 +267,58 @@ def _example(kinds: Sequence[str]) -> str:
     axes = iter(POSITION_AXES)
     names = {"time": "time", "clock": "time", "date": "date", "text": "name"}
     return ",".join(next(axes, "-") if kind == "number" else names.get(kind, "-") for kind in kinds)
+
+
+def _ask_for_one_triple(table: RawTable, roles: Roles, problems: ExportProblems) -> None:
+    """Ask where three columns that are not used may be the position as well: nominal and measured, for instance.
+
+    Their names are those of x, y, z with the same letters before or behind, and from row to row they change as the
+    others do.
+    """
+    if table.header is None or not all(axis in roles.column for axis in POSITION_AXES):
+        return
+    chosen = [roles.column[axis] for axis in POSITION_AXES]
+    names = [split_unit(name)[0] for name in table.header]
+    unused = [
+        k
+        for k, name in enumerate(table.header)
+        if k not in roles.column.values() and not is_not_measured(name) and is_number_column(table.columns[k])
+    ]
+    triples: dict[tuple[str, str], dict[str, int]] = {}
+    for k in unused:
+        for place, letter in enumerate(names[k]):
+            if letter in POSITION_AXES:
+                triples.setdefault((names[k][:place], names[k][place + 1 :]), {})[letter] = k
+    for others in triples.values():
+        places = [others[axis] for axis in POSITION_AXES if axis in others]
+        if len(places) != len(POSITION_AXES) or not _change_alike(table, chosen, places):
+            continue
+        answers = []
+        for columns in (chosen, places):
+            named = " ".join(
+                f"--{axis} {shlex.quote(table.header[k])}" for axis, k in zip(POSITION_AXES, columns, strict=True)
+            )
+            answers.append(f"{named} ({', '.join(table.columns[k][0] for k in columns)})")
+        problems.ask(
+            "two triples of columns may be the position, as where nominal and measured values stand side by side",
+            ", ".join(table.header[k] for k in (*chosen, *places)),
+            answers,
+            table.header_line,
+        )
+        return
+
+
+def _change_alike(table: RawTable, one: Sequence[int], other: Sequence[int]) -> bool:
+    """Whether the distances between successive rows are nearly the same in both triples of columns."""
+    ignored = ExportProblems(table.path)
+    steps = []
+    for columns in (one, other):
+        values = np.column_stack([numbers(table.columns[k], table.line, "", ignored) for k in columns])
+        steps.append(np.linalg.norm(np.diff(values, axis=0), axis=1))
+    both = np.isfinite(steps[0]) & np.isfinite(steps[1])
+    if not both.any():
+        return False
+    return bool(rms(steps[1][both] - steps[0][both]) <= _ALIKE * rms(steps[0][both]))
 
 
 def _check(table: RawTable, roles: Roles, problems: ExportProblems) -> None:

@@ -12,15 +12,33 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.instruments.cells import numbers
 from compd.instruments.column_roles import AXES, Roles, column_text, find_roles
 from compd.instruments.export import ATTITUDE_AXES, InstrumentExport, ReadOptions
-from compd.instruments.export_problems import ExportProblems
+from compd.instruments.export_problems import ExportProblems, lines_text
+from compd.instruments.marker_rows import marker_rows
 from compd.instruments.raw_table import RawTable
-from compd.instruments.time_stamps import StampedTime, is_clock, is_date, is_stamp, read_stamps, spread_within
+from compd.instruments.time_stamps import (
+    SET_BACK_S,
+    StampedTime,
+    is_clock,
+    is_date,
+    is_stamp,
+    read_stamps,
+    set_back_at,
+    spread_within,
+)
 from compd.units import unit_factor, unit_named
 
 ALL_GROUPS = "all"
 # Groups that a question lists.
 _SHOWN_GROUPS = 20
+_SHOWN_MARKERS = 2
 _HALF_DAY = frozenset(("AM", "PM"))
+# Trackers and interferometers give up to 10 000 positions a second that are written with a time.
+FASTEST_ROWS_S = 1e-4
+# Days as a spreadsheet counts them, of the years 1954 to 2119. A second has five decimals; rows of one measurement are
+# less than half an hour apart.
+SERIAL_DAYS = (20_000.0, 80_000.0)
+_DAY_DECIMALS = 5
+_LONGEST_DAY_STEP = 0.02
 _LENGTH_UNITS = "mm, um, nm, cm, m, inch, ft"
 
 
@@ -40,8 +58,13 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     problems.check()
     axes = tuple(axis for axis in AXES if axis in roles.column)
     time = _time(table, roles, options, problems)
+    if time is not None and options.clock_set_back:
+        time = _with_the_hour(time, table, problems)
     values = _values(table, roles, axes, options, assumptions, problems)
     problems.check()
+    places = [k for k, axis in enumerate(axes) if axis not in ATTITUDE_AXES]
+    cells = [table.columns[roles.column[axes[k]]] for k in places]
+    markers = marker_rows(cells, values[:, places])
     complete: BoolArray = np.asarray(np.isfinite(values).all(axis=1))
     if time is not None:
         complete = complete & np.isfinite(time.time_s)
@@ -51,10 +74,17 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
         problems.check()
     names = _names(table, roles, assumptions)
     left_out = dict(table.left_out)
+    if markers.any():
+        digits = {", ".join(column[i] for column in cells) for i in np.flatnonzero(markers).tolist()}
+        shown = " or ".join(sorted(digits)[:_SHOWN_MARKERS])
+        left_out[f"{shown} marks what was not measured ({lines_text(table.line[markers].tolist())})"] = int(
+            markers.sum()
+        )
     if not complete.all():
         left_out["with an empty cell"] = int((~complete).sum())
-        if names is not None:
-            names = tuple(name for name, whole in zip(names, complete.tolist(), strict=True) if whole)
+    complete = complete & ~markers
+    if not complete.all() and names is not None:
+        names = tuple(name for name, whole in zip(names, complete.tolist(), strict=True) if whole)
     return InstrumentExport(
         path=table.path,
         shape=table.shape,
@@ -252,6 +282,18 @@ def _time(table: RawTable, roles: Roles, options: ReadOptions, problems: ExportP
     )
 
 
+def _with_the_hour(time: StampedTime, table: RawTable, problems: ExportProblems) -> StampedTime:
+    """The times with an hour added from where the clock was set back."""
+    row = set_back_at(time.time_s)
+    if row is None:
+        allowed = "times that fall once, by an hour"
+        problems.add(0, "its clock was not set back by an hour", "--clock-set-back", allowed, "leave it out")
+        return time
+    time_s = time.time_s.copy()
+    time_s[row:] += SET_BACK_S
+    return replace(time, time_s=time_s, assumed=f"{time.assumed}; 1 h added from line {table.line[row]} on")
+
+
 def _whole_stamps(table: RawTable, roles: Roles, column: int) -> Sequence[str]:
     """Stamps of one column, or put together from date, time of day, and AM or PM in columns of their own."""
     cells = table.columns[column]
@@ -271,6 +313,17 @@ def _whole_stamps(table: RawTable, roles: Roles, column: int) -> Sequence[str]:
     return [f"{day} {cell}" if cell else "" for day, cell in zip(days, cells, strict=True)]
 
 
+def _is_doubtful(values: FloatArray, cells: Sequence[str]) -> bool:
+    """Whether times (N,) without a unit, with decimals, are probably no seconds: too close together for an instrument,
+    or the days that a spreadsheet counts."""
+    steps = np.abs(np.diff(values))
+    step = float(np.median(steps[steps > 0])) if steps.any() else 0.0
+    if step < FASTEST_ROWS_S:
+        return len(values) > 1
+    fine = all(len(cell.partition(".")[2]) >= _DAY_DECIMALS for cell in cells if cell)
+    return fine and step < _LONGEST_DAY_STEP and bool(SERIAL_DAYS[0] <= values.min() <= values.max() <= SERIAL_DAYS[1])
+
+
 def _time_of_numbers(
     table: RawTable, roles: Roles, cells: Sequence[str], line: IntArray, problems: ExportProblems
 ) -> StampedTime | None:
@@ -282,13 +335,26 @@ def _time_of_numbers(
     assumed = unit or "s, as it has decimals and no unit"
     filled = values[~np.isnan(values)]
     if unit and factor is None:
-        problems.add(table.header_line, "is no unit of time", unit, "s, ms, us, min, h", "give --columns with time[s]")
+        allowed = "s, ms, us, min, h, day"
+        problems.add(table.header_line, "is no unit of time", unit, allowed, "give --columns with time[s]")
         return None
     if not unit and np.all(filled == np.floor(filled)):
         problems.ask(
             "no unit of time in its name, and whole numbers",
             ", ".join(cells[:3]),
             [f"--columns with time[{other}] for {what}" for other in ("s", "ms")],
+            table.header_line or int(line[0]),
+        )
+        return None
+    if not unit and _is_doubtful(filled, cells):
+        span = float(np.ptp(filled))
+        problems.ask(
+            f"no unit of time in its name; in s, its {len(filled)} rows would span {span:.3g} s",
+            ", ".join(cells[:3]),
+            [
+                f"--columns with time[{other}] for {what} (they span {span * (unit_factor(other, 's') or 1.0):.3g} s)"
+                for other in ("day", "h", "min", "s")
+            ],
             table.header_line or int(line[0]),
         )
         return None

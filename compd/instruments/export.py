@@ -28,6 +28,7 @@ class ReadOptions:
     names : role -> a column's name in the header (`--time`, `--x`, ...).
     unit : of the lengths (`--unit`). angle_unit : of the attitude (`--angle-unit`). decimal : "." or "," (`--decimal`).
     dates : "dmy", "mdy" or "ymd" (`--dates`). rate_hz : samples per second where rows have no time (`--rate-hz`).
+    clock_set_back : from where the times fall on, they are an hour later than they say (`--clock-set-back`).
     group : which group of points (`--group`). sheet : of a workbook (`--sheet`).
     limits : how much the file may hold.
     """
@@ -40,6 +41,7 @@ class ReadOptions:
     decimal: str | None = None
     dates: str | None = None
     rate_hz: float | None = None
+    clock_set_back: bool = False
     group: str | None = None
     sheet: str | None = None
     limits: ReadLimits = GENEROUS

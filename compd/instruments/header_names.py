@@ -64,6 +64,12 @@ def understand(name: str) -> HeaderName:
     return HeaderName("length" if numbered or _LINK.fullmatch("_".join(parts[-2:])) else "", unit)
 
 
+def is_not_measured(name: str) -> bool:
+    """Whether a column's name says that it is nominal, a deviation or an uncertainty, also in one word: xnom."""
+    parts = [part for stem in split_unit(name)[0].split("_") for part in (stem, stem[1:], stem[:-1])]
+    return any(_MEANING.get(part) == "not measured" for part in parts)
+
+
 def split_unit(name: str) -> tuple[str, str]:
     """A name without its unit, tidied, and the unit: "X [mm]", "x_mm", "X mm", "X / mm" are ("x", "mm")."""
     behind = _UNIT_BEHIND.search(name)

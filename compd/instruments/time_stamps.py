@@ -18,6 +18,9 @@ from compd.instruments.export_problems import ExportProblems
 
 DATE_ORDERS = ("dmy", "mdy", "ymd")
 DAY_S = 86400.0
+# By how much a clock is set back in autumn, s. The row after it comes at most so long, s, after the one before.
+SET_BACK_S = 3600.0
+_LONGEST_PAUSE_S = 600.0
 # Two-digit years from here on are of the last century, as POSIX has it.
 _CENTURY = 69
 _ONE_DATE = "all rows of one date"
@@ -127,6 +130,19 @@ def spread_within(time_s: FloatArray, resolution_s: float, whole: bool = False) 
     rows = f"up to {most} rows in each, spread within" if most > 1 else "one row in each"
     assumed = f"{words}, {rows}: +- {std_s:.2g} s"
     return spread_s, std_s, assumed
+
+
+def set_back_at(time_s: FloatArray) -> int | None:
+    """The row from which on times (N,) are an hour too early, as a clock that was set back says them; None for none.
+
+    That is: they fall once, by an hour less a pause, and rise everywhere else. Rows without a time (nan) do not count.
+    """
+    rows = np.flatnonzero(~np.isnan(time_s))
+    steps_s = np.diff(time_s[rows])
+    falls = np.flatnonzero(steps_s < 0)
+    if len(falls) != 1 or not -SET_BACK_S <= steps_s[falls[0]] <= _LONGEST_PAUSE_S - SET_BACK_S:
+        return None
+    return int(rows[falls[0] + 1])
 
 
 class _Parsed:

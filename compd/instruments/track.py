@@ -12,11 +12,18 @@ from scipy.spatial.transform import Rotation, Slerp
 from compd.arrays import FloatArray
 from compd.instruments.export import ATTITUDE_AXES, InstrumentExport
 from compd.instruments.export_problems import ExportProblems, lines_text
+from compd.instruments.time_stamps import set_back_at
 
 LENGTH = "length"
 # 1 / 0.6745: the standard deviation of a normal distribution over its median absolute deviation.
 _STD_PER_MEDIAN = 1.4826
 LEAST_ROWS = 3
+# Of two tracks in one: rows far from the next (mm), and nearer to the one after by this factor; so many, and so many of
+# the rows in between. Two in turn make it of every row, two at random of a quarter.
+_FAR_MM = 0.1
+_BACK = 0.1
+_FEWEST_MIXED = 20
+_SHARE_MIXED = 0.15
 
 
 @dataclass(frozen=True)
@@ -88,13 +95,29 @@ def track_of(export: InstrumentExport) -> Track:
         problems.check()
     assert export.time_s is not None
     not_rising = 1 + np.flatnonzero(np.diff(export.time_s) <= 0)
-    if len(not_rising):
+    set_back = set_back_at(export.time_s)
+    if set_back is not None:
+        problems.ask(
+            "the clock was set back by an hour (end of summer time?)",
+            f"{-np.diff(export.time_s)[set_back - 1]:.3f} s earlier than the row above",
+            ["--clock-set-back (the rows from here on get an hour more)"],
+            int(export.line[set_back]),
+        )
+    elif len(not_rising):
         lines = export.line[not_rising].tolist()
         problems.add(
             lines[0],
             f"time does not rise ({lines_text(lines)})",
             allowed="later than the row above",
             next_step="choose one group of points with --group where there are several, or sort the rows",
+        )
+    elif (mixed := _mixed_rows(export.values)) is not None:
+        problems.add(
+            int(export.line[mixed[0]]),
+            f"its rows are of two tracks in turn, up to line {export.line[mixed[1]]}",
+            allowed="one track, in the order of measuring",
+            next_step="export it again and do not sort it: a clock that was set back gives the same times twice, which "
+            "--clock-set-back takes apart",
         )
     if len(export.time_s) < LEAST_ROWS:
         problems.add(
@@ -115,6 +138,23 @@ def track_of(export: InstrumentExport) -> Track:
         rotation_rad=export.values[:, attitude] if attitude else None,
         time_std_s=export.time_std_s,
     )
+
+
+def _mixed_rows(position_mm: FloatArray) -> tuple[int, int] | None:
+    """The first and the last row (M, d) of two tracks that are mixed, as where rows of two hours are sorted by a clock
+    that was set back; None without any.
+
+    There a row is often far from the next one, and near to the one after that.
+    """
+    if len(position_mm) < 3:
+        return None
+    next_mm = np.linalg.norm(np.diff(position_mm, axis=0), axis=1)
+    second_mm = np.linalg.norm(position_mm[2:] - position_mm[:-2], axis=1)
+    to_and_fro = np.flatnonzero((next_mm[:-1] > _FAR_MM) & (second_mm < _BACK * next_mm[:-1]))
+    if len(to_and_fro) < _FEWEST_MIXED:
+        return None
+    first, last = int(to_and_fro[0]), int(to_and_fro[-1])
+    return (first, last) if len(to_and_fro) >= _SHARE_MIXED * (last - first) else None
 
 
 def _noise(values: FloatArray) -> float:

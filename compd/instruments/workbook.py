@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -89,7 +90,8 @@ def _read(path: Path, options: ReadOptions) -> RawTable:
     problems = [*_merged(reader.place, part, table), *reader.wrong_cells(table.rows, options.decimal)]
     if problems:
         raise RecordingError(problems)
-    return _raw_table(path, table, reader, f"{sheet.title!r}, of {count}" if count > 1 else f"{sheet.title!r}")
+    raw = _raw_table(path, table, reader, f"{sheet.title!r}, of {count}" if count > 1 else f"{sheet.title!r}")
+    return replace(raw, assumed={**raw.assumed, **_hidden_rows(part, table)})
 
 
 def _choose_sheet(path: Path, book: Workbook, wanted: str | None) -> ReadOnlyWorksheet:
@@ -130,6 +132,16 @@ def _merged(place: str, part: SheetPart, table: SheetTable) -> list[Problem]:
             next_step="undo the merging, and fill the cells",
         )
     ]
+
+
+def _hidden_rows(part: SheetPart, table: SheetTable) -> dict[str, str]:
+    """What is said of rows of the list that a person does not see in a spreadsheet."""
+    hidden = sorted(part.hidden & {row.number for row in table.rows})
+    if not hidden:
+        return {}
+    rows = f"row {hidden[0]} is" if len(hidden) == 1 else f"{len(hidden)} rows between {hidden[0]} and {hidden[-1]} are"
+    what = "hidden, by a filter or by hand, and used as the others: delete them where they are not to count"
+    return {"hidden rows": f"{rows} {what}"}
 
 
 def _raw_table(path: Path, table: SheetTable, reader: SheetReader, sheet: str) -> RawTable:

@@ -26,6 +26,10 @@ _FORMULA = re.compile(rb"<(?:\w+:)?f[ >/]")
 # Of a sheet, and of the table of texts.
 _CELL = re.compile(rb"<(?:\w+:)?(?:c|si)[ >/]")
 _MERGED = re.compile(rb"<(?:\w+:)?mergeCell [^>]*?ref=\"(([A-Z]{1,3})(\d{1,7}):([A-Z]{1,3})(\d{1,7}))\"")
+# Hidden by hand, by a filter or in a group that is folded up; or of no height.
+_ROW = re.compile(rb"<(?:\w+:)?row ([^>]*)>")
+_ROW_NUMBER = re.compile(rb"\br=\"(\d{1,7})\"")
+_HIDDEN = re.compile(rb"\bhidden=\"(?:1|true)\"|\bht=\"0(?:\.0*)?\"")
 _SAVE_AS = "open it in a spreadsheet and save it as .xlsx, without a password"
 
 
@@ -40,10 +44,11 @@ class MergedArea:
 
 @dataclass(frozen=True)
 class SheetPart:
-    """has_formulas : whether any cell has one. merged : areas of merged cells."""
+    """has_formulas : whether any cell has one. merged : areas of merged cells. hidden : rows that are not shown."""
 
     has_formulas: bool
     merged: tuple[MergedArea, ...]
+    hidden: frozenset[int] = frozenset()
 
 
 def check_workbook_file(path: Path, limits: ReadLimits) -> None:
@@ -134,6 +139,7 @@ def unreadable(path: Path, reason: str) -> Problem:
 def read_sheet_part(path: Path, name: str) -> SheetPart:
     """What the reader of cells does not tell of a sheet. name : of its part in the archive."""
     has_formulas = False
+    number, scanned, hidden = 0, 0, set()
     merged: dict[str, MergedArea] = {}
     with zipfile.ZipFile(path) as archive, archive.open(name.lstrip("/")) as file:
         rest = b""
@@ -143,5 +149,13 @@ def read_sheet_part(path: Path, name: str) -> SheetPart:
             for match in _MERGED.finditer(text):
                 area = match[1].decode()
                 merged[area] = MergedArea(area, int(match[3]), int(match[5]))
-            rest = text[-_OVERLAP:]
-    return SheetPart(has_formulas, tuple(merged.values()))
+            # a tag that is cut by the chunk's end is read with the next one
+            end = max(text.rfind(b"<"), 0)
+            for match in _ROW.finditer(text, scanned, end):
+                own = _ROW_NUMBER.search(match[1])
+                number = int(own[1]) if own else number + 1
+                if _HIDDEN.search(match[1]):
+                    hidden.add(number)
+            start = max(min(len(text) - _OVERLAP, end), len(text) - _CHUNK, 0)
+            rest, scanned = text[start:], max(end - start, 0)
+    return SheetPart(has_formulas, tuple(merged.values()), frozenset(hidden))

@@ -65,6 +65,19 @@ class NoAssignment:
     dwell: int | None = None
 
 
+def on_one_line(measured_mm: FloatArray) -> NoAssignment:
+    """Why points (G, d) on one line cannot be told: one that is far from all others makes a line of them, too."""
+    away_mm = np.linalg.norm(measured_mm - np.median(measured_mm, axis=0), axis=1)
+    far = int(np.argmax(away_mm))
+    return NoAssignment(
+        "the points are on one line, or one of them is far from all others",
+        f"{away_mm[far]:.6g} mm from their middle, the median is {np.median(away_mm):.6g} mm",
+        "three or more that are not on one line",
+        far,
+        0,
+    )
+
+
 def repeat_distance_mm(sigma_mm: float) -> float:
     """Points nearer to each other are at one place: six standard deviations of the difference of two, REPEAT_MM or
     more."""

@@ -25,6 +25,7 @@ from compd.joining.assignment import (
     OTHER_SHARE,
     Assignment,
     NoAssignment,
+    on_one_line,
     repeat_distance_mm,
     unit_hint,
 )
@@ -60,7 +61,9 @@ def assign_by_distance(
     place_of = _places(expected_mm, near_mm)
     place_mm = expected_mm[np.unique(place_of, return_index=True)[1]]
     different_mm = measured_mm[np.unique(_places(measured_mm, near_mm), return_index=True)[1]]
-    few = min(len(place_mm), len(different_mm)) < LEAST_POINTS or not is_spread(different_mm)
+    if not is_spread(different_mm) and len(different_mm) >= LEAST_POINTS and not in_M:
+        return on_one_line(measured_mm)
+    few = min(len(place_mm), len(different_mm)) < LEAST_POINTS
     if few and not in_M:
         return NoAssignment(
             "too few different places to tell by their distances",

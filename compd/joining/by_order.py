@@ -23,6 +23,7 @@ from compd.joining.assignment import (
     OTHER_SHARE,
     Assignment,
     NoAssignment,
+    on_one_line,
     repeat_distance_mm,
     unit_hint,
 )
@@ -48,12 +49,14 @@ def assign_by_order(expected_mm: FloatArray, measured_mm: FloatArray, sigma_mm: 
     stop, place = _collapsed(expected_mm, repeat_mm)
     group, point = _collapsed(measured_mm, repeat_mm)
     most = min(len(place), len(point))
-    if most < 3 or not is_spread(place) or not is_spread(point):
+    if most < 3 or not is_spread(place):
         return NoAssignment(
             "too few different places to tell by their distances",
             f"{len(place)} of the machine, {len(point)} of the instrument",
             "three or more that are not on one line",
         )
+    if not is_spread(point):
+        return on_one_line(measured_mm)
     refusals = []
     for window in sorted({min(window, most) for window in _WINDOWS}, reverse=True):
         starts = _starts(place, point, window)

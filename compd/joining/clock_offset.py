@@ -37,6 +37,8 @@ CLEARLY_WORSE = 2.0
 # Most steps of the common grid of time, most candidates.
 _MOST_STEPS = 2**18
 _CANDIDATES = 8
+# Of the shorter of the two, on that grid.
+_FEWEST_STEPS = 3
 # Offsets in one scan of the refinement.
 _SCAN = 201
 # Offsets of a picture: over all at which the two overlap, and near each candidate.
@@ -146,6 +148,14 @@ def _candidates_s(motion: SharedMotion, window_s: float) -> list[float]:
         root: FloatArray = np.sqrt(np.linalg.norm(np.diff(on_grid, axis=0), axis=1))
         return root
 
+    spans_s = [float(np.ptp(time_s)) for time_s in (motion.all_time_s, track.time_s)]
+    if min(spans_s) < _FEWEST_STEPS * step_s:
+        raise motion.refusal(
+            "one of the two is too short beside the rows of the other",
+            f"the gauges span {spans_s[0]:.3g} s, a row every {motion.period_s:.3g} s; the instrument {spans_s[1]:.3g} "
+            f"s, a row every {track.period_s:.3g} s",
+            "times in the same unit, of one measurement",
+        )
     machine = root_speed(motion.all_time_s, motion.all_scale_mm)
     instrument = root_speed(track.time_s, track.position_mm)
     correlation = _overlap_correlation(machine, instrument)

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from compd.gauge import LineFault, Quality
 from compd.lines.modbus_serial import CONFIRMED, WRITES, SerialMaster
-from compd.lines.stream import shown
+from compd.lines.stream import StreamLine, shown
 
+# Bytes of damage before a reply: of a single edge one, rarely two.
+MOST_SKIPPED = 3
 SHORTEST_FRAME = 5  # unit, function, exception or byte count, CRC
 CONFIRMATION = 2 + CONFIRMED + 2  # of a write
 
@@ -43,22 +45,67 @@ def crc16(data: bytes) -> int:
     return crc
 
 
+def _frame_length(begin: bytes) -> int:
+    """Bytes of the frame that begins so, with three bytes or more."""
+    if begin[1] & 0x80:
+        return SHORTEST_FRAME
+    return CONFIRMATION if begin[1] in WRITES else SHORTEST_FRAME + begin[2]
+
+
 class RtuMaster(SerialMaster):
     """A `RegisterLine` over a stream of bytes: a serial port, or RTU over TCP. Used by one thread."""
 
+    def __init__(self, stream: StreamLine, ask_one_more: bool = True, skip_bytes: int = 0) -> None:
+        """`skip_bytes`: so many bytes before a reply may be damage, where the rest has a CRC that fits."""
+        super().__init__(stream, ask_one_more)
+        self._skip_bytes = skip_bytes
+        self._function = 0  # of the last request
+
     def _send(self, unit: int, message: bytes) -> float:
         request = bytes([unit]) + message
+        self._function = message[0]
         return self._stream.send(request + crc16(request).to_bytes(2, "little"))
 
     def _receive(self, unit: int) -> bytes:
         frame = self._stream.receive(SHORTEST_FRAME)
-        if not frame[1] & 0x80:
-            frame += self._receive_rest(frame)
-        if crc16(frame):
-            raise LineFault(Quality.CRC, shown(frame))
+        try:
+            if not frame[1] & 0x80:
+                frame += self._receive_rest(frame)
+            if crc16(frame):
+                raise LineFault(Quality.CRC, shown(frame))
+        except LineFault as fault:
+            if fault.quality is Quality.LINE_LOST:
+                raise
+            frame = self._behind_damage(unit, frame, fault)
         if frame[0] != unit:
             raise LineFault(Quality.MISMATCH, f"asked unit {unit}, unit {frame[0]} answered")
         return frame[1:-2]
+
+    def _behind_damage(self, unit: int, begin: bytes, fault: LineFault) -> bytes:
+        """The whole frame that stands behind a few bytes. Raises `fault`, with a hint where there is one.
+
+        A transceiver that changes its direction late, or a line without bias resistors, makes a byte of an edge.
+        """
+        for count in range(1, MOST_SKIPPED + 1):
+            came = begin[count:] + self._stream.received
+            if len(came) < 3 or came[0] != unit or came[1] & 0x7F != self._function:
+                continue
+            length = _frame_length(came)
+            try:
+                frame = begin[count:] + self._stream.receive(max(length - len(begin) + count, 0))
+            except LineFault as missing:
+                if missing.quality is Quality.LINE_LOST:
+                    raise
+                continue
+            if crc16(frame):
+                begin = begin[:count] + frame
+            elif count <= self._skip_bytes:
+                return frame
+            else:
+                bytes_text = "one byte" if count == 1 else f"{count} bytes"
+                hint = f"{bytes_text} before the reply ({begin[:count].hex(' ')}); the rest fits"
+                raise LineFault(fault.quality, f"{hint}: write `skip_bytes: {count}` on the line") from fault
+        raise fault
 
     def _receive_rest(self, head: bytes) -> bytes:
         """The bytes that follow the shortest frame `head`: as many as its byte count says, or as a write confirms."""

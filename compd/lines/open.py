@@ -69,11 +69,22 @@ class SerialSettings(_Serial, Protocol):
     def kind(self) -> Literal["serial"]: ...
 
 
-class ModbusSerialSettings(_Serial, Protocol):
-    """The keys of a Modbus line on a serial port in the configuration that are needed to open it."""
+class ModbusRtuSettings(_Serial, Protocol):
+    """The keys of a Modbus RTU line in the configuration that are needed to open it."""
 
     @property
-    def kind(self) -> Literal["modbus_rtu", "modbus_ascii"]: ...
+    def kind(self) -> Literal["modbus_rtu"]: ...
+    @property
+    def ask_one_more(self) -> bool: ...
+    @property
+    def skip_bytes(self) -> int: ...
+
+
+class ModbusAsciiSettings(_Serial, Protocol):
+    """The keys of a Modbus ASCII line in the configuration that are needed to open it."""
+
+    @property
+    def kind(self) -> Literal["modbus_ascii"]: ...
     @property
     def ask_one_more(self) -> bool: ...
 
@@ -103,7 +114,7 @@ class ModbusTcpSettings(_Address, Protocol):
     def gateway_wait_s(self) -> float | None: ...
 
 
-StreamSettings = SerialSettings | ModbusSerialSettings | TcpSettings
+StreamSettings = SerialSettings | ModbusRtuSettings | ModbusAsciiSettings | TcpSettings
 
 
 def open_line(
@@ -127,7 +138,7 @@ def open_line(
     stream = open_stream(settings, clock, wrap_port)
     match settings.kind:
         case "modbus_rtu":
-            return RtuMaster(stream, settings.ask_one_more)
+            return RtuMaster(stream, settings.ask_one_more, settings.skip_bytes)
         case "modbus_ascii":
             return AsciiMaster(stream, settings.ask_one_more)
     return stream

@@ -182,6 +182,11 @@ class StreamLine:
             searched = max(0, len(self._received) - len(terminator) + 1)
             self._read_more(limit, first_s)
 
+    @property
+    def received(self) -> bytes:
+        """What has come and is not taken yet."""
+        return bytes(self._received)
+
     def drain(self, quiet_s: float | None = None) -> bytes:
         """Wait until nothing has come for `quiet_s`, the line's timeout if None; all that came, also before."""
         quiet_s = self._timeout_s if quiet_s is None else quiet_s

@@ -10,6 +10,7 @@ Readings, setpoints and commands pass through shared memory, and nobody waits fo
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from functools import partial
@@ -171,6 +172,7 @@ class Daemon:
             publisher,
             packets,
             self._lines_status,
+            self.trust,
             clock,
         )
         keys = TargetKeys(
@@ -284,6 +286,7 @@ class Daemon:
             self.latest,
             zero_mm,
             self._newest_setpoint,
+            configuration.geometry.scale_signal_period_mm or math.nan,
         )
 
     def _newest_setpoint(self) -> bytes | None:

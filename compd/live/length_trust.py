@@ -26,7 +26,10 @@ def length_memory(configuration: Configuration, wires: MachineWires) -> TrustMem
 def length_trust(configuration: Configuration, wires: MachineWires, memory: TrustMemory) -> dict[str, ReadingTrust]:
     """The judge of each length channel that is wired, by "gauge.channel"."""
     return {
-        wire.channel: ReadingTrust(memory, wire.channel, _settings(configuration, wire)) for wire in wires.length_wires
+        wire.channel: ReadingTrust(
+            memory, wire.channel, _settings(configuration, wire, is_scale=place < len(wires.scale.wires))
+        )
+        for place, wire in enumerate(wires.length_wires)
     }
 
 
@@ -50,11 +53,12 @@ def _noise_um(options: GaugeOptions) -> float:
     return math.nan if options.noise_um is None else options.noise_um
 
 
-def _settings(configuration: Configuration, wire: Wire) -> TrustSettings:
+def _settings(configuration: Configuration, wire: Wire, is_scale: bool) -> TrustSettings:
     gauge = wire.channel.split(".")[0]
     options, driver = configuration.gauges[gauge], configuration.drivers[gauge]
     return TrustSettings(
         MotionLimits(options.fastest_mm_per_s or math.inf, options.acceleration_mm_per_s2 or math.inf),
         options.trust_after_loss or (driver.absolute if options.absolute is None else options.absolute),
         wire.stale_after_s,
+        configuration.geometry.scale_signal_period_mm or math.nan if is_scale else math.nan,
     )

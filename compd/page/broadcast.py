@@ -123,7 +123,7 @@ class Broadcast:
         if link.connected and link.readings is not None and self._machine is not None:
             setpoint = link.readings["setpoint"]
             event["setpoint"] = setpoint
-            event["gauges"] = gauges(link.readings, link.columns)
+            event["gauges"] = gauges(link.readings, link.columns, link.status)
             event["budget"] = (link.budget or {}).get("tip_um")
             event["shadow_budget"] = (link.budget or {}).get("shadow_tip_um")
             event["scene"] = scene(self._machine, setpoint, link.budget)
@@ -145,12 +145,15 @@ class Broadcast:
         }
 
 
-def gauges(readings: Event, columns: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def gauges(readings: Event, columns: list[dict[str, Any]], status: Event | None = None) -> list[dict[str, Any]]:
     """What each wired channel shows in the cycle of a READINGS message, in the order of MACHINE's wiring.
 
     `value` : a length in mm since machine zero, or another quantity in its unit; absent where there is none, or no
     machine zero to count from.  `age_s` : of a value.  `fault` : why there is none, or why it must not be used.
+    `warning` : what the newest STATUS says that is to be looked at.
     """
+    said = () if status is None else status["gauges"]
+    warnings = {channel["channel"]: channel["warning"] for channel in said if "warning" in channel}
     zero = readings.get("zero", {}).get("readings_mm", {})
     gauges: list[dict[str, Any]] = []
     for column in columns:
@@ -169,6 +172,8 @@ def gauges(readings: Event, columns: list[dict[str, Any]]) -> list[dict[str, Any
             gauge["fault"] = reading["quality"]
             if "detail" in reading:
                 gauge["detail"] = reading["detail"]
+        if column["channel"] in warnings:
+            gauge["warning"] = warnings[column["channel"]]
         gauges.append(gauge)
     return gauges
 

@@ -6,6 +6,7 @@ them, which have the simulated time. There are no wires, so that a day takes an 
 
 from __future__ import annotations
 
+import math
 import random
 import threading
 import time
@@ -150,6 +151,7 @@ class TimeLapse:
             self._latest,
             lambda: readings,
             lambda: self._line or None,
+            configuration.geometry.scale_signal_period_mm or math.nan,
         )
         self._tick = 0
         self._looked_s = self._clock.now_s

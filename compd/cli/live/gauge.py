@@ -123,9 +123,9 @@ def read(
     line_keys: LineKeys = None,
     assignments: Set = None,
 ) -> None:
-    """Read one gauge once, and show every byte. Exit code 1 if a channel has no value."""
+    """Read one gauge once, and show every byte. Exit code 1 if a channel has no value, or one that is stale."""
     from compd.clock import MonotonicClock
-    from compd.commissioning.open_gauge import read_gauge
+    from compd.commissioning.open_gauge import aged, read_gauge
     from compd.gauge import LineFault
 
     gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
@@ -140,8 +140,11 @@ def read(
     except LineFault as fault:
         typer.echo(f"{gauge_target.name}: {fault}")
         raise typer.Exit(1) from fault
+    now_s = clock.monotonic()
+    readings = [aged(reading, now_s, gauge_target.stale_after_s) for reading in readings]
     for channel, reading in zip(gauge_target.gauge.channels, readings, strict=True):
-        typer.echo(f"{gauge_target.name}.{channel.name}: {_reading_text(reading, channel.unit)}")
+        age = f", {(now_s - reading.time_s) * 1e3:.3g} ms old" if reading.ok else ""
+        typer.echo(f"{gauge_target.name}.{channel.name}: {_reading_text(reading, channel.unit)}{age}")
     raise typer.Exit(0 if all(reading.ok for reading in readings) else 1)
 
 
@@ -163,7 +166,7 @@ def watch(
 
     from compd.clock import MonotonicClock
     from compd.commissioning.gauge_statistics import GaugeStatistics
-    from compd.commissioning.open_gauge import poll_gauge
+    from compd.commissioning.open_gauge import aged, poll_gauge
 
     gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
     clock = MonotonicClock()
@@ -171,7 +174,8 @@ def watch(
     with Live(console=Console(), refresh_per_second=5) as live:
         try:
             for readings in poll_gauge(gauge_target, clock, polls):
-                statistics.add(readings, clock.monotonic())
+                now_s = clock.monotonic()
+                statistics.add([aged(each, now_s, gauge_target.stale_after_s) for each in readings], now_s)
                 live.update(_statistics_table(gauge_target.name, statistics, clock.monotonic()))
         except KeyboardInterrupt:
             return

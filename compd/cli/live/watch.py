@@ -18,6 +18,7 @@ from rich.text import Text
 from compd.cli.waiting import connect_patiently
 from compd.client import DEFAULT_ADDRESS, Client, connect
 from compd.clock import Clock, MonotonicClock
+from compd.commissioning.daemon_status import warnings_of
 from compd.errors import CompdError
 from compd.live.loop.states import State, state_named
 from compd.units import UM_PER_MM
@@ -196,6 +197,7 @@ def view(
     if ended := _ended_processes(status):
         parts.append(Text(f"started anew: {ended}", style="yellow"))
     parts += [Text(f"not good: {text}", style="red") for text in lost_gauges(status["gauges"])]
+    parts += [Text(text, style="yellow") for text in warnings_of(status["gauges"])]
     return Group(*parts)
 
 

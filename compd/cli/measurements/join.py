@@ -10,6 +10,7 @@ import typer
 
 from compd.cli.export_options import (
     AngleUnitOption,
+    ClockSetBackOption,
     ColumnsOption,
     DatesOption,
     DecimalOption,
@@ -65,6 +66,7 @@ def join(
     decimal: DecimalOption = None,
     dates: DatesOption = None,
     rate_hz: RateOption = None,
+    clock_set_back: ClockSetBackOption = False,
     group: GroupOption = None,
     sheet: SheetOption = None,
     offset: Annotated[
@@ -102,7 +104,9 @@ def join(
     from compd.recording.writer import write_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
-    read_as = read_options(shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet)
+    read_as = read_options(
+        shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet, clock_set_back
+    )
     exported = read_export(export, read_as)
     echo_taken(export, exported.shape, exported.taken, exported.left_out)
     instrument = Instrument(frame.value, sigma_um, link, sigma_urad, ball)

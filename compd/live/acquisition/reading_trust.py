@@ -29,6 +29,8 @@ from compd.live.acquisition.possible_motion import (
     mean_speed,
     rest_to_rest_mm,
 )
+from compd.live.acquisition.scatter import Scatter
+from compd.live.acquisition.steps import Steps
 from compd.live.acquisition.witnesses import moved_while_away, stood_still
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
@@ -42,6 +44,8 @@ LONGEST_OWN_GAP_S = 10.0
 _WAIT_FOR_MOTION_S = 0.3
 # In tolerances: less than that, a gauge may move in a short silence while no other shows it.
 _LEAST_MOTION = 10.0
+# An interpolator that loses counts loses whole signal periods, or quarters of them: the least that counts as a step.
+LEAST_PERIODS = 0.25
 # Samples of motion that are kept.
 _HISTORY = 32
 # Two answers show the same value where they differ by less than this share of the jump that they show.
@@ -62,12 +66,13 @@ class TrustSettings:
     """How far the readings of a channel are believed.
 
     limits : what the measured part can do. returns_by_itself : the device shows the same value again when it is back.
-    stale_after_s : age from which a last reading is lost.
+    stale_after_s : age from which a last reading is lost. signal_period_mm : of a scale, where it is known; nan.
     """
 
     limits: MotionLimits
     returns_by_itself: bool
     stale_after_s: float
+    signal_period_mm: float = math.nan
 
 
 class ReadingTrust:
@@ -83,6 +88,10 @@ class ReadingTrust:
         self._back_s = math.nan  # since when a gauge that was away answers again
         self._before_silence: NDArray[np.float64] | None = None  # what all showed when it first did not answer
         self._heard_s = math.nan  # since when it answers again after that
+        self._scatter = Scatter(self._tolerance_mm)
+        period_mm = settings.signal_period_mm
+        least_mm = LEAST_PERIODS * period_mm - self._tolerance_mm
+        self._steps = None if math.isnan(period_mm) else Steps(least_mm, self._tolerance_mm)
 
     def surprises(self, sample: GaugeSample) -> bool:
         """Whether a second answer is needed: a good reading is not where the last ones lead, or follows none."""
@@ -113,6 +122,8 @@ class ReadingTrust:
         memory, i = self._memory, self._i
         sample = GaugeSample(reading.value, reading.time_s, window_s)
         self._count(sample)
+        self._scatter.note(sample)
+        memory.scatter_mm[i] = self._scatter.mm
         memory.shown[i], memory.shown_s[i] = sample.value, sample.time_s
         # one that was accepted while it was asked is asked twice at the next poll
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
@@ -158,11 +169,22 @@ class ReadingTrust:
 
     def _believed(self, reading: Reading, sample: GaugeSample) -> Reading:
         self._before_silence = None
-        self._history.append(sample)
+        self._remember(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
         if self._memory.suspected[self._i]:
             return bad(reading.time_s, Quality.STALE, "stands while all others move")
-        return reading._replace(motion=estimated_motion(self._history, self._tolerance_mm))
+        motion = estimated_motion(self._history, self._tolerance_mm)
+        return reading._replace(motion=motion._replace(scatter_mm=self._scatter.mm))
+
+    def _remember(self, sample: GaugeSample) -> None:
+        """Keep a sample of motion, and count the step that it completes."""
+        self._history.append(sample)
+        step = None if self._steps is None else self._steps.note(sample)
+        if step is not None:
+            memory, i = self._memory, self._i
+            memory.stepped_mm[i] += 0.0 if step.is_seen else step.height_mm
+            memory.stepped_s[i] = step.time_s
+            memory.stepped[i] += 1  # last: it tells that the others are there
 
     def _refused(self, reading: Reading) -> Reading:
         limits = self._limits_text() if self._memory.doubt[self._i] == Doubt.JUMPED else ""
@@ -220,7 +242,7 @@ class ReadingTrust:
             possible = is_possible(before, base_s, last, earlier, sample, self._tolerance_mm, limits)
         if possible and (stays or math.isfinite(limits.acceleration) or self._goes_on(last, earlier, sample)):
             if not latched:
-                self._history.append(earlier)
+                self._remember(earlier)
             return self._believed(reading, sample)
         if stays:
             self._memory.distrust(self._i, Doubt.JUMPED, sample.value - last.value)

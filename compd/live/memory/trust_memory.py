@@ -53,10 +53,14 @@ class TrustMemory:
     repeats : how many polls in a row have given the very same value. changes : how many polls have given another one.
     first_change_s, last_change_s : when the first and the last of these were, s.
     step_mm : the smallest change seen; inf before the first.
+    scatter_mm : standard deviation of its readings at rest, as measured, mm; nan before it is known.
+    stepped, stepped_mm, stepped_s : how often it has gone from one place where it stood to the next; the sum of those
+        steps that no reading shows on the way, mm; and when the last one began, s; nan before the first.
     accepted, obeyed : how often a person has accepted the channel, and how often its thread has followed.
     voted, heard : how often a vote has named the channel, and how often its thread has followed.
     suspected : 1 while a vote waits for more evidence against the channel: it has no value meanwhile.
     evidence : of the votes, by channel.
+    warnings : by channel: what is to be looked at, of one that is believed all the same.
     """
 
     def __init__(self, channels: Sequence[str], tolerance_mm: Sequence[float]) -> None:
@@ -72,9 +76,11 @@ class TrustMemory:
         self.repeats, self.changes = (shared_floats(max(n, 1)) for _ in range(2))
         self.first_change_s, self.last_change_s = (shared_floats(max(n, 1)) for _ in range(2))
         self.step_mm[:] = math.inf
+        self.scatter_mm, self.stepped, self.stepped_mm, self.stepped_s = (shared_floats(max(n, 1)) for _ in range(4))
+        self.scatter_mm[:] = self.stepped_s[:] = math.nan
         self.accepted, self.obeyed, self.voted, self.heard = (shared_counters(max(n, 1)) for _ in range(4))
         self.suspected = shared_counters(max(n, 1))
-        self.evidence = SharedMessage()
+        self.evidence, self.warnings = SharedMessage(), SharedMessage()
 
     def lose(self, i: int, now_s: float) -> None:
         """Note that channel `i` is away from now on (s), with what the others show."""

@@ -16,10 +16,12 @@ from compd.live.loop.skew import skew_of
 from compd.live.loop.timing import LoopTiming
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
+from compd.live.memory.trust_memory import TrustMemory
 from compd.live.processes.control import Control
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender
 from compd.text.json_text import omit_unknown
+from compd.units import UM_PER_MM
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,7 @@ class StatusReport:
     latest, wires, commands, adopted, timing, control, publisher : the daemon's own.
     packets : the UDP sender, where one is configured.
     lines : makes the state of every line, by name.
+    trust : what is known of the length channels.
     """
 
     version: Mapping[str, Any]
@@ -44,6 +47,7 @@ class StatusReport:
     publisher: Publisher
     packets: UdpSender | None
     lines: Callable[[], Mapping[str, Any]]
+    trust: TrustMemory
     clock: Clock
 
     def message(self) -> dict[str, Any]:
@@ -94,6 +98,7 @@ class StatusReport:
         gauges: list[dict[str, Any]] = []
         stale_after_s = {wire.channel: wire.stale_after_s for wire in self.wires.all_wires}
         meanings = {wire.channel: wire.meaning for wire in self.wires.all_wires}
+        warnings = self.trust.warnings.read() or {}
         for channel, reading in zip(self.latest.channels, self.latest.snapshot(now_s).readings, strict=True):
             age_s = now_s - reading.time_s
             stale = reading.ok and age_s > stale_after_s.get(channel, math.inf)
@@ -106,5 +111,9 @@ class StatusReport:
                 entry["value"] = round(reading.value, 7)
             if reading.detail:
                 entry["detail"] = reading.detail
+            if reading.motion is not None and not math.isnan(reading.motion.scatter_mm):
+                entry["scatter_um"] = round(reading.motion.scatter_mm * UM_PER_MM, 4)
+            if channel in warnings:
+                entry["warning"] = warnings[channel]
             gauges.append(entry)
         return gauges

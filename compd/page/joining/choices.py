@@ -63,7 +63,8 @@ class Choices:
         for option, value in options.items():
             if value is not None:
                 words += [option, repr(value) if isinstance(value, float) else str(value)]
-        return shlex.join([*words, "--moving"] if join.moving else words)
+        flags = {"--moving": join.moving, "--clock-set-back": read.clock_set_back}
+        return shlex.join([*words, *(flag for flag, is_set in flags.items() if is_set)])
 
 
 def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | None) -> Choices:
@@ -101,6 +102,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
         decimal=text("decimal", (".", ",")),
         dates=text("dates", _DATES),
         rate_hz=choice("rate_hz", float, "a number, Hz"),
+        clock_set_back=keys.get("clock_set_back") is True,
         group=text("group"),
         sheet=text("sheet"),
         limits=LIMITS,

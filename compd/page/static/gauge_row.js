@@ -53,13 +53,15 @@ export class GaugeRow {
     const digits = this.wire.kind === "quantity" ? 2 : 4;
     this.share = reading.fault ? Infinity : (reading.age_s ?? Infinity) / this.wire.stale_after_s;
     this.bad = Boolean(reading.fault);
-    this.row.className = this.bad ? "bad" : "";
+    this.row.className = this.bad ? "bad" : reading.warning ? "warned" : "";
     this.age.classList.toggle("old", this.bad);
     this.bar.style.width = `${100 * Math.min(1, this.share)}%`;
     const waits = reading.fault === "distrusted";
     if (waits && !this.button.isConnected) this.quality.prepend(this.button);
     if (!waits) this.button.remove();
-    const quality = reading.fault ? `✕ ${reading.fault.replaceAll("_", " ")}${reading.detail ? `: ${reading.detail}` : ""}` : "✓ ok";
+    const warning = reading.warning ? `⚠ ${reading.warning}` : "";
+    const fault = reading.fault ? `✕ ${reading.fault.replaceAll("_", " ")}${reading.detail ? `: ${reading.detail}` : ""}` : "";
+    const quality = [fault, warning].filter(Boolean).join("; ") || "✓ ok";
     write(this.cells.value, reading.value === undefined ? "–" : `${this.wire.kind === "quantity" ? reading.value.toFixed(digits) : signed(reading.value, digits)} ${this.unit}`);
     write(this.cells.age, reading.age_s === undefined ? "" : ago(reading.age_s));
     write(this.cells.quality, quality);

@@ -79,3 +79,8 @@ def test_channels_of_one_gauge_that_differ_are_named():
     gauges = [{"channel": f"joints.{i}", "quality": quality} for i, quality in enumerate(["ok", "crc", "crc"], start=1)]
     gauges.append({"channel": "scale_1.position", "quality": "timeout"})
     assert lost_gauges(gauges) == ["joints.2, joints.3: crc", "scale_1.position: timeout"]
+
+
+def test_a_gauge_that_is_to_be_looked_at_is_a_line():
+    gauges = [{"channel": "scale_1.position", "quality": "ok", "warning": "scatters by 3.5 um at rest"}]
+    assert "scale_1.position: warning: scatters by 3.5 um at rest" in shown(setpoint(), STATUS | {"gauges": gauges})

@@ -103,3 +103,11 @@ def test_the_same_as_json(tmp_path: Path) -> None:
     found = json.loads(text)
     assert (code, found["health"], found["state"], found["valid"]) == (1, "warning", "hold", True)
     assert found["status"]["class"] == "STATUS"
+
+
+def test_a_gauge_that_is_to_be_looked_at_is_said_and_is_no_fault(tmp_path: Path) -> None:
+    warned = [GOOD[0] | {"warning": "scatters by 3.5 um at rest, declared: 0.1 um (`noise_um`)"}, GOOD[1]]
+    with daemon(tmp_path, "ok", gauges=warned) as address:
+        code, text = invoke(address)
+    assert code == 0
+    assert "scale_1.value: warning: scatters by 3.5 um at rest" in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -159,6 +160,19 @@ def test_every_blind_spot_says_what_remains() -> None:
         assert spot.fault
         assert spot.unseen
         assert "nan" not in spot.cost(figures)
+
+
+@pytest.mark.parametrize("name", ["tripod-cmm", "hexapod"])
+def test_lost_signal_periods_and_scatter_have_their_numbers(name: str) -> None:
+    configuration = load(CONFIG / f"{name}.yaml")
+    gauges = {g: options.model_copy(update={"noise_um": None}) for g, options in configuration.gauges.items()}
+    gauges["scale_1"] = gauges["scale_1"].model_copy(update={"noise_um": 0.1})
+    figures = figures_of(replace(configuration, gauges=gauges))
+    cost = {spot.name: spot.cost(figures) for spot in BLIND_SPOTS}
+    assert f"20 um that is lost: {20 * figures.leverage('scale'):.3g} um at the tip" in cost["lost_signal_periods"]
+    assert "one step at rest: 38" in cost["lost_signal_periods"]
+    assert cost["scatter"].startswith(f"scale_1: 0.2 um, {0.2 * figures.leverage('scale'):.3g} um at the tip")
+    assert "no `noise_um`, so that any scatter passes: scale_2, " in cost["scatter"]
 
 
 def test_the_command_prints_both() -> None:

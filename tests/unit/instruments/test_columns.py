@@ -144,3 +144,44 @@ def test_groups_are_chosen_and_never_mixed_silently(tmp_path: Path) -> None:
     assert every.name == ("A::1", "B::1", "A::2")
     assert "has no such group" in refused(tmp_path, GROUPS, group="C")
     assert read(tmp_path, GROUPS.replace("B", "A")).name == ("1", "1", "2")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("X", "Y", "Z", "Xm", "Ym", "Zm"),
+        ("x_mm", "y_mm", "z_mm", "mx_mm", "my_mm", "mz_mm"),
+        ("X", "Y", "Z", "X2", "Y2", "Z2"),
+        ("X", "Y", "Z", "Tx1", "Ty1", "Tz1"),
+    ],
+)
+def test_two_triples_of_like_names_are_asked_about(tmp_path: Path, names: tuple[str, ...]) -> None:
+    places = np.random.default_rng(1).uniform(-200.0, 200.0, (12, 3))
+    rows = [",".join([*(f"{v:.0f}" for v in place), *(f"{v + 0.01:.6f}" for v in place)]) for place in places]
+    text = "\n".join([",".join(names), *rows]) + "\n"
+    message = refused(tmp_path, text, unit="mm")
+    assert "two triples of columns may be the position" in message
+    assert f"--x {names[3]} --y {names[4]} --z {names[5]}" in message
+    export = read(tmp_path, text, unit="mm", names=dict(zip("xyz", names[3:], strict=True)))
+    np.testing.assert_allclose(export.values, places + 0.01, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("X", "Y", "Z", "Nominal X", "Nominal Y", "Nominal Z"),
+        ("X", "Y", "Z", "Xnom", "Ynom", "Znom"),
+        ("X", "Y", "Z", "xa", "ya", "wa"),
+    ],
+)
+def test_what_a_name_says_is_not_asked(tmp_path: Path, names: tuple[str, ...]) -> None:
+    places = np.random.default_rng(1).uniform(-200.0, 200.0, (12, 3))
+    rows = [",".join([*(f"{v + 0.01:.6f}" for v in place), *(f"{v:.0f}" for v in place)]) for place in places]
+    export = read(tmp_path, "\n".join([",".join(names), *rows]) + "\n", unit="mm")
+    np.testing.assert_allclose(export.values, places + 0.01, atol=1e-6)
+
+
+def test_deviations_beside_a_position_are_not_asked_about(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    rows = [",".join(f"{v:.4f}" for v in [*rng.uniform(-200, 200, 3), *rng.normal(0, 0.01, 3)]) for _ in range(12)]
+    assert len(read(tmp_path, "\n".join(["X,Y,Z,dX,dY,dZ", *rows]) + "\n", unit="mm").values) == 12

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -125,3 +126,40 @@ def test_a_rate_gives_times_to_rows_without_any(tmp_path: Path) -> None:
     np.testing.assert_allclose(export.values[0], [25.4, 50.8, 76.2])
     assert "has a time" in refused(tmp_path, "time_s,x_mm\n1,2\n", rate_hz=10.0)
     assert "is no rate" in refused(tmp_path, "x_mm,y_mm\n1,2\n", rate_hz=-1.0)
+
+
+def counted(times: Sequence[str]) -> str:
+    return "Time;X [mm]\n" + "".join(f"{time};{k}\n" for k, time in enumerate(times))
+
+
+@pytest.mark.parametrize(
+    ("start", "step", "decimals"),
+    [
+        (45592.124722, 0.05 / 86400, 9),  # a spreadsheet's days, twenty rows a second
+        (45592.12472, 5.0 / 86400, 5),  # a row every 5 s
+        (45592.12472, 60.0 / 86400, 6),  # and every minute
+        (12.345678, 0.05 / 3600, 8),  # hours
+    ],
+)
+def test_times_that_are_no_seconds_are_asked_about(tmp_path: Path, start: float, step: float, decimals: int) -> None:
+    text = counted([f"{start + step * k:.{decimals}f}" for k in range(20)])
+    message = refused(tmp_path, text)
+    assert "no unit of time in its name" in message
+    assert "time[day]" in message
+    export = read(tmp_path, text, columns=("time[day]", "x[mm]"))
+    assert export.time_s is not None
+    assert np.ptp(export.time_s) == pytest.approx(19 * step * 86400, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("start", "step", "decimals"),
+    [(0.0, 0.05, 3), (45592.125, 0.05, 3), (1730000000.0, 0.001, 3), (0.5, 0.0005, 4), (30000.00001, 60.0, 5)],
+)
+def test_times_that_may_be_seconds_are_seconds(tmp_path: Path, start: float, step: float, decimals: int) -> None:
+    export = read(tmp_path, counted([f"{start + step * k:.{decimals}f}" for k in range(20)]))
+    assert export.time_s is not None
+    assert np.ptp(export.time_s) == pytest.approx(19 * step, rel=1e-3)
+
+
+def test_times_all_alike_are_no_error_here(tmp_path: Path) -> None:
+    assert "no unit of time" in refused(tmp_path, counted(["45592.124722"] * 3))

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from compd.errors import RecordingError
 from compd.instruments.track import track_of
-from tests.unit.instruments.reading import read
+from tests.unit.instruments.reading import read, refused
 
 
 def test_positions_between_samples_and_attitude_on_the_shortest_arc(tmp_path: Path) -> None:
@@ -35,3 +35,50 @@ def test_positions_between_samples_and_attitude_on_the_shortest_arc(tmp_path: Pa
 def test_what_is_no_track_is_refused(tmp_path: Path, text: str, wanted: str) -> None:
     with pytest.raises(RecordingError, match=wanted):
         track_of(read(tmp_path, text))
+
+
+def stamped(times: list[str]) -> str:
+    return "time,x_mm\n" + "".join(f"{time},{k}\n" for k, time in enumerate(times))
+
+
+AUTUMN = ["2024-10-27 02:59:58.5", "2024-10-27 02:59:59.5", "2024-10-27 02:00:00.5", "2024-10-27 02:00:01.5"]
+
+
+def test_a_clock_that_was_set_back_is_told_and_mended(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="the clock was set back by an hour") as caught:
+        track_of(read(tmp_path, stamped(AUTUMN)))
+    assert "export.txt:4" in str(caught.value)
+    assert "--clock-set-back" in str(caught.value)
+    export = read(tmp_path, stamped(AUTUMN), clock_set_back=True)
+    np.testing.assert_allclose(np.diff(track_of(export).time_s), 1.0)
+    assert "1 h added from line 4 on" in export.taken["time"]
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        [AUTUMN[0], AUTUMN[2], AUTUMN[1], AUTUMN[3]],  # falls twice, when sorted badly
+        ["2024-10-27 02:30:00.5", "2024-10-27 02:00:00.5", "2024-10-27 02:00:01.5"],  # by half an hour
+        AUTUMN[2:],
+    ],
+)
+def test_an_hour_is_added_nowhere_else(tmp_path: Path, times: list[str]) -> None:
+    assert "its clock was not set back by an hour" in refused(tmp_path, stamped(times), clock_set_back=True)
+
+
+def test_two_hours_sorted_into_one_are_no_track(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    time_s = np.sort(rng.uniform(0.0, 20.0, 400))
+    places_mm = np.where(rng.random(400)[:, None] < 0.5, 100.0, -80.0) + rng.normal(0.0, 1e-3, (400, 3))
+    text = "time_s,x_mm,y_mm,z_mm\n" + "".join(
+        f"{t:.4f},{x:.5f},{y:.5f},{z:.5f}\n" for t, (x, y, z) in zip(time_s, places_mm, strict=True)
+    )
+    with pytest.raises(RecordingError, match="of two tracks in turn"):
+        track_of(read(tmp_path, text))
+
+
+def test_a_track_with_single_wild_samples_is_one(tmp_path: Path) -> None:
+    time_s = np.arange(600) / 20
+    x_mm = 50 * np.sin(time_s) + np.where(np.arange(600) % 29 == 3, 5.0, 0.0)
+    text = "time_s,x_mm\n" + "".join(f"{t:.4f},{x:.5f}\n" for t, x in zip(time_s, x_mm, strict=True))
+    assert len(track_of(read(tmp_path, text)).time_s) == 600

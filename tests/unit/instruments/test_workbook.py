@@ -253,3 +253,31 @@ def test_names_of_cells() -> None:
         "ZZ4",
         "AAA5",
     ]
+
+
+@pytest.mark.parametrize(
+    ("attributes", "hidden"), [('hidden="1"', True), ('ht="0" customHeight="1"', True), ('ht="15"', False)]
+)
+def test_hidden_rows_are_told(tmp_path: Path, attributes: str, hidden: bool) -> None:
+    def hide(text: str) -> str:
+        return text.replace('<row r="3"', f'<row {attributes} r="3"').replace('<row r="4"', f'<row r="4" {attributes}')
+
+    path = edit(book(tmp_path, LIST), "xl/worksheets/sheet1.xml", hide)
+    table = read(path)
+    assert table.line.tolist() == [2, 3, 4]
+    if hidden:
+        assert table.assumed["hidden rows"].startswith("2 rows between 3 and 4 are hidden")
+    else:
+        assert "hidden rows" not in table.assumed
+
+
+def test_a_hidden_row_of_a_long_sheet_is_told(tmp_path: Path) -> None:
+    """The sheet is read in parts of a megabyte: a row is found wherever it stands."""
+    rows = [("name", "X [mm]"), *((f"P{k}", k + 0.5) for k in range(40_000))]
+    hidden = set(range(2, 40_000, 7))
+
+    def hide(text: str) -> str:
+        return re.sub(r'<row r="(\d+)"', lambda match: match[0] + ' hidden="1"' * (int(match[1]) in hidden), text)
+
+    table = read(edit(book(tmp_path, rows), "xl/worksheets/sheet1.xml", hide))
+    assert table.assumed["hidden rows"].startswith(f"{len(hidden)} rows between 2 and {max(hidden)} are hidden")

@@ -170,3 +170,13 @@ def test_any_measurement_is_joined_rightly_or_refused() -> None:
             joined += 1
             assert not ((result.dwell != wanted) & (result.dwell >= 0)).any(), seed
     assert joined > 45
+
+
+def test_one_point_far_from_all_others_is_named() -> None:
+    """It makes a line of all points: a decimal point that was lost, for instance."""
+    rng = np.random.default_rng(2)
+    points_mm = measured(rng, random_places(rng, 20))
+    points_mm[7, 1] = 171118176.0
+    result = refused(random_places(rng, 20), points_mm)
+    assert "one of them is far from all others" in result.why
+    assert result.point == 7

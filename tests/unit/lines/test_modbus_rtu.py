@@ -264,3 +264,43 @@ def test_a_reply_that_is_one_behind_is_refused() -> None:
 def test_the_silence_before_a_frame() -> None:
     assert gap_s(9600) == pytest.approx(3.5 * 11 / 9600)
     assert gap_s(115200) == 1.75e-3
+
+
+def behind(damage: bytes, device: Device) -> Device:
+    return lambda request: damage + device(request)
+
+
+@pytest.mark.parametrize("damage", [b"\0", b"\xff", b"\x01", b"\0\xff"])
+@pytest.mark.parametrize("count", [1, 2, 3, 32])
+def test_bytes_before_a_reply_are_told_and_can_be_skipped(damage: bytes, count: int) -> None:
+    device = behind(damage, counting_slave())
+    fault = fault_of(device, count)
+    bytes_text = "one byte" if len(damage) == 1 else "2 bytes"
+    assert f"{bytes_text} before the reply ({damage.hex(' ')}); the rest fits" in fault.detail
+    assert f"`skip_bytes: {len(damage)}`" in fault.detail
+    clock = InstantClock()
+    port = ScriptedPort(clock, device=device)
+    line = RtuMaster(StreamLine(port, 0.1, 0.002, clock), skip_bytes=len(damage))
+    for _ in range(4):  # also with one register more
+        assert line.read_registers(UNIT, 4, 10, count).registers == tuple(range(1010, 1010 + count))
+    assert line.unexpected_bytes == 0
+
+
+def test_an_exception_behind_a_byte_is_the_exception() -> None:
+    clock = InstantClock()
+    port = ScriptedPort(clock, device=behind(b"\0", counting_slave(end=5)))
+    with pytest.raises(LineFault, match="illegal data address"):
+        RtuMaster(StreamLine(port, 0.1, 0.002, clock), False, 1).read_registers(UNIT, 4, 10, 2)
+
+
+@pytest.mark.parametrize("damage", [b"\0", b"\0\0\0\0"])
+def test_a_damaged_reply_behind_bytes_is_never_believed(damage: bytes) -> None:
+    def device(request: bytes) -> bytes:
+        reply = bytearray(counting_slave()(request))
+        reply[4] ^= 0x10
+        return damage + bytes(reply)
+
+    clock = InstantClock()
+    line = RtuMaster(StreamLine(ScriptedPort(clock, device=device), 0.1, 0.002, clock), False, 3)
+    with pytest.raises(LineFault):
+        line.read_registers(UNIT, 4, 10, 2)

@@ -35,3 +35,12 @@ def test_a_fault_has_no_value_and_an_old_reading_is_stale():
     scale, room = shown(lost, {"value": 20.25, "time_s": 94.0}, zero=ZERO)
     assert scale == {"fault": "timeout", "detail": "no byte"}
     assert room["fault"] == "stale"
+
+
+def test_a_warning_of_status_stands_beside_its_gauge() -> None:
+    readings = {"time_s": 5.0, "readings": {"a.x": {"value": 1.0, "time_s": 4.9}, "b.x": {"value": 1.0, "time_s": 4.9}}}
+    columns = [{"column": name, "channel": f"{name}.x", "stale_after_s": 0.5} for name in "ab"]
+    status = {"gauges": [{"channel": "a.x", "quality": "ok"}, {"channel": "b.x", "quality": "ok", "warning": "hum"}]}
+    first, second = gauges(readings, columns, status)
+    assert "warning" not in first
+    assert second["warning"] == "hum"

@@ -64,9 +64,16 @@ class Contradiction(NamedTuple):
     evidence: str
 
 
+class Remark(NamedTuple):
+    """A channel, by its number, that is believed and to be looked at, and why; made at each look while it lasts."""
+
+    channel: int
+    text: str
+
+
 class Vote(Protocol):
     """One kind of contradiction. A channel that is not believed takes no part, and begins anew when it is again."""
 
-    def look(self, view: MachineView) -> Iterator[Contradiction]:
-        """The channels that the gauges contradict now."""
+    def look(self, view: MachineView) -> Iterator[Contradiction | Remark]:
+        """The channels that the gauges contradict now, or that are to be looked at."""
         ...

@@ -14,8 +14,10 @@ from compd.configuration.operation import VoteSettings
 from compd.live.acquisition.votes.following_error import FollowingError
 from compd.live.acquisition.votes.frame_temperature import FrameTemperature
 from compd.live.acquisition.votes.joint_pair import JointPair
-from compd.live.acquisition.votes.machine_view import MachineView, Vote, WiredLength
+from compd.live.acquisition.votes.machine_view import MachineView, Remark, Vote, WiredLength
+from compd.live.acquisition.votes.measured_scatter import MeasuredScatter
 from compd.live.acquisition.votes.repeated_digits import RepeatedDigits
+from compd.live.acquisition.votes.signal_periods import SignalPeriods
 from compd.live.acquisition.votes.standing_scale import StandingScale
 from compd.live.acquisition.votes.tip_speed import TipSpeed
 from compd.live.memory.latest import Latest
@@ -39,9 +41,11 @@ class Votes:
         latest: Latest,
         zero_mm: Callable[[], Mapping[str, float] | None],
         setpoint_line: Callable[[], bytes | None],
+        signal_period_mm: float = math.nan,
     ) -> None:
         """`wired`: what each channel of `memory` measures. `quantities`: channel and stale limit (s) of each quantity,
-        by name. `zero_mm`: readings at machine zero by channel, or None. `setpoint_line`: the newest SETPOINT."""
+        by name. `zero_mm`: readings at machine zero by channel, or None. `setpoint_line`: the newest SETPOINT.
+        `signal_period_mm`: of the scales, where it is known."""
         self._memory = memory
         self._wired = tuple(wired)
         self._sign = np.array([entry.sign for entry in self._wired], dtype=float)
@@ -49,23 +53,45 @@ class Votes:
         self._latest = latest
         self._zero_mm = zero_mm
         self._setpoint_line = setpoint_line
-        self._votes = _votes(settings)
+        self._votes = _votes(settings, signal_period_mm)
+        self._remarks: dict[str, str] = {}
         for i in range(len(self._wired)):
             memory.suspected[i] = False  # of an acquisition that has ended: its evidence went with it
         # the messages are parsed only for votes that look at them
-        self._needs_setpoint = settings.following_mm is not None or settings.tip_mm_per_s is not None
+        self._needs_setpoint = (
+            settings.following_mm is not None
+            or settings.tip_mm_per_s is not None
+            or (settings.signal_periods and not math.isnan(signal_period_mm))
+        )
 
     def look(self, now_s: float) -> None:
         """Look once, at `now_s` (s)."""
         view = self._view(now_s)
         evidence: dict[str, str] = {}
+        remarks: dict[str, str] = {}
         for vote in self._votes:
-            for number, text in vote.look(view):
-                evidence.setdefault(self._memory.channels[number], text)
+            for found in vote.look(view):
+                channel = self._memory.channels[found.channel]
+                if isinstance(found, Remark):
+                    remarks[channel] = f"{remarks[channel]}; {found.text}" if channel in remarks else found.text
+                else:
+                    evidence.setdefault(channel, found.evidence)
+        self._remark(remarks)
         if evidence:
             for channel, text in evidence.items():
                 log.warning("gauge is contradicted", channel=channel, evidence=text)
             self._memory.vote(evidence)
+
+    def _remark(self, remarks: dict[str, str]) -> None:
+        """Publish what is to be looked at, and log what begins and what is over."""
+        if remarks == self._remarks:
+            return
+        for channel in remarks.keys() - self._remarks.keys():
+            log.warning("gauge is to be looked at", channel=channel, reason=remarks[channel])
+        for channel in self._remarks.keys() - remarks.keys():
+            log.info("gauge has no warning any more", channel=channel, reason=self._remarks[channel])
+        self._remarks = remarks
+        self._memory.warnings.write(remarks)
 
     def _view(self, now_s: float) -> MachineView:
         memory, n = self._memory, len(self._wired)
@@ -87,8 +113,10 @@ class Votes:
         return None if not line else json.loads(line)
 
 
-def _votes(settings: VoteSettings) -> list[Vote]:
-    votes: list[Vote] = []
+def _votes(settings: VoteSettings, signal_period_mm: float) -> list[Vote]:
+    votes: list[Vote] = [MeasuredScatter()]
+    if settings.signal_periods and not math.isnan(signal_period_mm):
+        votes.append(SignalPeriods(signal_period_mm))
     if settings.repeated_digits:
         votes.append(RepeatedDigits())
     if settings.standing_scale_mm is not None:

@@ -19,6 +19,10 @@ class MotionKeys(Keys):
         default=None, description="standard uncertainty of the speed; absent while it is not known"
     )
     horizon_s: float = Field(description="for so long after the reading the motion is taken to go on, s")
+    scatter_mm: float | None = Field(
+        default=None,
+        description="standard deviation of one reading at rest, as the last ones show it; absent while it is not known",
+    )
 
 
 class ReadingKeys(Keys):

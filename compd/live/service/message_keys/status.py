@@ -105,6 +105,14 @@ class ChannelStatusKeys(Keys):
     age_s: float | None = Field(default=None, description="age of its reading, s")
     value: float | None = Field(default=None, description="raw value, before sign and machine zero, in its unit")
     detail: str | None = Field(default=None, description="what the device sent or the line saw")
+    scatter_um: float | None = Field(
+        default=None,
+        description="of a length that is good: standard deviation of one reading at rest, as measured, um; absent "
+        "while it is not known",
+    )
+    warning: str | None = Field(
+        default=None, description="what is to be looked at, of a length that is believed all the same"
+    )
 
 
 class StatusKeys(VersionKeys):

@@ -1,8 +1,8 @@
 // How the export is read: its first rows, above each column what it is taken for, and what else a person may say of it.
 import { element } from "../format.js";
-import { Choice, Quantity } from "./fields.js";
+import { Check, Choice, Quantity } from "./fields.js";
 
-const ROLES = [["time", "time"], ["time[s]", "time, s"], ["time[ms]", "time, ms"], ["date", "date"], ["x", "x"], ["y", "y"], ["z", "z"], ["rx", "rx"], ["ry", "ry"], ["rz", "rz"], ["length", "length"], ["name", "name"], ["group", "group"], ["collection", "collection"], ["-", "unused"]];
+const ROLES = [["time", "time"], ["time[s]", "time, s"], ["time[ms]", "time, ms"], ["time[min]", "time, min"], ["time[h]", "time, h"], ["time[day]", "time, days"], ["date", "date"], ["x", "x"], ["y", "y"], ["z", "z"], ["rx", "rx"], ["ry", "ry"], ["rz", "rz"], ["length", "length"], ["name", "name"], ["group", "group"], ["collection", "collection"], ["-", "unused"]];
 const LENGTHS = ["mm", "um", "m", "cm", "inch", "ft"];
 const ANGLES = ["rad", "mrad", "deg", "arcsec"];
 const SHAPES = [["csv", "text with a delimiter"], ["blanks", "text between blanks"], ["sa", "SpatialAnalyzer"], ["carto", "CARTO"], ["xlsx", "Excel"]];
@@ -19,6 +19,7 @@ export class Reading {
       decimal: new Choice(wizard, "decimal", "Decimal sign", [[".", "point"], [",", "comma"]]),
       dates: new Choice(wizard, "dates", "Order of dates", [["dmy", "day month year"], ["mdy", "month day year"], ["ymd", "year month day"]]),
       rate_hz: new Quantity(wizard, "rate_hz", "Rows in a second", "Hz"),
+      clock_set_back: new Check(wizard, "clock_set_back", "the clock was set back by 1 h meanwhile"),
       group: new Choice(wizard, "group", "Group of points"),
       sheet: new Choice(wizard, "sheet", "Sheet"),
     };
@@ -36,7 +37,7 @@ export class Reading {
     this.showTaken(table);
     this.showTable(table);
     if (!table) return;
-    const { shape, unit, angle_unit, decimal, dates, rate_hz, group, sheet } = this.fields;
+    const { shape, unit, angle_unit, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
     const { assumed } = table;
     const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
     shape.automatic(`as found: ${SHAPES.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
@@ -47,6 +48,7 @@ export class Reading {
     const order = /dates ([a-z]+-[a-z]+-[a-z]+)/.exec(assumed.time ?? "");
     dates.automatic(order && !choices.dates ? `as found: ${order[1].replaceAll("-", " ")}` : "as found");
     rate_hz.offer(!table.roles.includes("time"));
+    clock_set_back.offer(table.roles.some((role) => bare(role) === "time"));
     group.offer(table.groups.length > 1 || choices.group != null);
     group.options([...each(table.groups), ["all", "all of them"]], table.groups.length > 1 ? "choose …" : "the only one");
     sheet.offer(table.sheets.length > 1);

@@ -1,0 +1,88 @@
+"""How far the readings of a length scatter while it stands, by themselves: nothing that is declared enters.
+
+The standard deviation about a straight line in windows of a second or more, so that a drift does not count, without
+single readings that are damaged. A window counts where the readings stay within their tolerance, or go to and fro about
+the same place: motion from one place to another crosses the line two or three times, noise and hum many times. The
+median of the last windows counts, so that one in which the machine has moved all the same does no harm.
+
+A hum that the polls alias to less than three periods in a window looks like motion, and does not count.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.live.acquisition.possible_motion import GaugeSample
+
+# A window has at least so many readings, and lasts so long, s. The error of a standard deviation from 32 is 13 %.
+FEWEST = 32
+WINDOW_S = 1.0
+# Windows of which the median counts, and how many of them there must be.
+_WINDOWS = 5
+_FEWEST_WINDOWS = 3
+# How often readings go from one side of the line to the other, each time by half a standard deviation beyond it: three
+# periods. The residual of a move with one reversal has three or four such changes, that of noise 0.3 for each reading.
+_FEWEST_CHANGES = 6
+_BEYOND = 0.5
+# About one place, where the line goes no further than so many standard deviations.
+_STAYS = 2.0
+# A reading so many medians of the deviations from the middle is damaged: of noise 7 is 5 sigma, of hum 1.4 is the most.
+_DAMAGED = 7.0
+# A recording has it as text: 1 pm is less than anybody knows of it.
+_DECIMALS_MM = 9
+
+
+class Scatter:
+    """Of one length.
+
+    Attributes
+    ----------
+    mm : standard deviation of one reading, mm; nan before there are enough.
+    """
+
+    def __init__(self, tolerance_mm: float) -> None:
+        """`tolerance_mm`: readings that differ by no more stand."""
+        self.mm = math.nan
+        self._tolerance_mm = tolerance_mm
+        self._times_s: list[float] = []
+        self._values_mm: list[float] = []
+        self._windows: deque[float] = deque(maxlen=_WINDOWS)
+
+    def note(self, sample: GaugeSample) -> None:
+        """A reading, in the order of time."""
+        self._times_s.append(sample.time_s)
+        self._values_mm.append(sample.value)
+        if len(self._times_s) < FEWEST or sample.time_s - self._times_s[0] < WINDOW_S:
+            return
+        value_mm = np.array(self._values_mm)
+        time_s = np.array(self._times_s)
+        self._times_s.clear()
+        self._values_mm.clear()
+        off_mm = value_mm - np.median(value_mm)
+        whole = np.abs(off_mm) <= _DAMAGED * max(float(np.median(np.abs(off_mm))), self._tolerance_mm)
+        off_mm, went_mm = _off_line(time_s[whole], value_mm[whole])
+        if len(off_mm) <= 2:
+            return
+        deviation_mm = math.sqrt(float(off_mm @ off_mm) / (len(off_mm) - 2))
+        stands = float(np.ptp(value_mm[whole])) <= self._tolerance_mm
+        stays = went_mm <= max(self._tolerance_mm, _STAYS * deviation_mm)
+        if stands or (stays and _changes_of_side(off_mm, _BEYOND * deviation_mm) >= _FEWEST_CHANGES):
+            self._windows.append(deviation_mm)
+            if len(self._windows) >= _FEWEST_WINDOWS:
+                self.mm = round(float(np.median(self._windows)), _DECIMALS_MM)
+
+
+def _off_line(time_s: FloatArray, value_mm: FloatArray) -> tuple[FloatArray, float]:
+    """Distances (mm) from the straight line that fits best, and how far that goes (mm)."""
+    time_s, value_mm = time_s - time_s.mean(), value_mm - value_mm.mean()
+    slope = float(time_s @ value_mm) / max(float(time_s @ time_s), 1e-12)
+    return value_mm - slope * time_s, abs(slope) * float(np.ptp(time_s))
+
+
+def _changes_of_side(off_mm: FloatArray, beyond_mm: float) -> int:
+    sides = np.sign(off_mm[np.abs(off_mm) > beyond_mm])
+    return int(np.count_nonzero(np.diff(sides)))
