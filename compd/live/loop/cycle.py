@@ -187,8 +187,10 @@ def _compute(
         compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
         if code := int(compensation.reason):
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
-    reported = max(limited.state, usable.state, scales.state or State.OK, key=lambda state: state.rank)
-    reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason)))
+    at_edge = State.CLAMPED if usable.beyond else State.OK
+    reported = max(limited.state, usable.state, scales.state or State.OK, at_edge, key=lambda state: state.rank)
+    beyond = f"effects stay at the edge of their range: {usable.beyond}" if usable.beyond else ""
+    reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason, beyond)))
     u_tip_um = with_age(*u_tip, lambda: age_uncertainty_mm(snapshot, comparators, target, settings))
     setpoint_values = _setpoint_values(compensation, limited.applied_mm, u_tip_um, shadow, wires.tool_on_plate)
     return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state

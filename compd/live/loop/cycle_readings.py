@@ -36,16 +36,19 @@ def read_comparators(
     lengths = wires.comparators.read(snapshot, zero_mm, extrapolate)
     lost, oldest_s = lengths.lost, lengths.oldest_s
     quantities: Mapping[str, FloatArray] = {}
+    beyond = ""
     if applied.quantities:
         needed = applied.read(snapshot)
         lost = lost.and_also(needed.lost)
         oldest_s = min(oldest_s, needed.oldest_s)
         quantities = applied.by_name(needed)
+        beyond = needed.beyond
     if not lost:
         length_times_s = lengths.oldest_s, lengths.newest_s
         drift_mm_per_s = () if settings.noise is None else wires.comparators.drift_mm_per_s(snapshot)
         live = ComparatorSet(lengths.values, now_s, oldest_s, quantities, (), length_times_s, drift_mm_per_s)
-        return live, usable_comparators(live, last_good, lost, now_s, settings.loop)
+        usable = usable_comparators(live, last_good, lost, now_s, settings.loop)
+        return live, usable._replace(beyond=beyond) if beyond else usable
     if settings.loop.on_stale == "degrade":
         groups = (
             _group(wires.joint, snapshot, zero_mm[: wires.joints], extrapolate),
