@@ -169,7 +169,7 @@ class ModelDocument(FilePart):
     )
     checksum: str = Field(
         default="",
-        description="of all other keys; whoever changes the file by hand removes this line, and is warned when it is used",
+        description="of all other keys; whoever changes the file by hand removes this line, and is warned in its use",
     )
 
 

@@ -60,7 +60,7 @@ def read_comparators(
 
 
 def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray, extrapolate: bool) -> GroupReadings:
-    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, extrapolate)
+    values, oldest_s, newest_s, lost, _ = wires.read(snapshot, zero_mm, extrapolate)
     return GroupReadings(values, lost, oldest_s, newest_s)
 
 
@@ -93,7 +93,7 @@ def read_scales(
             return unread
         state = State.FAULT if lost.distrusted else State.DEGRADED
         return unread._replace(state=state, reason=f"not compared with the setpoint: {lost}")
-    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, settings.loop.extrapolate)
+    values, oldest_s, newest_s, lost, _ = wires.read(snapshot, zero_mm, settings.loop.extrapolate)
     if not lost:
         return Scales(values, oldest_s, newest_s)
     # no policy replaces a scale: without it the tip is not known

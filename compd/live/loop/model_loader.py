@@ -188,22 +188,26 @@ class ModelLoader:
         self._wires = wires
         self._code = code
 
-    def read(self, path: Path) -> LiveModel:
-        """The model in a file.
+    def read(self, path: Path, plausible: bool = True) -> LiveModel:
+        """The model in a file; `plausible` as of `load`.
 
         Raises CompdError with every problem: a file that cannot be read, what `read_model_file` refuses, gauges that
         the effects need and the machine does not have, an effect that fails.
         """
-        return self.load(ModelText.read(path))
+        return self.load(ModelText.read(path), plausible)
 
-    def load(self, text: ModelText | None) -> LiveModel:
-        """The model in a file that has been read; None is the machine without effects. Raises as `read` does."""
+    def load(self, text: ModelText | None, plausible: bool = True) -> LiveModel:
+        """The model in a file that has been read; None is the machine without effects. Raises as `read` does.
+
+        plausible : whether to refuse what is not plausible. False for a recording, which is replayed with what it had.
+        """
         if text is None:
             return self.without_effects
         model = self.without_effects.machine
         file = read_model_file(Path(text.file), self._machine, model.links, self._geometry, text.content, self._code)
         problems = [*self._unmet_needs(file.fitted), *_id_and_value_problems(file.fitted)]
-        problems = problems or [*_implausible_numbers(file), *_implausible_ranges(file)]
+        if plausible and not problems:
+            problems = [*_implausible_numbers(file), *_implausible_ranges(file)]
         if problems:
             raise StateError(problems)
         machine = replace(model, effects=file.fitted, covariance=file.covariance)

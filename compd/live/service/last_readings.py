@@ -79,25 +79,9 @@ class LastReadings:
 
     def recall(self) -> None:
         """Take what is on disk into the memory; before any gauge is read."""
-        try:
-            content = self._path.read_text(encoding="utf-8")
-        except FileNotFoundError:
+        file = self._read()
+        if file is None or file.zero_hash != self._zero_hash or file.format != _FORMAT:
             return
-        except (OSError, UnicodeDecodeError) as error:
-            log.warning("last readings cannot be read", path=str(self._path), reason=str(error))
-            return
-        try:
-            data = json.loads(content)
-            file = _LastReadingsFile.model_validate(data)
-            if file.checksum and file.checksum != checksum_of(data):
-                raise ValueError("the checksum does not fit")
-        except (ValueError, RecursionError, ValidationError) as error:
-            log.warning("last readings are damaged", path=str(self._path), reason=str(error).splitlines()[0])
-            return
-        if file.zero_hash != self._zero_hash or file.format != _FORMAT:
-            return
-        if not file.checksum:
-            log.warning("last readings have no checksum: what was changed in them cannot be seen", path=str(self._path))
         now_s = self._clock.monotonic()
         goes_on = file.boot_id == boot_id() and 0.0 <= now_s - file.time_s <= _LONGEST_ABSENCE_S
         memory = self._memory
@@ -118,6 +102,27 @@ class LastReadings:
                 memory.lose(i, now_s)
         if evidence := {channel: last.evidence for channel, last in doubts.items() if last.evidence}:
             memory.evidence.write(evidence)
+
+    def _read(self) -> _LastReadingsFile | None:
+        """What is on disk; None where there is nothing, or nothing that can be used."""
+        try:
+            content = self._path.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return None
+        except (OSError, UnicodeDecodeError) as error:
+            log.warning("last readings cannot be read", path=str(self._path), reason=str(error))
+            return None
+        try:
+            data = json.loads(content)
+            file = _LastReadingsFile.model_validate(data)
+            if file.checksum and file.checksum != checksum_of(data):
+                raise ValueError("the checksum does not fit")
+        except (ValueError, RecursionError, ValidationError) as error:
+            log.warning("last readings are damaged", path=str(self._path), reason=str(error).splitlines()[0])
+            return None
+        if not file.checksum:
+            log.warning("last readings have no checksum: what was changed in them cannot be seen", path=str(self._path))
+        return file
 
     def start(self) -> None:
         """Write from now on."""
