@@ -23,7 +23,9 @@ def file_with(path: Path, *declared, name="tripod-cmm", links=3, fitted_range=No
         numbers = np.broadcast_to(theta.get(effect.id, 1.0), (len(columns),)).astype(float)
         shape = {constant.name: constant.grid[0] for constant in effect.constants}
         fitted.append(FittedEffect(effect, numbers, shape))
-        anything[effect.id] = {name: (-1e9, 1e9) for name in (*(column.name for column in columns), *shape)}
+        anything[effect.id] = dict.fromkeys(
+            (*(column.name for column in columns), *shape), (-1000000000.0, 1000000000.0)
+        )
     count = sum(len(effect.theta) for effect in fitted)
     covariance = np.eye(count) * 1e-2
     file = ModelFile(name, links, tuple(declared), tuple(fitted), covariance, plausible=anything)

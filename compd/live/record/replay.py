@@ -112,7 +112,7 @@ class RecordedCycles:
         return lacking
 
     def messages(self, path: Path) -> Iterator[tuple[str, Message]]:
-        """(file:line, message) of every line of a part, in order; an incomplete last line is counted in `torn_lines`."""
+        """(file:line, message) of every line of a part; an incomplete last one is left out, and counted."""
         with path.open("rb") as file:
             for number, line in enumerate(file, start=1):
                 if not line.endswith(b"\n"):
