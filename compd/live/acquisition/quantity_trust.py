@@ -98,6 +98,8 @@ class QuantityTrust:
         faults = [self._fault(each.value, each.time_s) for each in candidates]
         for each, fault in zip(candidates, faults, strict=True):
             if fault is None:
+                if not any(faults):  # one of two answers that is plausible says nothing of the next poll
+                    self._implausible_s = max(0.0, self._implausible_s - self._share_s(reading.time_s))
                 return self._believed(each) if known else self._begin(each, candidates)
         assert faults[0] is not None
         return self._refused(reading, faults[0])
@@ -135,7 +137,6 @@ class QuantityTrust:
         return self._believed(reading)
 
     def _believed(self, reading: Reading) -> Reading:
-        self._implausible_s = max(0.0, self._implausible_s - self._share_s(reading.time_s))
         change = self._possible_change(reading.time_s)
         self._expected = min(max(reading.value, self._expected - change), self._expected + change)
         self._expected_s = reading.time_s

@@ -127,7 +127,7 @@ def test_a_thermometer_that_was_not_believed_is_not_believed_after_a_start(tmp_p
     found = with_thermometer()
     LastReadings(tmp_path, HASH, found, Clock(now_s=103.0)).recall()
     assert found.value[3] == 23.0
-    assert "jumped by 5.000 degC: look at it, then `compd accept cabinet.link_1`" in found.explanation(3)
+    assert "jumped by 5.000 degC: look at it, then `compd accept cabinet`" in found.explanation(3)
 
 
 def test_a_file_that_was_changed_is_damaged_and_one_without_a_checksum_is_warned_of(tmp_path, capsys):

@@ -179,7 +179,10 @@ def test_every_changed_digit_is_seen_and_no_comment(tmp_path: Path) -> None:
     text = path.read_text()
     digits = [k for k, character in enumerate(text) if character.isdigit()]
     for k in digits[:: max(1, len(digits) // 40)]:
-        path.write_text(text[:k] + str((int(text[k]) + 1) % 10) + text[k + 1 :])
+        changed = text[:k] + str((int(text[k]) + 1) % 10) + text[k + 1 :]
+        if yaml.safe_load(changed) == yaml.safe_load(text):  # the 17th digit of a number
+            continue
+        path.write_text(changed)
         with pytest.raises(StateError):
             read_stored(path)
     path.write_text("# of the week after the move\n" + text)
