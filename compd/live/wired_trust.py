@@ -10,7 +10,7 @@ from compd.configuration.operation import FRAME_DISTANCES
 from compd.gauge import GaugeOptions
 from compd.live.acquisition.gauge_trust import Judge
 from compd.live.acquisition.possible_motion import MotionLimits
-from compd.live.acquisition.quantity_trust import QuantityTrust
+from compd.live.acquisition.quantity_trust import QuantityLimits, QuantityTrust
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
 from compd.live.acquisition.votes.machine_view import WiredLength
 from compd.live.loop.wiring import MachineWires, Wire
@@ -22,14 +22,18 @@ from compd.units import UM_PER_MM, unit_of
 
 def wired_memory(configuration: Configuration, wires: MachineWires) -> TrustMemory:
     """The memory for the channels that are wired: lengths, then quantities."""
-    gauges, quantities = configuration.gauges, configuration.wiring.quantities
+    gauges, limits = configuration.gauges, _quantity_limits(configuration)
     return TrustMemory(
         [wire.channel for wire in wires.all_wires],
         [
             *(tolerance_mm(gauges[channel.split(".")[0]].noise_um) for channel in wires.length_channels),
-            *(quantity_limits(quantity).tolerance for quantity in quantities),
+            # what may change by anything is not worth keeping
+            *(
+                limits[name].tolerance if math.isfinite(limits[name].fastest_per_s) else math.inf
+                for name in wires.quantity_names
+            ),
         ],
-        [unit_of(quantity.name) for quantity in quantities],
+        [unit_of(name) for name in wires.quantity_names],
     )
 
 
@@ -38,7 +42,7 @@ def wired_trust(configuration: Configuration, wires: MachineWires, memory: Trust
     lengths: dict[str, Judge] = {
         wire.channel: ReadingTrust(memory, wire.channel, _settings(configuration, wire)) for wire in wires.length_wires
     }
-    limits = {quantity.name: quantity_limits(quantity) for quantity in configuration.wiring.quantities}
+    limits = _quantity_limits(configuration)
     return lengths | {
         channel: QuantityTrust(memory, channel, limits[name]) for name, (channel, _) in wires.quantity_channels.items()
     }
@@ -58,10 +62,12 @@ def wired_channels(configuration: Configuration, wires: MachineWires, model: Mac
         WiredLength(kind, wire.meaning, wire.sign, link, role, length_mm, _noise_mm(gauges[wire.channel.split(".")[0]]))
         for wire, (kind, link, role, length_mm) in zip(wires.length_wires, parts, strict=True)
     ]
-    return lengths + [
-        WiredLength("quantity", quantity.name, 1, 0, "", unknown, quantity.noise or unknown)
-        for quantity in wiring.quantities
-    ]
+    noise = {quantity.name: quantity.noise or unknown for quantity in wiring.quantities}
+    return lengths + [WiredLength("quantity", name, 1, 0, "", unknown, noise[name]) for name in wires.quantity_names]
+
+
+def _quantity_limits(configuration: Configuration) -> dict[str, QuantityLimits]:
+    return {quantity.name: quantity_limits(quantity) for quantity in configuration.wiring.quantities}
 
 
 def _noise_mm(options: GaugeOptions) -> float:

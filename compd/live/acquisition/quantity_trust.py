@@ -93,16 +93,20 @@ class QuantityTrust:
             memory.distrust(i, Doubt.VOTED, math.nan)
         if Doubt(int(memory.doubt[i])).until_accepted:
             return bad(reading.time_s, Quality.DISTRUSTED, memory.explanation(i))
+        share_s = self._share_s(reading.time_s)
         known = self._recall()
         candidates = (reading,) if first is None else (reading, first)
         faults = [self._fault(each.value, each.time_s) for each in candidates]
         for each, fault in zip(candidates, faults, strict=True):
             if fault is None:
                 if not any(faults):  # one of two answers that is plausible says nothing of the next poll
-                    self._implausible_s = max(0.0, self._implausible_s - self._share_s(reading.time_s))
+                    self._implausible_s = max(0.0, self._implausible_s - share_s)
                 return self._believed(each) if known else self._begin(each, candidates)
         assert faults[0] is not None
-        return self._refused(reading, faults[0])
+        self._implausible_s += share_s
+        if self._implausible_s < LASTING_S:
+            return bad(reading.time_s, Quality.MISMATCH, faults[0].text)
+        return self._distrusted(reading, faults[0])
 
     def _recall(self) -> bool:
         """Whether a reading is known that the next one follows; that of another process counts, too."""
@@ -126,7 +130,7 @@ class QuantityTrust:
         if len(answers) < 2:
             return bad(reading.time_s, Quality.MISMATCH, f"{reading.value:g} is not confirmed by a second answer")
         one, other = answers
-        if abs(one.value - other.value) > self._limits.tolerance:
+        if abs(one.value - other.value) > self._limits.tolerance + self._possible_change(one.time_s, other.time_s):
             return bad(reading.time_s, Quality.MISMATCH, f"two answers disagree: {other.value:g}, {one.value:g}")
         if math.isnan(self._begun_s):
             self._begun_s = reading.time_s
@@ -137,17 +141,11 @@ class QuantityTrust:
         return self._believed(reading)
 
     def _believed(self, reading: Reading) -> Reading:
-        change = self._possible_change(reading.time_s)
+        change = self._possible_change(reading.time_s, self._expected_s)
         self._expected = min(max(reading.value, self._expected - change), self._expected + change)
         self._expected_s = reading.time_s
         self._memory.believe(self._i, reading.value, reading.time_s)
         return reading
-
-    def _refused(self, reading: Reading, fault: _Fault) -> Reading:
-        self._implausible_s += self._share_s(reading.time_s)
-        if self._implausible_s < LASTING_S:
-            return bad(reading.time_s, Quality.MISMATCH, fault.text)
-        return self._distrusted(reading, fault)
 
     def _distrusted(self, reading: Reading, fault: _Fault) -> Reading:
         self._implausible_s = 0.0
@@ -167,19 +165,17 @@ class QuantityTrust:
             return _Fault(Doubt.IMPLAUSIBLE, value, text)
         if not math.isnan(self._expected):
             away = value - self._expected
-            if abs(away) > limits.tolerance + self._possible_change(time_s):
+            if abs(away) > limits.tolerance + self._possible_change(time_s, self._expected_s):
                 text = f"{value:g} {unit}, {away:+.3g} at once, fastest {limits.fastest_per_s:g} a second"
                 return _Fault(Doubt.JUMPED, away, text)
         if math.isfinite(limits.apart) and len(self._neighbours) >= _FEWEST_NEIGHBOURS:
             return self._apart(value, time_s)
         return None
 
-    def _possible_change(self, time_s: float) -> float:
-        """By how much it can have changed since the last believed reading."""
-        limits = self._limits
-        return (
-            math.inf if math.isinf(limits.fastest_per_s) else limits.fastest_per_s * max(0.0, time_s - self._expected_s)
-        )
+    def _possible_change(self, time_s: float, since_s: float) -> float:
+        """By how much it can have changed between two times, s."""
+        fastest = self._limits.fastest_per_s
+        return math.inf if math.isinf(fastest) else fastest * max(0.0, time_s - since_s)
 
     def _apart(self, value: float, time_s: float) -> _Fault | None:
         """Where more than half of the neighbours, and two at least, are far away.

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from compd.configuration.operation import QuantityWire, VoteSettings
-from compd.gauge import Quality
+from compd.gauge import Quality, good
+from compd.live.acquisition.quantity_trust import QuantityTrust
 from compd.live.acquisition.votes.machine_view import MachineView
 from compd.live.acquisition.votes.standing_temperature import StandingTemperature
 from compd.live.loop.states import State
-from compd.live.memory.trust_memory import Doubt
+from compd.live.memory.trust_memory import Doubt, TrustMemory
 from compd.live.quantity_limits import quantity_limits
+from compd.units import unit_of
 from tests.support.thermometers import warm_machine
 
 MACHINES = ("tripod-cmm.yaml", "hexapod.yaml")
@@ -204,3 +206,32 @@ def view(live) -> MachineView:
     nothing = np.full(n, math.nan)
     believed = (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(memory.value[:n])
     return MachineView(live.now_s, memory, tuple(live.wired), memory.value[:n].copy(), believed, nothing, {}, None)
+
+
+def test_a_force_may_change_by_anything_within_its_range():
+    judge, memory = judged("force_x_N")
+    values = [0.0, 40.0, -800.0, 3.0]
+    readings = [
+        judge.judge(good(value, 1000.0 + k), 0.0, good(value + 1.0, 1000.0 + k)) for k, value in enumerate(values)
+    ]
+    assert [reading.value for reading in readings] == values
+    assert math.isinf(memory.tolerance_mm[0]), "nothing to be kept on disk"
+    beyond = [judge.judge(good(3e4, 1010.0 + 0.1 * k), 0.0, good(3e4, 1010.0 + 0.1 * k)) for k in range(20)]
+    assert beyond[0].quality is Quality.MISMATCH
+    assert beyond[-1].quality is Quality.DISTRUSTED
+
+
+def test_a_thermometer_that_is_asked_once_a_minute_may_change_meanwhile():
+    judge, _ = judged("temperature_hall_degC")
+    assert judge.judge(good(20.0, 1000.0), 0.0).quality is Quality.MISMATCH, "not confirmed"
+    assert judge.judge(good(25.0, 1060.0), 0.0, good(20.0, 1000.0)).ok
+    assert judge.judge(good(31.0, 1120.0), 0.0).ok
+    assert not judge.judge(good(60.0, 1180.0), 0.0).ok
+
+
+def judged(name):
+    """The judge of one quantity by itself."""
+    limits = quantity_limits(QuantityWire(name=name, gauge="g.c"))
+    kept = limits.tolerance if math.isfinite(limits.fastest_per_s) else math.inf
+    memory = TrustMemory(["g.c"], [kept], [unit_of(name)])
+    return QuantityTrust(memory, "g.c", limits), memory
