@@ -333,7 +333,8 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "beyond its range, faster than heat changes anything, or far from most other thermometers "
         "(`plausible`, `fastest_per_s`, `apart` of the quantity); or the same digits while all others change",
         "standing_temperature_K",
-        "what is slower and nearer than that, or nearer when the daemon starts, several alike, one that falls off its part into air as warm",
+        "what is slower and nearer than that, or nearer when the daemon starts; several alike; one that falls off its "
+        "part into air as warm",
         _wrong_thermometer,
     ),
     BlindSpot(

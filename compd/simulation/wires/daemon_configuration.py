@@ -18,6 +18,8 @@ from compd.simulation.wires.tcp_port import ANY, LOOPBACK
 
 # What a pty does not have, and a simulated line does not do; nor does anybody log in to a simulated machine.
 NOT_SIMULATED = ("dtr", "rts", "rs485", "echo", "security", "tls", "user", "password_file", "client_id")
+# A plan may hold parts at any temperature, K from one another.
+_HELD_APART_K = 60.0
 Port = str | tuple[str, int]
 
 
@@ -70,7 +72,7 @@ def daemon_configuration(
     if fastest_K_per_s:
         for wire in data["wiring"].get("quantities") or ():
             if wire["name"].endswith("_degC"):
-                wire["fastest_per_s"] = fastest_K_per_s
+                wire |= {"fastest_per_s": fastest_K_per_s, "apart": _HELD_APART_K}
     data["state"] = {"directory": str(directory / STATE)}
     (directory / STATE).mkdir(exist_ok=True)
     _write(path, configuration.path, data)

@@ -61,7 +61,10 @@ def test_a_recorded_run_replays_bit_for_bit(tmp_path, name, on_stale, on_limit):
 @pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
 def test_a_csv_that_is_not_what_was_recorded_is_seen(tmp_path, name):
     """One bit of a digit, in any place, whether or not a column of the daemon's."""
-    record(Run(machine(name), seed=11), tmp_path / "run", 60)
+    run = Run(machine(name), seed=11)
+    with run.recorder(tmp_path / "run") as recorder:
+        for line, message, _ in run.quiet(40):
+            recorder.put(line, message)
     (table,) = tmp_path.glob("run-*.csv")
     assert list(differing_cells(RecordedCycles(tmp_path / "run"))) == []
     content = table.read_bytes()
@@ -77,7 +80,9 @@ def test_a_csv_that_is_not_what_was_recorded_is_seen(tmp_path, name):
 
 def test_replay_says_which_cell_of_the_csv_was_changed(tmp_path, capsys):
     run = Run(machine(), seed=11)
-    record(run, tmp_path / "run", 5)
+    with run.recorder(tmp_path / "run") as recorder:
+        for line, message, _ in run.quiet(5):
+            recorder.put(line, message)
     (table,) = tmp_path.glob("run-*.csv")
     lines = table.read_text().splitlines(keepends=True)
     cells = lines[3].split(",")
