@@ -15,7 +15,7 @@ from compd.configuration import load
 from compd.gauge import Reading, good
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.acquisition.votes.votes import LOOK_EVERY_S, Votes
-from compd.live.length_trust import length_memory, length_trust, wired_lengths
+from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.live.memory.latest import Latest
 from compd.live.pipeline import build_pipeline
 from tests.support.paths import CONFIG
@@ -39,10 +39,10 @@ class Machine:
         pipeline = build_pipeline(configuration, configuration.gauge_objects())
         self.now_s = 1000.0
         self.ticks = 0
-        self.memory = length_memory(configuration, pipeline.wires)
-        self.channels = self.memory.channels
+        self.memory = wired_memory(configuration, pipeline.wires)
+        self.channels = self.memory.channels[: self.memory.lengths]
         self.scales = self.channels[: configuration.geometry.links]
-        self.judges = length_trust(configuration, pipeline.wires, self.memory)
+        self.judges = wired_trust(configuration, pipeline.wires, self.memory)
         self.true_mm: dict[str, Truth] = {channel: lambda _: 0.0 for channel in self.channels}
         self.noise_um: dict[str, float] = dict.fromkeys(self.channels, NOISE_UM)
         self.digit_mm = STEP_MM
@@ -52,7 +52,7 @@ class Machine:
         self.votes = Votes(
             configuration.votes,
             self.memory,
-            wired_lengths(configuration, pipeline.wires, pipeline.settings.model),
+            wired_channels(configuration, pipeline.wires, pipeline.settings.model),
             {},
             Latest(["room.temperature"]),
             lambda: dict.fromkeys(self.channels, 0.0),

@@ -25,9 +25,9 @@ class MeasuredScatter:
         self._outside: set[int] = set()
 
     def look(self, view: MachineView) -> Iterator[Remark]:
-        for i, wired in enumerate(view.wired):
+        for i, wired in enumerate(view.wired[: view.memory.lengths]):
             scatter_um = float(view.memory.scatter_mm[i]) * UM_PER_MM
-            declared_um = wired.noise_um
+            declared_um = wired.noise * UM_PER_MM
             if not math.isfinite(scatter_um) or not math.isfinite(declared_um):
                 self._outside.discard(i)
                 continue

@@ -48,7 +48,7 @@ class SignalPeriods:
         self._accepted: list[int] = []
 
     def look(self, view: MachineView) -> Iterator[Contradiction | Remark]:
-        memory, n = view.memory, len(view.wired)
+        memory, n = view.memory, view.memory.lengths
         accepted, self._accepted = self._accepted, memory.accepted[:n].tolist()
         self._looks.append(_Look(view.now_s, view.value.copy(), _setpoint_mm(view)))
         while self._looks[0].now_s < view.now_s - LASTING_S - 2 * _WAIT_S:
@@ -72,7 +72,7 @@ class SignalPeriods:
 
     def _judge(self, view: MachineView, i: int, step: Step) -> None:
         """Count a step where the others have stood, as soon as that can be said."""
-        others = [j for j in range(len(view.wired)) if j != i and view.believed[j]]
+        others = [j for j in range(view.memory.lengths) if j != i and view.believed[j]]
         before = next((look for look in reversed(self._looks) if look.now_s <= step.time_s), None)
         read = bool((view.memory.time_s[others] > step.time_s).all())
         if not read and view.now_s < step.time_s + _WAIT_S:

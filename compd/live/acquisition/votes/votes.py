@@ -19,6 +19,7 @@ from compd.live.acquisition.votes.measured_scatter import MeasuredScatter
 from compd.live.acquisition.votes.repeated_digits import RepeatedDigits
 from compd.live.acquisition.votes.signal_periods import SignalPeriods
 from compd.live.acquisition.votes.standing_scale import StandingScale
+from compd.live.acquisition.votes.standing_temperature import StandingTemperature
 from compd.live.acquisition.votes.tip_speed import TipSpeed
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import Doubt, TrustMemory
@@ -121,6 +122,8 @@ def _votes(settings: VoteSettings, signal_period_mm: float) -> list[Vote]:
         votes.append(RepeatedDigits())
     if settings.standing_scale_mm is not None:
         votes.append(StandingScale(settings.standing_scale_mm))
+    if settings.standing_temperature_K is not None:
+        votes.append(StandingTemperature(settings.standing_temperature_K))
     if settings.following_mm is not None:
         votes.append(FollowingError(settings.following_mm))
     if settings.joint_pair_um is not None:
