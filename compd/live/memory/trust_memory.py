@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from enum import IntEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compd.live.memory.shared_array import shared_counters, shared_floats
 from compd.live.memory.shared_message import SharedMessage
@@ -30,11 +31,19 @@ class Doubt(IntEnum):
     """It jumped by `amount` mm, further than what is measured can move."""
     VOTED = 5
     """Other gauges contradict it; `TrustMemory.evidence` says how."""
+    AT_ZERO = 6
+    """A scale shows zero after its power may have been off: with any direction and unit it would."""
+    REPLUGGED = 7
+    """Its line is at another port than before, `TrustMemory.evidence`: it may be another gauge."""
 
     @property
     def until_accepted(self) -> bool:
         """Whether it lasts until a person accepts the gauge."""
         return self > Doubt.LOST
+
+
+# Readings of each channel that are kept for the others, and for a process that takes over: a second at 4 ms each.
+RECENT = 256
 
 
 class TrustMemory:
@@ -43,12 +52,14 @@ class TrustMemory:
 
     Attributes
     ----------
-    channels : "gauge.channel" of every length channel. index : of each in the arrays, all (n,).
+    channels : "gauge.channel" of every length channel, the scales first. index : of each in the arrays, all (n,).
+    scales : how many of them are scales.
     value, time_s : the last reading that was believed, mm, and its monotonic time, s; nan before the first.
     shown, shown_s : the last value that the gauge gave, believed or not, mm, and its time, s; nan before the first.
     tolerance_mm : by which a reading may differ from another one of the same value.
-    witness : (n, n), row i: the values of all channels when channel i was lost, mm.
+    witness : (n, n), row i: the values of all channels at the last reading of channel i that was believed, mm.
     lost_s : monotonic time at which the channel was lost, s.
+    power_lost : 1 where the gauge itself may have been without power since its last reading.
     doubt : a `Doubt`. amount : what it says of it.
     repeats : how many polls in a row have given the very same value. changes : how many polls have given another one.
     first_change_s, last_change_s : when the first and the last of these were, s.
@@ -59,8 +70,9 @@ class TrustMemory:
     evidence : of the votes, by channel.
     """
 
-    def __init__(self, channels: Sequence[str], tolerance_mm: Sequence[float]) -> None:
+    def __init__(self, channels: Sequence[str], tolerance_mm: Sequence[float], scales: int = 0) -> None:
         self.channels = tuple(channels)
+        self.scales = scales
         self.index: Mapping[str, int] = {name: i for i, name in enumerate(self.channels)}
         n = len(self.channels)
         self.tolerance_mm = np.array(tolerance_mm, dtype=float)
@@ -74,14 +86,19 @@ class TrustMemory:
         self.step_mm[:] = math.inf
         self.accepted, self.obeyed, self.voted, self.heard = (shared_counters(max(n, 1)) for _ in range(4))
         self.suspected = shared_counters(max(n, 1))
+        self.power_lost = shared_floats(max(n, 1))
         self.evidence = SharedMessage()
+        self._recent = shared_floats(max(n, 1) * RECENT * 2).reshape(max(n, 1), RECENT, 2)  # time, s, and value, mm
+        self._recent[:] = math.nan
+        self._believed = shared_counters(max(n, 1))
 
-    def lose(self, i: int, now_s: float) -> None:
-        """Note that channel `i` is away from now on (s), with what the others show."""
+    def lose(self, i: int, now_s: float, power: bool = False) -> None:
+        """Note that channel `i` is away from now on (s). power : its gauge may be without power."""
         if self.doubt[i] == Doubt.NONE:
-            self.witness[i] = self.value[: len(self.channels)]
             self.lost_s[i] = now_s
             self.doubt[i] = Doubt.LOST
+        if power:
+            self.power_lost[i] = 1.0
 
     def distrust(self, i: int, doubt: Doubt, amount: float) -> None:
         """Believe channel `i` no more until a person accepts it."""
@@ -90,8 +107,22 @@ class TrustMemory:
 
     def believe(self, i: int, value: float, time_s: float) -> None:
         """Note a reading of channel `i` (mm, s) that is believed."""
+        self._recent[i, self._believed[i] % RECENT] = time_s, value
+        self._believed[i] += 1
         self.value[i], self.time_s[i] = value, time_s
+        self.witness[i] = self.value[: len(self.channels)]
         self.doubt[i] = Doubt.NONE
+        self.power_lost[i] = 0.0
+
+    def begin(self, i: int) -> None:
+        """Forget the readings of channel `i`: it counts anew."""
+        self._recent[i] = math.nan
+
+    def recent(self, i: int) -> NDArray[np.float64]:
+        """(k, 2) monotonic time (s) and value (mm) of the last readings of channel `i` that were believed, in order."""
+        readings = self._recent[i].copy()
+        readings = readings[~np.isnan(readings[:, 0])]
+        return readings[np.argsort(readings[:, 0], kind="stable")]
 
     def accept(self, name: str) -> list[str]:
         """Believe what the channels of `name` show from now on, and return those that were not believed.
@@ -109,9 +140,13 @@ class TrustMemory:
 
     def vote(self, evidence: Mapping[str, str]) -> None:
         """Name channels that other gauges contradict, each with the evidence."""
-        self.evidence.write({**(self.evidence.read() or {}), **evidence})
+        self.tell(evidence)
         for channel in evidence:
             self.voted[self.index[channel]] += 1
+
+    def tell(self, evidence: Mapping[str, str]) -> None:
+        """Keep the evidence against channels, by channel."""
+        self.evidence.write({**(self.evidence.read() or {}), **evidence})
 
     def short_name(self, i: int) -> str:
         """What `compd accept` is given: the gauge alone where it has one length channel."""
@@ -133,4 +168,9 @@ class TrustMemory:
             case Doubt.VOTED:
                 evidence = (self.evidence.read() or {}).get(self.channels[i], "other gauges contradict it")
                 return f"{evidence}: look at it, {accept}"
+            case Doubt.AT_ZERO:
+                return f"shows zero, as before its power was off, with any direction and unit: look at these, {accept}"
+            case Doubt.REPLUGGED:
+                evidence = (self.evidence.read() or {}).get(self.channels[i], "its line has another port than before")
+                return f"{evidence}: look whether it is this gauge, {accept}"
         return ""
