@@ -20,7 +20,8 @@ def length_memory(configuration: Configuration, wires: MachineWires) -> TrustMem
     """The memory for the length channels that are wired."""
     gauges = configuration.gauges
     channels = wires.length_channels
-    return TrustMemory(channels, [tolerance_mm(gauges[channel.split(".")[0]].noise_um) for channel in channels])
+    tolerances_mm = [tolerance_mm(gauges[channel.split(".")[0]].noise_um) for channel in channels]
+    return TrustMemory(channels, tolerances_mm, scales=len(wires.scale.wires))
 
 
 def length_trust(configuration: Configuration, wires: MachineWires, memory: TrustMemory) -> dict[str, ReadingTrust]:

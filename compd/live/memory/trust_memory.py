@@ -31,9 +31,9 @@ class Doubt(IntEnum):
     """It jumped by `amount` mm, further than what is measured can move."""
     VOTED = 5
     """Other gauges contradict it; `TrustMemory.evidence` says how."""
-    AT_ZERO = 6
+    AT_ZERO = 8
     """A scale shows zero after its power may have been off: with any direction and unit it would."""
-    REPLUGGED = 7
+    REPLUGGED = 9
     """Its line is at another port than before, `TrustMemory.evidence`: it may be another gauge."""
 
     @property
@@ -74,6 +74,7 @@ class TrustMemory:
         self.channels = tuple(channels)
         self.scales = scales
         self.index: Mapping[str, int] = {name: i for i, name in enumerate(self.channels)}
+        self._gauges = [channel.partition(".")[0] for channel in self.channels]
         n = len(self.channels)
         self.tolerance_mm = np.array(tolerance_mm, dtype=float)
         self.value, self.time_s, self.shown, self.shown_s, self.lost_s = (shared_floats(max(n, 1)) for _ in range(5))
@@ -131,7 +132,7 @@ class TrustMemory:
         """
         channels = [c for c in self.channels if name in ("all", c, c.partition(".")[0])]
         if not channels:
-            gauges = dict.fromkeys(channel.partition(".")[0] for channel in self.channels)
+            gauges = dict.fromkeys(self._gauges)
             raise ValueError(f"no length gauge is called {name[:40]!r}, allowed: all, {', '.join(gauges)}")
         doubted = [c for c in channels if Doubt(int(self.doubt[self.index[c]])).until_accepted]
         for channel in channels:
@@ -146,13 +147,20 @@ class TrustMemory:
 
     def tell(self, evidence: Mapping[str, str]) -> None:
         """Keep the evidence against channels, by channel."""
-        self.evidence.write({**(self.evidence.read() or {}), **evidence})
+        if evidence:
+            self.evidence.write({**(self.evidence.read() or {}), **evidence})
+
+    def distrust_ports(self, changes: Mapping[str, str]) -> None:
+        """Believe no channel of these gauges until a person accepts it: each is at another port, as the text says."""
+        changed = {i: changes[gauge] for i, gauge in enumerate(self._gauges) if gauge in changes}
+        self.tell({self.channels[i]: text for i, text in changed.items()})
+        for i in changed:
+            self.distrust(i, Doubt.REPLUGGED, math.nan)
 
     def short_name(self, i: int) -> str:
         """What `compd accept` is given: the gauge alone where it has one length channel."""
-        gauge = self.channels[i].partition(".")[0]
-        alone = sum(channel.partition(".")[0] == gauge for channel in self.channels) == 1
-        return gauge if alone else self.channels[i]
+        gauge = self._gauges[i]
+        return gauge if self._gauges.count(gauge) == 1 else self.channels[i]
 
     def explanation(self, i: int) -> str:
         """Why channel `i` is not believed, and what to do; "" where it is."""

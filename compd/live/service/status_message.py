@@ -16,6 +16,7 @@ from compd.live.loop.skew import skew_of
 from compd.live.loop.timing import LoopTiming
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
+from compd.live.port_names import changed_ports
 from compd.live.processes.control import Control
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender
@@ -32,6 +33,7 @@ class StatusReport:
     latest, wires, commands, adopted, timing, control, publisher : the daemon's own.
     packets : the UDP sender, where one is configured.
     lines : makes the state of every line, by name.
+    ports : the lasting name of each gauge's port.
     """
 
     version: Mapping[str, Any]
@@ -45,6 +47,7 @@ class StatusReport:
     packets: UdpSender | None
     lines: Callable[[], Mapping[str, Any]]
     clock: Clock
+    ports: Mapping[str, str]
 
     def message(self) -> dict[str, Any]:
         """The message as plain data; what is unknown is left out."""
@@ -74,7 +77,8 @@ class StatusReport:
         zero = self.commands.zero
         if isinstance(zero, StateError):
             return {"taken": False, "reason": str(zero)}
-        return {"taken": True, "taken_at": zero.taken_at}
+        changed = changed_ports(zero.ports, self.ports)
+        return {"taken": True, "taken_at": zero.taken_at, **({"ports_changed": changed} if changed else {})}
 
     def _model(self) -> dict[str, Any]:
         """The applied model and, if there is one, the shadow; without their paths, which no remote client needs."""

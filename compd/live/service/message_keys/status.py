@@ -17,6 +17,9 @@ class ZeroStatusKeys(Keys):
     taken: bool = Field(description="whether there is one that fits this configuration")
     taken_at: str | None = Field(default=None, description="when, UTC, ISO 8601")
     reason: str | None = Field(default=None, description="why there is none")
+    ports_changed: dict[str, str] | None = Field(
+        default=None, description="gauges whose port is another one than when it was taken, each with both"
+    )
 
 
 class LoopStatusKeys(Keys):
