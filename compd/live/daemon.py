@@ -49,6 +49,7 @@ from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.machine_message import machine_message
 from compd.live.service.messages import PROTOCOL
+from compd.live.service.model_keeping import ModelKeeping
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
 from compd.live.service.readings_message import ReadingsMessage
@@ -159,7 +160,8 @@ class Daemon:
             self._changed_ports = changed_ports(before.ports, self.ports)
         else:
             last_readings.recall()
-        model_switch = ModelSwitch(self.control, self.setpoints.wake_reader, clock)
+        keeping = ModelKeeping(configuration.path, configuration.state.model_file).keys
+        model_switch = ModelSwitch(self.control, self.setpoints.wake_reader, clock, keeping)
         version: dict[str, Any] = {
             "class": "VERSION",
             "protocol": PROTOCOL,
@@ -197,7 +199,7 @@ class Daemon:
                 zero_capture.start,
                 ReadingsMessage(self._wires, self.latest.channels),
                 model_switch.start,
-                lambda: adopted.summary,
+                lambda: {**adopted.summary, **keeping(adopted.summary)},
                 Acceptance(self.trust, clock).start,
                 sockets.target,
                 access,

@@ -29,7 +29,7 @@ from compd.live.acquisition.possible_motion import (
     mean_speed,
     rest_to_rest_mm,
 )
-from compd.live.acquisition.way_evidence import SIDE_S, way_by_itself, way_by_links
+from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
 from compd.live.acquisition.witnesses import all_back, moved_while_away, stood_still
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
@@ -98,7 +98,9 @@ class ReadingTrust:
         doubt = Doubt(int(memory.doubt[i]))
         if doubt.until_accepted:
             return False
-        return doubt is Doubt.LOST or not self._recall() or not self._is_expected(sample) or self._needs_evidence(sample)
+        return (
+            doubt is Doubt.LOST or not self._recall() or not self._is_expected(sample) or self._needs_evidence(sample)
+        )
 
     def fail(self, quality: Quality, now_s: float) -> None:
         """Note a poll without a value, at `now_s` (s)."""

@@ -44,7 +44,7 @@ class ExpectedWay(NamedTuple):
 def way_by_links(
     memory: TrustMemory, i: int, before: Sequence[GaugeSample], after: Sequence[GaugeSample]
 ) -> ExpectedWay | None:
-    """The way of scale `i` from the last sample before a gap to the first one after it, by the motion of the other links.
+    """The way of scale `i` from the last sample before a gap to the first after it, by the motion of the other links.
 
     None where they do not say: they have not been read for long enough since, or have not moved before nor after.
     """

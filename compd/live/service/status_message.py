@@ -12,6 +12,7 @@ from compd.errors import StateError
 from compd.gauge import Quality
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
+from compd.live.loop.reasons import waiting_text
 from compd.live.loop.skew import skew_of
 from compd.live.loop.timing import LoopTiming
 from compd.live.loop.wiring import MachineWires
@@ -52,7 +53,8 @@ class StatusReport:
     def message(self) -> dict[str, Any]:
         """The message as plain data; what is unknown is left out."""
         now_s = self.clock.monotonic()
-        published = self.publisher.summary()
+        published, gauges = self.publisher.summary(), self._gauges(now_s)
+        not_believed = [gauge["channel"] for gauge in gauges if gauge["quality"] is Quality.DISTRUSTED]
         if self.packets is not None:
             published |= self.packets.summary()
         message = {
@@ -68,7 +70,8 @@ class StatusReport:
             "publisher": published,
             "skew_s": self._skew_s(now_s),
             "lines": self.lines(),
-            "gauges": self._gauges(now_s),
+            "gauges": gauges,
+            "waits_for_person": waiting_text(not_believed) or None,
         }
         known: dict[str, Any] = omit_unknown(message)
         return known

@@ -134,3 +134,6 @@ class StatusKeys(VersionKeys):
     )
     lines: dict[str, LineStatusKeys] = Field(description="every line, by name")
     gauges: list[ChannelStatusKeys] = Field(description="every channel of every gauge")
+    waits_for_person: str | None = Field(
+        default=None, description="for people: the gauges that are not believed, and what to do; absent where all are"
+    )
