@@ -319,8 +319,8 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
     BlindSpot(
         "exchanged_gauges",
         "the cables of two gauges are exchanged, or their ports in the configuration",
-        "while they are plugged: each came back with another value, or jumped; in the configuration: the lasting names of "
-        "their ports are kept with their last readings and with machine zero",
+        "while they are plugged: each came back with another value, or jumped; in the configuration: the lasting names "
+        "of their ports are kept with their last readings and with machine zero",
         "",
         "where both show the same at that moment; and where they were exchanged when machine zero was taken",
         _exchanged,

@@ -43,6 +43,7 @@ class _LastReading(BaseModel):
     amount: float | None = None
     evidence: str = ""
     port: str = ""
+    power_lost: bool = False
 
 
 class _LastReadingsFile(BaseModel):
@@ -101,7 +102,7 @@ class LastReadings:
             if last.doubt > Doubt.LOST:
                 memory.distrust(i, Doubt(min(last.doubt, max(Doubt))), math.nan if last.amount is None else last.amount)
             else:
-                memory.lose(i, now_s, power=file.boot_id != boot_id())
+                memory.lose(i, now_s, power=last.power_lost or file.boot_id != boot_id())
         memory.tell({memory.channels[i]: last.evidence for i, last in known.items() if last.evidence})
         before = {memory.channels[i].partition(".")[0]: last.port for i, last in known.items() if last.port}
         memory.distrust_ports(changed_ports(before, self._ports))
@@ -159,6 +160,8 @@ class LastReadings:
         entry: dict[str, Any] = {"value_mm": value_mm}
         if port := self._ports.get(self._memory.channels[i].partition(".")[0]):
             entry["port"] = port
+        if self._memory.power_lost[i]:
+            entry["power_lost"] = True
         if doubt > Doubt.LOST:
             amount = float(self._memory.amount[i])
             entry |= {"doubt": doubt, **({"amount": amount} if math.isfinite(amount) else {})}

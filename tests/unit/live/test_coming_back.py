@@ -182,6 +182,7 @@ def test_scales_at_zero_are_asked_for_after_the_computer_was_off_and_not_after_a
     shop.restart(1.0)
     shop.poll()
     assert not shop.not_believed
+    shop._last._write_if_changed()
     monkeypatch.setattr(last_readings, "boot_id", lambda: "another one")
     shop.restart(1.0)
     shop.poll()

@@ -69,7 +69,12 @@ def test_every_gauge_must_show_what_it_showed_however_long_the_daemon_was_away(t
 def test_where_the_computer_was_started_anew_the_gauges_may_have_been_without_power(tmp_path, monkeypatch):
     written(tmp_path)
     monkeypatch.setattr(last_readings, "boot_id", lambda: "another one")
-    assert recalled(tmp_path).power_lost[:2].all()
+    found = recalled(tmp_path)
+    assert found.power_lost[:2].all()
+    last = LastReadings(tmp_path, HASH, found, Clock(), PORTS)
+    last.start()
+    last.stop()
+    assert recalled(tmp_path).power_lost[:2].all(), "nor is it forgotten before they have answered"
 
 
 def test_a_gauge_at_another_port_is_not_believed_and_stays_so(tmp_path):
