@@ -108,7 +108,9 @@ class TrustMemory:
 
     def believe(self, i: int, value: float, time_s: float) -> None:
         """Note a reading of channel `i` (mm, s) that is believed."""
-        self._recent[i, self._believed[i] % RECENT] = time_s, value
+        newest = self._recent[i, self._believed[i] % RECENT]
+        newest[1] = value
+        newest[0] = time_s  # after the value: whoever reads in between takes it for the oldest
         self._believed[i] += 1
         self.value[i], self.time_s[i] = value, time_s
         self.witness[i] = self.value[: len(self.channels)]
@@ -179,6 +181,6 @@ class TrustMemory:
             case Doubt.AT_ZERO:
                 return f"shows zero, as before its power was off, with any direction and unit: look at these, {accept}"
             case Doubt.REPLUGGED:
-                evidence = (self.evidence.read() or {}).get(self.channels[i], "its line has another port than before")
-                return f"{evidence}: look whether it is this gauge, {accept}"
+                evidence = (self.evidence.read() or {}).get(self.channels[i], "its port is not that of before")
+                return f"look whether it is this gauge, {accept}: {evidence}"  # what is too long is cut off
         return ""

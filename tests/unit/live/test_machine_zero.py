@@ -216,6 +216,21 @@ def test_a_file_of_an_earlier_release_has_no_checksum_and_is_used(tmp_path):
     assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
 
 
+def test_the_file_keeps_the_ports_and_a_recording_does_not(tmp_path):
+    zero = replace(ZERO, ports={"a": "/dev/serial/by-id/usb-one", "b": "192.168.10.20:502:1"})
+    path = zero.save(tmp_path)
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == zero
+    assert "ports" not in zero.to_json()
+    path.write_text(path.read_text().replace("usb-one", "usb-two"))
+    with pytest.raises(StateError, match="changed after it was written"):
+        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+
+
+def test_a_file_without_ports_is_used(tmp_path):
+    (tmp_path / FILE_NAME).write_text(json.dumps({"format": 2, **ZERO.to_json(), "checksum": ZERO.checksum}))
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
+
+
 @pytest.mark.parametrize(
     ("make", "says"),
     [
