@@ -362,7 +362,7 @@ class Client:
         -------
         dict
             MODEL with `applied` and, if there is one, `shadow`: `effects`, `not_live`, `model` (the file's hash) and
-            `file`.
+            `file`; `kept`, whether the daemon starts with the applied model again, and `kept_text`, what keeps it.
 
         Raises
         ------

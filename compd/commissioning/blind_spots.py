@@ -24,6 +24,8 @@ from compd.configuration.operation import FRAME_DISTANCES
 from compd.errors import KinematicsError
 from compd.live.acquisition.votes.measured_scatter import RATIO
 from compd.live.quantity_limits import UNIT_LIMITS
+from compd.live.acquisition.reading_trust import LEAST_MOTION, tolerance_mm
+from compd.live.acquisition.way_evidence import LEAST_WAY_MM, WAY_SHARE
 from compd.machine_builder import build_model
 from compd.model.machine import MachineModel
 from compd.model.tool import ToolOnPlate
@@ -34,6 +36,9 @@ DRIFT_UM = 10.0
 STEEL_PPM_PER_K = 11.5
 # Where no gauge says how fast the machine moves: a measuring machine between two points.
 _USUAL_SPEED_MM_PER_S = 50.0
+# Of a link at that speed, in a gap of 0.2 s.
+GAP_WAY_MM = 10.0
+_MM_PER_INCH = 25.4
 
 
 class DriftCost(NamedTuple):
@@ -282,6 +287,38 @@ def _nothing(_figures: Figures) -> str:
     return ""
 
 
+def _gap(figures: Figures) -> str:
+    jumps = [j for j in figures.jumps if any(length.startswith("scale") for length in j.measures)]
+    counting = [j.gauge for j in jumps if not _is_absolute(figures.configuration, j.gauge)]
+    if not counting:
+        return ""
+    error_mm = WAY_SHARE * GAP_WAY_MM + LEAST_WAY_MM
+    return (
+        f"in a gap in which the links move by {GAP_WAY_MM:g} mm, {error_mm:.2g} mm of a scale: "
+        f"{error_mm * figures.leverage('scale'):.2f} mm at the tip; at rest {_at_rest(figures)}"
+    )
+
+
+def _at_rest(figures: Figures) -> str:
+    """What a gauge may lose in a gap at rest, by the kind of the gauge."""
+    gauges = figures.configuration.gauges
+    parts = []
+    for kind in ("scale", "joint", "frame"):
+        names = {j.gauge.partition(".")[0] for j in figures.jumps if any(x.startswith(kind) for x in j.measures)}
+        if names:
+            lost_um = LEAST_MOTION * max(tolerance_mm(gauges[name].noise_um) for name in names) * UM_PER_MM
+            parts.append(f"{kind} {lost_um:.3g} um, {lost_um * figures.leverage(kind):.3g} um at the tip")
+    return "; ".join(parts)
+
+
+def _lost_parameters(figures: Figures) -> str:
+    factor = figures.leverage("scale")
+    return (
+        f"for each mm of a link's way from there {2 * factor:.1f} mm at the tip with the other direction, "
+        f"{(1 - 1 / _MM_PER_INCH) * factor:.1f} mm in inches"
+    )
+
+
 BLIND_SPOTS: tuple[BlindSpot, ...] = (
     BlindSpot(
         "drift_of_a_scale",
@@ -325,8 +362,9 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
     ),
     BlindSpot(
         "exchanged_gauges",
-        "the cables of two gauges are exchanged",
-        "while they are plugged: each came back with another value, or jumped",
+        "the cables of two gauges are exchanged, or their ports in the configuration",
+        "while they are plugged: each came back with another value, or jumped; in the configuration: the lasting names "
+        "of their ports are kept with their last readings and with machine zero",
         "",
         "where both show the same at that moment; and where they were exchanged when machine zero was taken",
         _exchanged,
@@ -389,6 +427,26 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "",
         "displays that come back with the same number although the machine was moved; a state directory that was lost",
         _power_cut,
+    ),
+    BlindSpot(
+        "display_parameters_at_zero",
+        "a scale's display loses its direction or its unit while it shows zero",
+        "at any other place: it comes back with another value. At zero a person is asked for, after the computer or "
+        "the scale was off",
+        "",
+        "a person who accepts without a look; a gauge with `absolute` or `trust_after_loss`; comparators, which move "
+        "by hundredths of a mm",
+        _lost_parameters,
+    ),
+    BlindSpot(
+        "count_lost_in_a_gap",
+        "a gauge loses its count while its replies are lost, or nobody reads it",
+        "at rest: it shows another value, and no other gauge has moved. On the move: the ways of the other links, or "
+        "its own speed, say where it must be; where they do not, or the gap was longer than `stale_after_s`, a person "
+        "is asked for",
+        "",
+        "what the ways of the links leave open; a comparator on the move, within its limits of motion",
+        _gap,
     ),
     BlindSpot(
         "wrong_from_the_start",

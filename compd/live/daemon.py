@@ -37,6 +37,7 @@ from compd.live.memory.poll_requests import PollRequests
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.memory.trust_memory import TrustMemory
 from compd.live.pipeline import build_pipeline
+from compd.live.port_names import changed_ports, port_names
 from compd.live.processes.acquisition_process import AcquisitionProcess
 from compd.live.processes.control import Control
 from compd.live.processes.loop_process import LoopProcess
@@ -48,6 +49,7 @@ from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.machine_message import machine_message
 from compd.live.service.messages import PROTOCOL
+from compd.live.service.model_keeping import ModelKeeping
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
 from compd.live.service.readings_message import ReadingsMessage
@@ -104,6 +106,7 @@ class Daemon:
                 packets.close()
             raise
         # what follows opens descriptors, and cannot fail
+        self.ports = port_names(configuration)
         self.commands = Commands(self._zero_on_disk())
         channels = len(self.latest.channels)
         self.setpoints, cycles, self.control = SharedRing(channels), SharedRing(channels), Control()
@@ -148,11 +151,18 @@ class Daemon:
             configuration.zero_hash,
             clock,
             self.trust.accept,
+            self.ports,
         )
-        last_readings = LastReadings(Path(configuration.state.directory), configuration.zero_hash, self.trust, clock)
-        if before is None or before.trust is not self.trust:
+        last_readings = LastReadings(
+            Path(configuration.state.directory), configuration.zero_hash, self.trust, clock, self.ports
+        )
+        self._changed_ports: Mapping[str, str] = {}
+        if before is not None and before.trust is self.trust:
+            self._changed_ports = changed_ports(before.ports, self.ports)
+        else:
             last_readings.recall()
-        model_switch = ModelSwitch(self.control, self.setpoints.wake_reader, clock)
+        keeping = ModelKeeping(configuration.path, configuration.state.model_file).keys
+        model_switch = ModelSwitch(self.control, self.setpoints.wake_reader, clock, keeping)
         version: dict[str, Any] = {
             "class": "VERSION",
             "protocol": PROTOCOL,
@@ -174,6 +184,7 @@ class Daemon:
             self._lines_status,
             self.trust,
             clock,
+            self.ports,
         )
         keys = TargetKeys(
             tip="tip_B0_mm" if configuration.geometry.tool.on == "platform" else "tip_P_mm",
@@ -190,7 +201,7 @@ class Daemon:
                 zero_capture.start,
                 ReadingsMessage(self._wires, self.latest.channels),
                 model_switch.start,
-                lambda: adopted.summary,
+                lambda: {**adopted.summary, **keeping(adopted.summary)},
                 Acceptance(self.trust, clock).start,
                 sockets.target,
                 access,
@@ -212,6 +223,19 @@ class Daemon:
             logs,
             configuration.loop.priority // 2,
         )
+
+    def take_over(self) -> None:
+        """Begin in the place of the daemon before, whose processes have ended: gauges at other ports are not believed.
+
+        Machine zero was taken at ports, too; where these have changed, the log says so.
+        """
+        for gauge, change in self._changed_ports.items():
+            _log.warning("gauge is at another port", gauge=gauge, change=change)
+        self.trust.distrust_ports(self._changed_ports)
+        zero = self.commands.zero
+        if isinstance(zero, MachineZero):
+            for gauge, change in changed_ports(zero.ports, self.ports).items():
+                _log.warning("machine zero was taken at another port", gauge=gauge, change=change)
 
     def log_pipe(self, process: str) -> int:
         """The descriptor to which the process of this name prints."""

@@ -29,6 +29,7 @@ def run(configuration: Configuration) -> bool:
     daemon = Daemon(configuration)
     while True:
         _report(daemon)
+        daemon.take_over()
         successor = _Successor(daemon)
         ending = Supervisor(daemon, notifier, clock).run(successor.check, successor.make)
         if ending is not Ending.RELOADED or successor.daemon is None:

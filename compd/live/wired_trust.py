@@ -34,6 +34,7 @@ def wired_memory(configuration: Configuration, wires: MachineWires) -> TrustMemo
             ),
         ],
         [unit_of(name) for name in wires.quantity_names],
+        len(wires.scale.wires),
     )
 
 

@@ -141,8 +141,8 @@ class Orders:
         if not chosen:
             return Consequence(False, "Every gauge is believed." if not waiting else "This gauge is believed.", command)
         lines = [f"{gauge.get('measures', gauge['channel'])}: {gauge.get('detail', '')}" for gauge in chosen]
-        text = "What it shows from now on is taken as it is. Look at the gauge, and reference it, first. "
-        return Consequence(True, text + "; ".join(lines), command)
+        text = f"{status['waits_for_person']}. What it shows from now on is taken as it is: reference it first. "
+        return Consequence(True, text[0].upper() + text[1:] + "; ".join(lines), command)
 
     def _shadow(self, subject: str) -> Consequence:
         if not subject:

@@ -170,7 +170,8 @@ def test_hold_ends_and_the_numbers_go(chain: Chain) -> None:
 def test_a_lost_scale_leaves_a_cmm_without_a_tip_and_other_lines_go_on(chain: Chain) -> None:
     with connect(chain.directory / "compd.sock", PATIENCE_S) as observer:
         before = observer.status()
-        chain.until("ok before", lambda s: s["state"] == "ok")
+        chain.machine.ask("DRIVE", scale_mm=[3.0, 4.0, 5.0])  # at zero a person would be asked for
+        chain.until("at rest", lambda s: s["state"] == "ok" and not chain.machine.ask("TRUTH")["moving"])
         chain.machine.ask("FAULT", line="scale_2", fault="unplugged")
         try:
             lost = chain.until("invalid", lambda s: not s["valid"])

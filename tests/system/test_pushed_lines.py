@@ -71,13 +71,19 @@ def machine_and_daemon(directory: Path, machine: Path, *options: str) -> Iterato
 
 
 def check_outage(daemon: Daemon, watcher: Watcher, begin: Any, end: Any) -> None:
-    """Ok, then no value for the scales, then ok again; and no setpoint in between that is of another place."""
+    """Ok, then no value for the scales, then ok again where a person has looked: they show zero, as before.
+
+    There is no setpoint in between that is of another place.
+    """
     before = watcher.until("ok", lambda seen: seen["state"] == "ok", watcher.now)
     since = watcher.now
     begin()
     until("the line is lost", lambda: daemon.quality("scale_1.position") == "line_lost")
     watcher.until("not ok", lambda seen: seen["state"] != "ok", since)
     end()
+    until("a person is asked", lambda: daemon.quality("scale_1.position") == "distrusted")
+    with daemon.connected() as client:
+        client.accept("all")
     until("the scale is good", lambda: daemon.quality("scale_1.position") == "ok")
     watcher.until("ok", lambda seen: seen["state"] == "ok", watcher.now)
     valid = [seen for seen in watcher.seen[since:] if seen["valid"]]

@@ -51,5 +51,7 @@ def not_believed(status: dict[str, Any], setpoint: dict[str, Any]) -> list[str]:
         lines.append(f"fault: {setpoint['reason']}")
     if not lines:
         return ["every gauge is believed"]
+    if distrusted:
+        lines = [status["waits_for_person"], *lines]
     names = list(dict.fromkeys(gauge["channel"].partition(".")[0] for gauge in distrusted))
     return [*lines, "", "When you have looked at it:", *(f"    compd accept {name}" for name in [*names, "all"])]

@@ -23,11 +23,7 @@ NoneOption = Annotated[bool, typer.Option("--none", help="No model file: the mac
 
 def adopt(file: FileArgument = None, daemon: DaemonOption = DEFAULT_SOCKET, none: NoneOption = False) -> None:
     """Let the running daemon use a model file: between two ticks, the correction slewing to the new one."""
-    answer = ask_daemon(file, daemon, none, shadow=False)
-    if file is not None:
-        typer.echo(
-            f"until the daemon starts anew; to keep it, write `model_file: {answer['applied']['file']}` under `state:`"
-        )
+    typer.echo(ask_daemon(file, daemon, none, shadow=False)["kept_text"])
 
 
 def ask_daemon(file: Path | None, daemon: str, none: bool, shadow: bool) -> dict[str, Any]:

@@ -89,7 +89,7 @@ def scan(
 ) -> None:
     """Find serial ports; with --probe, look which presets fit what answers."""
     from compd.commissioning.probe import announcements, preset_candidates
-    from compd.commissioning.scan import serial_ports
+    from compd.lines.computer_ports import serial_ports
 
     ports = serial_ports()
     if not ports:

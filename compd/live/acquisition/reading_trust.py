@@ -4,9 +4,10 @@ A reading that is not where the last ones lead is asked for once more. If the se
 first one was damaged. If it agrees with the first, the measured part has moved, where its acceleration and speed allow
 that; else the gauge has jumped, and is not believed before a person accepts it.
 
-A gauge that was away (its line was lost, or it did not answer until its last reading was stale) may count anew. It is
-believed where it shows what it showed before and no other gauge has moved meanwhile; else a person accepts it. One that
-is absolute, or goes on counting while its cable is out, is believed at once.
+A gauge that was away (its line was lost, or nobody had a reading of it until its last one was stale) may count anew. It
+is believed where it shows what it showed before and no other gauge has moved meanwhile; else a person accepts it. After
+a shorter gap it may have moved, where other gauges have, too; a scale as far as the other links or its own speed say.
+One that is absolute, or goes on counting while its cable is out, is believed at once.
 """
 
 from __future__ import annotations
@@ -14,15 +15,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from itertools import pairwise
 
 from compd.gauge import Quality, Reading, bad
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import (
     BASE_S,
     SAME_VALUE_SIGMAS,
+    WINDOW_S,
     GaugeSample,
     Interval,
     MotionLimits,
@@ -32,17 +32,23 @@ from compd.live.acquisition.possible_motion import (
 )
 from compd.live.acquisition.scatter import Scatter
 from compd.live.acquisition.steps import Steps
-from compd.live.acquisition.witnesses import moved_while_away, stood_still
+from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
+from compd.live.acquisition.witnesses import all_back, moved_while_away, stood_still
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
 # Last digit of a display that stands still, mm, where no noise is declared.
 UNREST_MM = 0.001
-# A gauge that was not asked for longer, s, may have been switched off: it was away.
-LONGEST_OWN_GAP_S = 10.0
-# After a silence, s, until the others have been read that have begun to move at the same time.
+# After a gap, s, until the others have been read that have begun to move at the same time.
 _WAIT_FOR_MOTION_S = 0.3
-# In tolerances: less than that, a gauge may move in a short silence while no other shows it.
-_LEAST_MOTION = 10.0
+# Or for so many gaps as long as its own polls may have, where that is longer.
+_WAIT_FOR_POLLS = 2.0
+# In tolerances: less than that, a gauge may move in a short gap while no other shows it.
+LEAST_MOTION = 10.0
+# In a gap that is no longer, s, a scale with 300 mm/s2 goes from rest to rest by less than 1 mm; no display restarts.
+SHORTEST_GAP_S = 0.1
+# A gap is also so many times as long as usual from one reading to the next.
+_GAP = 2.0
+_USUAL_OF = 8
 # An interpolator that loses counts loses whole signal periods, or quarters of them: the least that counts as a step.
 LEAST_PERIODS = 0.25
 # Samples of motion that are kept.
@@ -85,8 +91,8 @@ class ReadingTrust:
         self._history: deque[GaugeSample] = deque(maxlen=_HISTORY)
         self._candidate: GaugeSample | None = None  # the last answer, where nothing is believed yet
         self._back_s = math.nan  # since when a gauge that was away answers again
-        self._before_silence: NDArray[np.float64] | None = None  # what all showed when it first did not answer
-        self._heard_s = math.nan  # since when it answers again after that
+        self._missed = False  # whether a poll has failed since its last reading
+        self._after: list[GaugeSample] = []  # what it shows since a gap, and waits for evidence
         self._scatter = Scatter(self._tolerance_mm)
         period_mm = settings.signal_period_mm
         least_mm = LEAST_PERIODS * period_mm - self._tolerance_mm
@@ -98,16 +104,19 @@ class ReadingTrust:
         if memory.accepted[i] != memory.obeyed[i]:
             return True
         doubt = Doubt(int(memory.doubt[i]))
-        return not doubt.until_accepted and (doubt is Doubt.LOST or not self._recall() or not self._is_expected(sample))
+        if doubt.until_accepted:
+            return False
+        return (
+            doubt is Doubt.LOST or not self._recall() or not self._is_expected(sample) or self._needs_evidence(sample)
+        )
 
     def fail(self, quality: Quality, now_s: float) -> None:
         """Note a poll without a value, at `now_s` (s)."""
         memory, i = self._memory, self._i
         if quality is Quality.LINE_LOST or now_s - memory.time_s[i] > self._settings.stale_after_s:
-            memory.lose(i, now_s)
-        elif self._before_silence is None:
-            self._before_silence = memory.value[: memory.lengths].copy()
-        self._heard_s = math.nan
+            memory.lose(i, now_s, power=True)
+        self._missed = True
+        self._after.clear()
 
     def judge(self, reading: Reading, window_s: float, first: Reading | None = None) -> Reading:
         """The reading as it may be published: itself, the first answer, or one without a value.
@@ -131,8 +140,9 @@ class ReadingTrust:
         if memory.voted[i] != memory.heard[i]:
             memory.heard[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
-        if memory.doubt[i] == Doubt.NONE and sample.time_s - memory.time_s[i] > LONGEST_OWN_GAP_S:
-            memory.lose(i, float(memory.time_s[i]))
+        back_s = self._after[0].time_s if self._after else sample.time_s
+        if memory.doubt[i] == Doubt.NONE and back_s - memory.time_s[i] > self._settings.stale_after_s:
+            memory.lose(i, sample.time_s)
         doubt = Doubt(int(memory.doubt[i]))
         if doubt.until_accepted:
             return self._refused(reading)
@@ -143,10 +153,10 @@ class ReadingTrust:
         return self._continued(reading, sample, first)
 
     def _recall(self) -> bool:
-        """Whether there is a reading that the next one follows; that of another process counts, too."""
-        memory, i = self._memory, self._i
-        if not self._history and not math.isnan(memory.value[i]):
-            self._history.append(GaugeSample(float(memory.value[i]), float(memory.time_s[i]), 0.0))
+        """Whether there is a reading that the next one follows; those of another process count, too."""
+        if not self._history:
+            recent = self._memory.recent(self._i)
+            self._history.extend(GaugeSample(float(value), float(time_s), WINDOW_S) for time_s, value in recent)
         return bool(self._history)
 
     def _begin(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
@@ -163,10 +173,12 @@ class ReadingTrust:
                 reading.time_s, Quality.MISMATCH, f"two answers disagree: {first.value:.4f}, {sample.value:.4f} mm"
             )
         self._history.clear()
+        self._memory.begin(self._i)
         return self._believed(reading, sample)
 
     def _believed(self, reading: Reading, sample: GaugeSample) -> Reading:
-        self._before_silence = None
+        self._missed = False
+        self._after.clear()
         self._remember(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
         if self._memory.suspected[self._i]:
@@ -191,7 +203,7 @@ class ReadingTrust:
     def _returned(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
         """The first readings of a gauge that was away."""
         memory, i = self._memory, self._i
-        if not self._back_s > memory.lost_s[i]:
+        if not self._back_s >= memory.lost_s[i]:
             self._back_s = sample.time_s
         if self._settings.returns_by_itself or math.isnan(memory.value[i]):
             return self._begin(reading, sample, first)
@@ -211,6 +223,9 @@ class ReadingTrust:
         if moved is not None:
             memory.distrust(i, Doubt.MOVED_MEANWHILE, moved)
             return self._refused(reading)
+        if memory.power_lost[i] and i < memory.scales and abs(sample.value) <= self._tolerance_mm:
+            memory.distrust(i, Doubt.AT_ZERO, 0.0)
+            return self._refused(reading)
         return self._begin(reading, sample, first)
 
     def _continued(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
@@ -220,14 +235,13 @@ class ReadingTrust:
         damaged, and nothing of motion.
         """
         earlier = None if first is None else GaugeSample(first.value, first.time_s, sample.window_s)
-        if self._is_expected(sample):
+        needs_evidence = self._needs_evidence(sample)
+        if self._is_expected(sample) and not needs_evidence:
             return self._believed(reading, sample)
         if first is None or earlier is None:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
-        if self._is_expected(earlier):
+        if self._is_expected(earlier) and not self._needs_evidence(earlier):
             return self._believed(first, earlier)
-        if self._before_silence is not None and self._has_moved_alone(sample, self._before_silence):
-            return self._moved_alone(reading, sample)
         last = self._history[-1]
         stays = abs(sample.value - earlier.value) <= self._tolerance_mm + _AGREEMENT * abs(earlier.value - last.value)
         limits = self._settings.limits
@@ -239,6 +253,8 @@ class ReadingTrust:
         else:
             possible = is_possible(before, base_s, last, earlier, sample, self._tolerance_mm, limits)
         if possible and (stays or math.isfinite(limits.acceleration) or self._goes_on(last, earlier, sample)):
+            if needs_evidence:
+                return self._compared(reading, earlier, sample)
             if not latched:
                 self._remember(earlier)
             return self._believed(reading, sample)
@@ -255,23 +271,54 @@ class ReadingTrust:
         keys = ", ".join(f"`{key}: {limit:g}`" for key, limit in set_to.items() if math.isfinite(limit))
         return f"; its motion is limited by {keys}" if keys else ""
 
-    def _has_moved_alone(self, sample: GaugeSample, before: NDArray[np.float64]) -> bool:
-        """Whether a gauge that may count anew shows another value after a silence, and no other gauge does."""
-        away_mm = abs(sample.value - self._history[-1].value)
-        return (
-            not self._settings.returns_by_itself
-            and away_mm > _LEAST_MOTION * self._tolerance_mm
-            and stood_still(self._memory, self._i, before)
-        )
+    def _needs_evidence(self, sample: GaugeSample) -> bool:
+        """Whether a gauge that may count anew shows another value after a gap, or after a poll that has failed."""
+        last = self._history[-1]
+        if self._settings.returns_by_itself or abs(sample.value - last.value) <= LEAST_MOTION * self._tolerance_mm:
+            return False
+        return self._missed or bool(self._after) or sample.time_s - last.time_s > max(SHORTEST_GAP_S, self._gap_s())
 
-    def _moved_alone(self, reading: Reading, sample: GaugeSample) -> Reading:
-        """No value yet where the others may still show the same motion; after that the gauge counts anew."""
-        if math.isnan(self._heard_s):
-            self._heard_s = sample.time_s
-        if sample.time_s - self._heard_s < _WAIT_FOR_MOTION_S:
-            return bad(reading.time_s, Quality.MISMATCH, "has moved while it was silent; no other gauge has")
-        self._memory.distrust(self._i, Doubt.RETURNED, sample.value - self._history[-1].value)
+    def _gap_s(self) -> float:
+        """How long, s, an interval between two readings is that is longer than usual."""
+        times = [sample.time_s for sample in self._history][-_USUAL_OF - 1 :]
+        intervals = sorted(later - earlier for earlier, later in pairwise(times))
+        return _GAP * intervals[len(intervals) // 2] if intervals else 0.0
+
+    def _compared(self, reading: Reading, earlier: GaugeSample, sample: GaugeSample) -> Reading:
+        """A value that is possible after a gap: believed where others have moved, a scale where they say how far.
+
+        It has no value until they have been read, too, and have moved on for a moment.
+        """
+        memory, i = self._memory, self._i
+        after, last = self._after, self._history[-1]
+        after += [later for later in (earlier, sample) if not after or later.time_s > after[-1].time_s]
+        alone = stood_still(memory, i)
+        short = after[0].time_s - last.time_s <= SHORTEST_GAP_S
+        if short and not alone:
+            return self._accounted_for(reading, sample)
+        may_wait = sample.time_s - after[0].time_s < max(_WAIT_FOR_MOTION_S, _WAIT_FOR_POLLS * self._gap_s())
+        waits = bad(reading.time_s, Quality.MISMATCH, "has moved in a gap; the others do not show yet how far")
+        if may_wait and (alone or not all_back(memory, i, after[0].time_s)):
+            return waits
+        if not alone and i >= memory.scales:
+            return self._accounted_for(reading, sample)
+        way_mm = after[0].value - last.value
+        by_links = way_by_links(memory, i, self._history, after)
+        by_itself = way_by_itself(self._history, after)
+        if any(way is not None and way.explains(way_mm) for way in (by_links, by_itself)):
+            return self._accounted_for(reading, sample)
+        if may_wait and by_links is None:
+            return waits
+        expected = by_links or by_itself
+        memory.distrust(i, Doubt.RETURNED, way_mm - (expected.way_mm if expected else 0.0))
         return self._refused(reading)
+
+    def _accounted_for(self, reading: Reading, sample: GaugeSample) -> Reading:
+        """A value after a gap, with the readings since."""
+        for later in self._after:
+            if later.time_s < sample.time_s:
+                self._remember(later)
+        return self._believed(reading, sample)
 
     def _is_from_rest_to_rest(self, before: Interval, first: GaugeSample, second: GaugeSample) -> bool:
         """Whether the part was at rest before, and two answers show it at rest again."""

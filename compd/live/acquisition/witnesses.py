@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
@@ -12,23 +11,24 @@ _WAIT_FOR_OTHERS_S = 2.0
 
 
 def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -> tuple[int | None, bool]:
-    """Number of a channel that has moved since channel `i` was lost, and whether enough could be compared.
+    """Number of a channel that has moved since channel `i` was last believed, and whether enough could be compared.
 
-    What counts are the channels that have been good all the time. Where there are none, because everything was off,
-    half of those that are back are enough to say that the machine has stood still. back_s : since when `i` answers.
+    What counts are the channels that have been good all the time, as far as they have been read since `i` was lost.
+    Where there are none, because everything was off, half of those that are back are enough to say that the machine
+    has stood still. back_s : since when `i` answers.
     """
     n = memory.lengths
-    others = np.arange(n) != i
     witness = memory.witness[i]
     tolerance = memory.tolerance_mm[:n]
-    lost_s = float(memory.lost_s[i])
-    stayed = others & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(witness)
-    if stayed.any():
+    known = (np.arange(n) != i) & ~np.isnan(witness)
+    good = known & (memory.doubt[:n] == Doubt.NONE)
+    stayed = good & (memory.time_s[:n] > memory.lost_s[i])
+    back = known & (memory.shown_s[:n] > memory.lost_s[i])
+    waited = now_s - back_s >= _WAIT_FOR_OTHERS_S
+    if stayed.any() and (waited or (stayed == good).all()):
         moved = stayed & (np.abs(memory.value[:n] - witness) > tolerance)
         return (int(np.flatnonzero(moved)[0]) if moved.any() else None), True
-    known = others & ~np.isnan(witness)
-    back = known & (memory.shown_s[:n] > lost_s)
-    if back.sum() < known.sum() and now_s - back_s < _WAIT_FOR_OTHERS_S:
+    if not waited and (good.any() or back.sum() < known.sum()):
         return None, False
     moved = back & (np.abs(memory.shown[:n] - witness) > tolerance)
     if 2 * moved.sum() > back.sum():
@@ -36,13 +36,18 @@ def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -
     return None, True
 
 
-def stood_still(memory: TrustMemory, i: int, before: NDArray[np.float64]) -> bool:
-    """Whether every channel beside `i` that can be compared shows what it showed before; False where there is none.
+def stood_still(memory: TrustMemory, i: int) -> bool:
+    """Whether every channel beside `i` that can be compared shows what it showed when `i` was last believed.
 
-    before : values of all channels then, shape (n,), mm; nan where not known.
+    False where there is none.
     """
-    n = memory.lengths
+    n, before = memory.lengths, memory.witness[i]
     compared = (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(before)
-    return bool(
-        compared.any() and (np.abs(memory.value[:n] - before)[compared] <= memory.tolerance_mm[:n][compared]).all()
-    )
+    return bool(compared.any() and (np.abs(memory.value[:n] - before)[compared] <= memory.tolerance_mm[:n][compared]).all())
+
+
+def all_back(memory: TrustMemory, i: int, since_s: float) -> bool:
+    """Whether every channel beside `i` that is believed has been read since a monotonic time (s)."""
+    n = memory.lengths
+    good = (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(memory.value[:n])
+    return bool((memory.time_s[:n][good] >= since_s).all())

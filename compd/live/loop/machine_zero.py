@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,8 +19,8 @@ from compd.files.file_kind import FileKind
 FILE_NAME = "machine-zero.json"
 # The machine zero before the present one, as its file was.
 OLD_FILE_NAME = "machine-zero.json.old"
-# Format 1, of releases before 0.6, has no checksum.
-_FORMAT = 2
+# Format 1, of releases before 0.6, has no checksum; neither 1 nor 2 has ports.
+_FORMAT = 3
 _LARGEST_FILE_BYTES = 1_000_000
 _TAKE_ONE = "bring the machine to its zero position and run `compd zero`"
 
@@ -32,10 +32,11 @@ class _ZeroFile(BaseModel):
 
     model_config = ConfigDict(strict=True)
 
-    format: Literal[1, 2]
+    format: Literal[1, 2, 3]
     zero_hash: str
     taken_at: str
     readings_mm: dict[str, FiniteFloat]
+    ports: dict[str, str] = {}
     checksum: str = ""
 
 
@@ -57,15 +58,22 @@ class MachineZero:
     zero_hash : of geometry, gauges and wiring. The zero of a machine with another hash must not be used.
     taken_at : UTC, ISO 8601, for people.
     readings_mm : by "gauge.channel", as read: before any sign.
+    ports : lasting names of the ports where they were read, by gauge; only in the file, not in recordings.
     """
 
     zero_hash: str
     taken_at: str
     readings_mm: Mapping[str, float]
+    ports: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data from which `MachineZero(**data)` makes the same zero again."""
         return {"zero_hash": self.zero_hash, "taken_at": self.taken_at, "readings_mm": dict(self.readings_mm)}
+
+    @property
+    def _kept(self) -> dict[str, Any]:
+        """What the file has of it."""
+        return self.to_json() | ({"ports": dict(self.ports)} if self.ports else {})
 
     def changes_mm(self, before: MachineZero) -> dict[str, float]:
         """By how much each gauge reads more here than in `before`, by channel, mm; of the channels that both have."""
@@ -81,7 +89,7 @@ class MachineZero:
         The file that was there stays beside it as OLD_FILE_NAME. Raises StateError when the disk refuses.
         """
         path = directory / FILE_NAME
-        content = {"format": _FORMAT, **self.to_json(), CHECKSUM: checksum_of(self.to_json())}
+        content = {"format": _FORMAT, **self._kept, CHECKSUM: checksum_of(self._kept)}
         text = json.dumps(content, indent=1, allow_nan=False) + "\n"
         try:
             directory.mkdir(parents=True, exist_ok=True)
@@ -178,10 +186,10 @@ def _parse_zero(content: Any, path: Path) -> MachineZero:
                 for detail in error.errors(include_url=False)
             ]
         ) from error
-    zero = MachineZero(file.zero_hash, file.taken_at, file.readings_mm)
-    if file.format < _FORMAT:
+    zero = MachineZero(file.zero_hash, file.taken_at, file.readings_mm, file.ports)
+    if file.format == 1:
         log.warning("machine zero has no checksum: what was changed in it cannot be seen", path=str(path))
-    elif file.checksum != (checksum := checksum_of(zero.to_json())):
+    elif file.checksum != (checksum := checksum_of(zero._kept)):
         raise StateError(
             Problem(
                 where=str(path),

@@ -68,7 +68,7 @@ def evaluate_shadow(
     """
     quantities = shadow.read(snapshot)
     if quantities.lost:
-        return ShadowResult(shadow.hash, quantities.lost.text), memory
+        return ShadowResult(shadow.hash, str(quantities.lost)), memory
     values = values._replace(quantities=shadow.by_name(quantities))
     compensation, after = compensate(shadow.machine, values, target, warm_start._replace(effects=memory))
     if code := int(compensation.reason):

@@ -9,6 +9,8 @@ from compd.gauge import Quality
 
 # A reason goes to every client, in every setpoint; READINGS and STATUS name each gauge.
 LONGEST_REASON_BYTES = 300
+# The words by which SETPOINT, STATUS, page and command line say that time alone changes nothing.
+WAITS_FOR_PERSON = "waits for a person"
 _AND_MORE = " ... (STATUS names all)"
 
 
@@ -37,7 +39,7 @@ class Lost(NamedTuple):
         return bool(self.text)
 
     def __str__(self) -> str:
-        return self.text
+        return f"{WAITS_FOR_PERSON}: {self.text}" if self.distrusted else self.text
 
     def and_also(self, other: Lost) -> Lost:
         """Both together."""
@@ -57,6 +59,15 @@ def lost(faults: Iterable[GaugeFault]) -> Lost:
     ordered = sorted(groups.values(), key=lambda group: group[0].quality is not Quality.DISTRUSTED)
     text = ", ".join(map(_group_text, ordered))
     return Lost(text, any(group[0].quality is Quality.DISTRUSTED for group in ordered))
+
+
+def waiting_text(channels: Iterable[str]) -> str:
+    """What a person is waited for, where these channels are not believed; "" where all are."""
+    gauges = list(dict.fromkeys(channel.partition(".")[0] for channel in channels))
+    if not gauges:
+        return ""
+    accept = gauges[0] if len(gauges) == 1 else "all"
+    return f"{WAITS_FOR_PERSON}: look at {', '.join(gauges)}, then `compd accept {accept}`"
 
 
 def shortened(reason: str) -> str:

@@ -89,7 +89,7 @@ def usable_comparators(
     elapsed_s = now_s - last_good.time_s
     expires_s = last_good.time_s + settings.hold_s
     if settings.on_stale == "stop":
-        return UsableComparators(None, ended, lost.text, now_s)
+        return UsableComparators(None, ended, str(lost), now_s)
     if elapsed_s >= settings.hold_s:
         reason = f"{lost}; {settings.on_stale} ended after {settings.hold_s:g} s"
         return UsableComparators(None, ended, reason, now_s)

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from enum import IntEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compd.live.memory.shared_array import shared_counters, shared_floats
 from compd.live.memory.shared_message import SharedMessage
@@ -34,11 +35,19 @@ class Doubt(IntEnum):
     """A quantity shows `amount`, which is beyond its plausible range."""
     APART = 7
     """A quantity is `amount` away from its neighbours, the other quantities of its unit."""
+    AT_ZERO = 8
+    """A scale shows zero after its power may have been off: with any direction and unit it would."""
+    REPLUGGED = 9
+    """Its line is at another port than before, `TrustMemory.evidence`: it may be another gauge."""
 
     @property
     def until_accepted(self) -> bool:
         """Whether it lasts until a person accepts the gauge."""
         return self > Doubt.LOST
+
+
+# Readings of each channel that are kept for the others, and for a process that takes over: a second at 4 ms each.
+RECENT = 256
 
 
 class TrustMemory:
@@ -47,14 +56,15 @@ class TrustMemory:
 
     Attributes
     ----------
-    channels : "gauge.channel" of every length channel, then of every quantity. index : of each in the arrays, all (n,).
-        Their values are in the channel's own unit, `unit`: mm of a length.
-    lengths : how many of them are lengths.
+    channels : "gauge.channel" of every length channel, the scales first, then of every quantity. index : of each in the
+        arrays, all (n,). Their values are in the channel's own unit, `unit`: mm of a length.
+    lengths : how many of them are lengths. scales : how many are scales.
     value, time_s : the last reading that was believed, and its monotonic time, s; nan before the first.
     shown, shown_s : the last value that the gauge gave, believed or not, and its time, s; nan before the first.
     tolerance_mm : by which a reading may differ from another one of the same value; of a quantity in its unit.
-    witness : (lengths, lengths), row i: the values of all lengths when channel i was lost, mm.
+    witness : (lengths, lengths), row i: the values of all lengths at the last reading of length i that was believed, mm.
     lost_s : monotonic time at which the channel was lost, s.
+    power_lost : 1 where the gauge itself may have been without power since its last reading.
     doubt : a `Doubt`. amount : what it says of it.
     repeats : how many polls in a row have given the very same value. changes : how many polls have given another one.
     first_change_s, last_change_s : when the first and the last of these were, s.
@@ -69,12 +79,17 @@ class TrustMemory:
     warnings : by channel: what is to be looked at, of one that is believed all the same.
     """
 
-    def __init__(self, channels: Sequence[str], tolerance_mm: Sequence[float], units: Sequence[str] = ()) -> None:
-        """`units`: of the quantities, which are the last channels; all others are lengths."""
+    def __init__(
+        self, channels: Sequence[str], tolerance_mm: Sequence[float], units: Sequence[str] = (), scales: int = 0
+    ) -> None:
+        """`units`: of the quantities, which are the last channels; all others are lengths. `scales`: how many
+        of these, from the first, are scales."""
         self.channels = tuple(channels)
+        self.scales = scales
         self.lengths = len(self.channels) - len(units)
         self._units = ("mm",) * self.lengths + tuple(units)
         self.index: Mapping[str, int] = {name: i for i, name in enumerate(self.channels)}
+        self._gauges = [channel.partition(".")[0] for channel in self.channels]
         n = len(self.channels)
         self.tolerance_mm = np.array(tolerance_mm, dtype=float)
         self.value, self.time_s, self.shown, self.shown_s, self.lost_s = (shared_floats(max(n, 1)) for _ in range(5))
@@ -91,6 +106,10 @@ class TrustMemory:
         self.accepted, self.obeyed, self.voted, self.heard = (shared_counters(max(n, 1)) for _ in range(4))
         self.suspected = shared_counters(max(n, 1))
         self.evidence, self.warnings = SharedMessage(), SharedMessage()
+        self.power_lost = shared_floats(max(n, 1))
+        self._recent = shared_floats(max(n, 1) * RECENT * 2).reshape(max(n, 1), RECENT, 2)  # time, s, and value, mm
+        self._recent[:] = math.nan
+        self._believed = shared_counters(max(n, 1))
 
     def unit(self, i: int) -> str:
         """Of the values of channel `i`."""
@@ -110,13 +129,13 @@ class TrustMemory:
             self.step_mm[i] = min(float(self.step_mm[i]), change)
         self.shown[i], self.shown_s[i] = value, time_s
 
-    def lose(self, i: int, now_s: float) -> None:
-        """Note that channel `i` is away from now on (s); of a length with what the others show."""
+    def lose(self, i: int, now_s: float, power: bool = False) -> None:
+        """Note that channel `i` is away from now on (s). power : its gauge may be without power."""
         if self.doubt[i] == Doubt.NONE:
-            if i < self.lengths:
-                self.witness[i] = self.value[: self.lengths]
             self.lost_s[i] = now_s
             self.doubt[i] = Doubt.LOST
+        if power:
+            self.power_lost[i] = 1.0
 
     def distrust(self, i: int, doubt: Doubt, amount: float) -> None:
         """Believe channel `i` no more until a person accepts it."""
@@ -125,8 +144,25 @@ class TrustMemory:
 
     def believe(self, i: int, value: float, time_s: float) -> None:
         """Note a reading of channel `i` (in its unit, s) that is believed."""
+        newest = self._recent[i, self._believed[i] % RECENT]
+        newest[1] = value
+        newest[0] = time_s  # after the value: whoever reads in between takes it for the oldest
+        self._believed[i] += 1
         self.value[i], self.time_s[i] = value, time_s
+        if i < self.lengths:
+            self.witness[i] = self.value[: self.lengths]
         self.doubt[i] = Doubt.NONE
+        self.power_lost[i] = 0.0
+
+    def begin(self, i: int) -> None:
+        """Forget the readings of channel `i`: it counts anew."""
+        self._recent[i] = math.nan
+
+    def recent(self, i: int) -> NDArray[np.float64]:
+        """(k, 2) monotonic time (s) and value (mm) of the last readings of channel `i` that were believed, in order."""
+        readings = self._recent[i].copy()
+        readings = readings[~np.isnan(readings[:, 0])]
+        return readings[np.argsort(readings[:, 0], kind="stable")]
 
     def accept(self, name: str) -> list[str]:
         """Believe what the channels of `name` show from now on, and return those that were not believed.
@@ -135,7 +171,7 @@ class TrustMemory:
         """
         channels = [c for c in self.channels if name in ("all", c, c.partition(".")[0])]
         if not channels:
-            gauges = dict.fromkeys(channel.partition(".")[0] for channel in self.channels)
+            gauges = dict.fromkeys(self._gauges)
             raise ValueError(f"no wired gauge is called {name[:40]!r}, allowed: all, {', '.join(gauges)}")
         doubted = [c for c in channels if Doubt(int(self.doubt[self.index[c]])).until_accepted]
         for channel in channels:
@@ -144,15 +180,26 @@ class TrustMemory:
 
     def vote(self, evidence: Mapping[str, str]) -> None:
         """Name channels that other gauges contradict, each with the evidence."""
-        self.evidence.write({**(self.evidence.read() or {}), **evidence})
+        self.tell(evidence)
         for channel in evidence:
             self.voted[self.index[channel]] += 1
 
+    def tell(self, evidence: Mapping[str, str]) -> None:
+        """Keep the evidence against channels, by channel."""
+        if evidence:
+            self.evidence.write({**(self.evidence.read() or {}), **evidence})
+
+    def distrust_ports(self, changes: Mapping[str, str]) -> None:
+        """Believe no channel of these gauges until a person accepts it: each is at another port, as the text says."""
+        changed = {i: changes[gauge] for i, gauge in enumerate(self._gauges) if gauge in changes}
+        self.tell({self.channels[i]: text for i, text in changed.items()})
+        for i in changed:
+            self.distrust(i, Doubt.REPLUGGED, math.nan)
+
     def short_name(self, i: int) -> str:
         """What `compd accept` is given: the gauge alone where it has one length channel."""
-        gauge = self.channels[i].partition(".")[0]
-        alone = sum(channel.partition(".")[0] == gauge for channel in self.channels) == 1
-        return gauge if alone else self.channels[i]
+        gauge = self._gauges[i]
+        return gauge if self._gauges.count(gauge) == 1 else self.channels[i]
 
     def explanation(self, i: int) -> str:
         """Why channel `i` is not believed, and what to do; "" where it is."""
@@ -173,4 +220,9 @@ class TrustMemory:
             case Doubt.VOTED:
                 evidence = (self.evidence.read() or {}).get(self.channels[i], "other gauges contradict it")
                 return f"{evidence}: look at it, {accept}"
+            case Doubt.AT_ZERO:
+                return f"shows zero, as before its power was off, with any direction and unit: look at these, {accept}"
+            case Doubt.REPLUGGED:
+                evidence = (self.evidence.read() or {}).get(self.channels[i], "its port is not that of before")
+                return f"look whether it is this gauge, {accept}: {evidence}"  # what is too long is cut off
         return ""

@@ -1,7 +1,7 @@
 """What every gauge showed last, on disk: one that was switched off with the computer may count anew.
 
-When the daemon starts, a gauge must show what it showed last, as after any loss of its line; so must one that was not
-believed. A daemon that was away for seconds only, on a computer that was not started anew, goes on.
+When the daemon starts, a gauge must show what it showed last, as after any loss of its line, and at the same port; one
+that was not believed is not believed. Where the computer was started anew, the gauges may have been without power.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +21,18 @@ from compd.clock import Clock
 from compd.files.atomic_files import write_files
 from compd.files.checksum import CHECKSUM, checksum_of
 from compd.live.memory.trust_memory import Doubt, TrustMemory
+from compd.live.port_names import changed_ports
 
 FILE_NAME = "last-readings.json"
 _FORMAT = 1
+# In tolerances, within which a gauge must come back: so much it may drift and is not written again.
+_WRITTEN_SHARE = 0.5
 # The file is written at most so often, s, and only when a gauge has moved or is not believed any more.
 _LOOK_EVERY_S = 1.0
-# A daemon that was away for longer, s, does not know what happened to its gauges.
-_LONGEST_ABSENCE_S = 10.0
 _END_WITHIN_S = 0.5
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
+_NO_PORTS: Mapping[str, str] = {}
 log = structlog.get_logger()
 
 
@@ -39,6 +42,8 @@ class _LastDoubt(BaseModel):
     doubt: int = 0
     amount: float | None = None
     evidence: str = ""
+    port: str = ""
+    power_lost: bool = False
 
 
 class _LastReading(_LastDoubt):
@@ -66,8 +71,12 @@ class _LastReadingsFile(BaseModel):
 class LastReadings:
     """Keeps `TrustMemory` on disk, by a thread of its own."""
 
-    def __init__(self, directory: Path, zero_hash: str, memory: TrustMemory, clock: Clock) -> None:
-        """`zero_hash`: of the configuration; readings of another one say nothing."""
+    def __init__(
+        self, directory: Path, zero_hash: str, memory: TrustMemory, clock: Clock, ports: Mapping[str, str] = _NO_PORTS
+    ) -> None:
+        """`zero_hash`: of the configuration; readings of another one say nothing. `ports`: the lasting name of each
+        gauge's port."""
+        self._ports = ports
         self._path = directory / FILE_NAME
         self._zero_hash = zero_hash
         self._memory = memory
@@ -82,26 +91,25 @@ class LastReadings:
         file = self._read()
         if file is None or file.zero_hash != self._zero_hash or file.format != _FORMAT:
             return
-        now_s = self._clock.monotonic()
-        goes_on = file.boot_id == boot_id() and 0.0 <= now_s - file.time_s <= _LONGEST_ABSENCE_S
-        memory = self._memory
+        self._take(file)
+
+    def _take(self, file: _LastReadingsFile) -> None:
+        memory, now_s = self._memory, self._clock.monotonic()
         values = {channel: last.value_mm for channel, last in file.readings.items()}
         values |= {channel: last.value for channel, last in file.quantities.items()}
-        for channel, value in values.items():
-            i = memory.index.get(channel)
-            if i is not None:
-                memory.believe(i, value, file.time_s if goes_on else now_s)
         doubts: dict[str, _LastDoubt] = {**file.readings, **file.quantities}
-        for channel, last in doubts.items():
-            i = memory.index.get(channel)
-            if i is None:
-                continue
+        known = {memory.index[channel]: last for channel, last in doubts.items() if channel in memory.index}
+        for i in known:
+            memory.believe(i, values[memory.channels[i]], now_s)
+        memory.witness[:] = memory.value[: memory.lengths]
+        for i, last in known.items():
             if last.doubt > Doubt.LOST:
                 memory.distrust(i, Doubt(min(last.doubt, max(Doubt))), math.nan if last.amount is None else last.amount)
-            elif not goes_on:
-                memory.lose(i, now_s)
-        if evidence := {channel: last.evidence for channel, last in doubts.items() if last.evidence}:
-            memory.evidence.write(evidence)
+            else:
+                memory.lose(i, now_s, power=last.power_lost or file.boot_id != boot_id())
+        memory.tell({memory.channels[i]: last.evidence for i, last in known.items() if last.evidence})
+        before = {memory.channels[i].partition(".")[0]: last.port for i, last in known.items() if last.port}
+        memory.distrust_ports(changed_ports(before, self._ports))
 
     def _read(self) -> _LastReadingsFile | None:
         """What is on disk; None where there is nothing, or nothing that can be used."""
@@ -145,7 +153,7 @@ class LastReadings:
         if not known.any():
             return
         if self._written is not None:
-            moved = np.abs(value - self._written[0]) > memory.tolerance_mm
+            moved = np.abs(value - self._written[0]) > _WRITTEN_SHARE * memory.tolerance_mm
             new = known & np.isnan(self._written[0])
             if not (moved.any() or new.any() or (doubt != self._written[1]).any()):
                 return
@@ -178,10 +186,14 @@ class LastReadings:
 
     def _entry(self, i: int, value: float, doubt: int, evidence: str) -> dict[str, Any]:
         entry: dict[str, Any] = {"value_mm" if i < self._memory.lengths else "value": value}
+        if port := self._ports.get(self._memory.channels[i].partition(".")[0]):
+            entry["port"] = port
+        if self._memory.power_lost[i]:
+            entry["power_lost"] = True
         if doubt > Doubt.LOST:
             amount = float(self._memory.amount[i])
             entry |= {"doubt": doubt, **({"amount": amount} if math.isfinite(amount) else {})}
-            if doubt == Doubt.VOTED:
+            if doubt in (Doubt.VOTED, Doubt.REPLUGGED):
                 entry["evidence"] = evidence
         return entry
 

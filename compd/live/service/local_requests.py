@@ -127,6 +127,10 @@ class ModelKeys(SentMessage, ModelsKeys):
     """Answers MODEL."""
 
     wire_name = "MODEL"
+    kept: bool = Field(
+        description="whether the daemon starts with the applied model again, by its configuration as it was read"
+    )
+    kept_text: str = Field(description="the same for people, with what keeps it where it is not kept")
 
 
 class ModelRequest(OrderRequest):

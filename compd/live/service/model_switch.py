@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 import queue
 import threading
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import structlog
 
@@ -54,9 +54,17 @@ class ModelSwitch:
     One at a time; used by the publisher's thread.
     """
 
-    def __init__(self, control: Control, wake: Callable[[], None], clock: Clock) -> None:
-        """`wake` lets the publisher's thread call `look`; it is called from any thread."""
+    def __init__(
+        self,
+        control: Control,
+        wake: Callable[[], None],
+        clock: Clock,
+        keeping: Callable[[Mapping[str, Any]], Mapping[str, Any]] = lambda models: {},
+    ) -> None:
+        """`wake` lets the publisher's thread call `look`; it is called from any thread. `keeping`: the keys of MODEL
+        that say whether models last."""
         self._control = control
+        self._keeping = keeping
         self._wake = wake
         self._clock = clock
         self._number = 0
@@ -109,7 +117,7 @@ class ModelSwitch:
             return
         role = "shadow" if self._wish.shadow else "applied"
         _log.info("shadow" if self._wish.shadow else "model adopted", file=summary.get(role, {}).get("file", "none"))
-        self._send(line({"class": "MODEL", **summary}))
+        self._send(line({"class": "MODEL", **summary, **self._keeping(summary)}))
 
     def _begin(self, wish: ModelWish, answer: Callable[[bytes], None]) -> None:
         self._number += 1

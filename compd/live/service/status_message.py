@@ -12,11 +12,13 @@ from compd.errors import StateError
 from compd.gauge import Quality
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
+from compd.live.loop.reasons import waiting_text
 from compd.live.loop.skew import skew_of
 from compd.live.loop.timing import LoopTiming
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
+from compd.live.port_names import changed_ports
 from compd.live.processes.control import Control
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender
@@ -35,6 +37,7 @@ class StatusReport:
     packets : the UDP sender, where one is configured.
     lines : makes the state of every line, by name.
     trust : what is known of the length channels.
+    ports : the lasting name of each gauge's port.
     """
 
     version: Mapping[str, Any]
@@ -49,11 +52,13 @@ class StatusReport:
     lines: Callable[[], Mapping[str, Any]]
     trust: TrustMemory
     clock: Clock
+    ports: Mapping[str, str]
 
     def message(self) -> dict[str, Any]:
         """The message as plain data; what is unknown is left out."""
         now_s = self.clock.monotonic()
-        published = self.publisher.summary()
+        published, gauges = self.publisher.summary(), self._gauges(now_s)
+        not_believed = [gauge["channel"] for gauge in gauges if gauge["quality"] is Quality.DISTRUSTED]
         if self.packets is not None:
             published |= self.packets.summary()
         message = {
@@ -69,7 +74,8 @@ class StatusReport:
             "publisher": published,
             "skew_s": self._skew_s(now_s),
             "lines": self.lines(),
-            "gauges": self._gauges(now_s),
+            "gauges": gauges,
+            "waits_for_person": waiting_text(not_believed) or None,
         }
         known: dict[str, Any] = omit_unknown(message)
         return known
@@ -78,7 +84,8 @@ class StatusReport:
         zero = self.commands.zero
         if isinstance(zero, StateError):
             return {"taken": False, "reason": str(zero)}
-        return {"taken": True, "taken_at": zero.taken_at}
+        changed = changed_ports(zero.ports, self.ports)
+        return {"taken": True, "taken_at": zero.taken_at, **({"ports_changed": changed} if changed else {})}
 
     def _model(self) -> dict[str, Any]:
         """The applied model and, if there is one, the shadow; without their paths, which no remote client needs."""

@@ -35,6 +35,7 @@ _END_WITHIN_S = 0.5
 # Differences that an error names: the largest.
 _NAMED = 6
 
+_NO_PORTS: Mapping[str, str] = {}
 _log = structlog.get_logger()
 
 
@@ -53,8 +54,11 @@ class ZeroCapture:
         zero_hash: str,
         clock: Clock,
         accept: Callable[[str], object] = lambda gauge: None,
+        ports: Mapping[str, str] = _NO_PORTS,
     ) -> None:
-        """`accept`: as in `Requests`; who takes zero has looked at the machine, and accepts every gauge."""
+        """`accept`: as in `Requests`; who takes zero has looked at the machine, and accepts every gauge. `ports`: the
+        lasting name of each gauge's port."""
+        self._ports = ports
         self._accept = accept
         self._wires = wires
         self._latest = latest
@@ -130,7 +134,7 @@ class ZeroCapture:
             self._accept("all")
             self._wait_until_believed()
         taken_at = datetime.now(UTC).isoformat(timespec="seconds")
-        zero = MachineZero(self._zero_hash, taken_at, self.sample())
+        zero = MachineZero(self._zero_hash, taken_at, self.sample(), self._ports)
         if not isinstance(before, MachineZero):
             return zero, {}
         changed_mm = zero.changes_mm(before)

@@ -3,9 +3,9 @@ import { copyButton } from "./copy.js";
 import { element } from "./format.js";
 
 export class CommandLine {
-  constructor(text = "") {
+  constructor(text = "", title = "Copy this command line") {
     this.code = element("code", {});
-    this.row = element("div", { class: "command" }, this.code, copyButton(this.code, "Copy this command line"));
+    this.row = element("div", { class: "command" }, this.code, copyButton(this.code, title));
     this.write(text);
   }
 

@@ -83,6 +83,13 @@ export class Orders {
     }
     this.leave();
     this.say(answer.ok ? `Done: ${nameOf(name, subject).toLowerCase()}.` : `Refused: ${answer.reason}`);
+    if (answer.ok && ["adopt", "no-model"].includes(name)) this.offerToKeep(answer.answer);
+  }
+
+  // Of an applied model: whether the daemon starts with it again, and the line of its configuration that keeps it.
+  offerToKeep({ applied, kept, kept_text: text }) {
+    const line = kept || !applied.file ? "" : text.split("`")[1];
+    this.showConsequence(element("p", {}, `The model is ${text}.`), new CommandLine(line, "Copy this line").row);
   }
 
   say(text) {

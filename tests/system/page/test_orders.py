@@ -235,6 +235,8 @@ def test_adopt(tab, live, daemon, model):
     assert daemon.model()["applied"]["effects"] == []
     arm(tab)
     assert given(tab, "adopt") == "Done: adopt the shadow's model."
+    assert "not kept over a restart" in tab.locator(".consequence").inner_text()
+    assert tab.locator(".consequence code").inner_text() == f"model_file: {model}"
     assert daemon.model()["applied"]["effects"] == ["link_expansion"]
     until(tab, "document.querySelector('#budget .legend').textContent.includes('link expansion')")
 

@@ -16,8 +16,9 @@ STOP = {"state": "stop", "reason": "the tip is not known"}
 
 
 def test_each_gauge_that_is_not_believed_is_told_with_what_to_type():
-    lines = not_believed({"gauges": GAUGES}, STOP)
-    assert lines[0] == "scale_1.position: came back 5.000 mm away: reference it"
+    status = {"gauges": GAUGES, "waits_for_person": "waits for a person: look at scale_1, joints"}
+    lines = not_believed(status, STOP)
+    assert lines[:2] == [status["waits_for_person"], "scale_1.position: came back 5.000 mm away: reference it"]
     assert lines[-3:] == ["    compd accept scale_1", "    compd accept joints", "    compd accept all"]
     assert not any("cabinet" in line or "joints.3" in line for line in lines)
 

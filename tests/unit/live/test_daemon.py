@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import structlog
 
 from compd.client import connect
 from compd.clock import MonotonicClock
@@ -100,6 +101,36 @@ def test_zero_is_asked_for_taken_kept_over_a_restart_and_refused_for_another_wir
     rewired = replace(configured, wiring=configured.wiring.model_copy(update={"scale": (flipped, *others)}))
     with running(rewired) as (_, client):
         assert "another geometry, gauges or wiring" in first(client.watch(), "no_zero")["reason"]
+
+
+@pytest.mark.usefixtures("still")
+@pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
+def test_a_gauge_that_waits_for_a_person_is_told_in_setpoint_and_status_with_the_same_words(tmp_path, name):
+    configured = configuration(tmp_path, name)
+    with running(configured) as (daemon, client):
+        client.zero()
+        assert first(client.watch(), "ok")
+        assert "waits_for_person" not in client.status()
+        now_s = MonotonicClock().monotonic()
+        daemon.latest.put(daemon.latest.index["scale_1.position"], bad(now_s, Quality.DISTRUSTED, "came back"))
+        words = "waits for a person"
+        assert words in first(client.watch(), "fault")["reason"]
+        assert client.status()["waits_for_person"] == f"{words}: look at scale_1, then `compd accept scale_1`"
+
+
+@pytest.mark.usefixtures("still")
+def test_machine_zero_says_where_a_port_has_changed_since(tmp_path):
+    configured = configuration(tmp_path)
+    with running(configured) as (_, client):
+        client.zero()
+    moved = configured.lines["scale_1"].model_copy(update={"port": "/dev/serial/by-id/usb-another"})
+    elsewhere = replace(configured, lines={**configured.lines, "scale_1": moved})
+    with running(elsewhere) as (daemon, client):
+        change = "was at /dev/serial/by-id/usb-scale-1, is at /dev/serial/by-id/usb-another"
+        assert client.status()["zero"]["ports_changed"] == {"scale_1": change}
+        with structlog.testing.capture_logs() as logs:
+            daemon.take_over()
+    assert [(entry["gauge"], entry["change"]) for entry in logs] == [("scale_1", change)]
 
 
 @pytest.mark.usefixtures("still")

@@ -287,7 +287,8 @@ def test_a_running_daemon_is_asked_told_and_refuses(tmp_path, capsys):
         adopt(file, configured.sockets.unix.path)
         printed = capsys.readouterr().out
         assert f"applied: {file} (" in printed
-        assert f"model_file: {file}" in printed
+        keep = f"to keep it, write `model_file: {file}` under `state:` in {configured.path}"
+        assert f"not kept over a restart; {keep}" in printed
         done = next(s for s in setpoints if s.get("model") and s["state"] == "ok")
         assert done["sources_mm"]["link_zero"] == pytest.approx(-LINK_ZERO_UM * 1e-3, abs=1e-5)
         assert "shadow" not in done, "the shadow is what is applied now"
@@ -303,7 +304,8 @@ def test_a_running_daemon_is_asked_told_and_refuses(tmp_path, capsys):
             other.model()
         assert client.model()["applied"]["model"] == done["model"], "what was refused has changed nothing"
         adopt(None, configured.sockets.unix.path, none=True)
-        assert client.model() == {"class": "MODEL", "applied": {"effects": []}}
+        kept = {"kept": True, "kept_text": "kept over a restart"}
+        assert client.model() == {"class": "MODEL", "applied": {"effects": []}, **kept}
 
 
 @pytest.mark.usefixtures("still")

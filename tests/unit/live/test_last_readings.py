@@ -32,7 +32,10 @@ class Clock:
 
 
 def memory() -> TrustMemory:
-    return TrustMemory(CHANNELS, [0.001] * len(CHANNELS))
+    return TrustMemory(CHANNELS, [0.001] * len(CHANNELS), scales=1)
+
+
+PORTS = {"scale_1": "/dev/serial/by-id/usb-one", "joints": "192.168.10.20:502:1"}
 
 
 def written(tmp_path, change=lambda memory: None, now_s=100.0) -> None:
@@ -41,34 +44,58 @@ def written(tmp_path, change=lambda memory: None, now_s=100.0) -> None:
     left.believe(0, 12.5, now_s)
     left.believe(1, -0.25, now_s)
     change(left)
-    last = LastReadings(tmp_path, HASH, left, Clock(now_s=now_s))
+    last = LastReadings(tmp_path, HASH, left, Clock(now_s=now_s), PORTS)
     last.start()
     last.stop()
 
 
-def recalled(tmp_path, now_s=103.0, zero_hash=HASH) -> TrustMemory:
+def recalled(tmp_path, now_s=103.0, zero_hash=HASH, ports=PORTS) -> TrustMemory:
     found = memory()
-    LastReadings(tmp_path, zero_hash, found, Clock(now_s=now_s)).recall()
+    LastReadings(tmp_path, zero_hash, found, Clock(now_s=now_s), ports).recall()
     return found
 
 
-def test_a_daemon_that_was_away_for_a_moment_goes_on(tmp_path):
+@pytest.mark.parametrize("now_s", [103.0, 5.0, 1e6])
+def test_every_gauge_must_show_what_it_showed_however_long_the_daemon_was_away(tmp_path, now_s):
     written(tmp_path)
-    found = recalled(tmp_path, now_s=103.0)
+    found = recalled(tmp_path, now_s)
     assert found.value[:2].tolist() == [12.5, -0.25]
     assert math.isnan(found.value[2])
-    assert found.doubt[:3].tolist() == [Doubt.NONE] * 3
-    assert found.time_s[0] == 101.0
-
-
-@pytest.mark.parametrize("anew", ["the computer", "long after", "the clock"])
-def test_after_longer_every_gauge_must_show_what_it_showed(tmp_path, monkeypatch, anew):
-    written(tmp_path)
-    if anew == "the computer":
-        monkeypatch.setattr(last_readings, "boot_id", lambda: "another one")
-    found = recalled(tmp_path, now_s={"the computer": 103.0, "long after": 200.0, "the clock": 5.0}[anew])
     assert found.doubt[:3].tolist() == [Doubt.LOST, Doubt.LOST, Doubt.NONE], "the third has never been read"
-    assert found.witness[0, :2].tolist() == [12.5, -0.25]
+    assert found.witness[0, :2].tolist() == found.witness[1, :2].tolist() == [12.5, -0.25]
+    assert not found.power_lost.any()
+
+
+def test_where_the_computer_was_started_anew_the_gauges_may_have_been_without_power(tmp_path, monkeypatch):
+    written(tmp_path)
+    monkeypatch.setattr(last_readings, "boot_id", lambda: "another one")
+    found = recalled(tmp_path)
+    assert found.power_lost[:2].all()
+    last = LastReadings(tmp_path, HASH, found, Clock(), PORTS)
+    last.start()
+    last.stop()
+    assert recalled(tmp_path).power_lost[:2].all(), "nor is it forgotten before they have answered"
+
+
+def test_a_gauge_at_another_port_is_not_believed_and_stays_so(tmp_path):
+    written(tmp_path)
+    ports = PORTS | {"scale_1": "/dev/serial/by-id/usb-two"}
+    found = recalled(tmp_path, ports=ports)
+    assert found.doubt[:2].tolist() == [Doubt.REPLUGGED, Doubt.LOST]
+    text = (
+        "look whether it is this gauge, then `compd accept scale_1`: was at /dev/serial/by-id/usb-one, "
+        "is at /dev/serial/by-id/usb-two"
+    )
+    assert found.explanation(0) == text
+    last = LastReadings(tmp_path, HASH, found, Clock(), ports)
+    last.start()
+    last.stop()
+    assert recalled(tmp_path, ports=ports).explanation(0) == text, "a restart is no acceptance"
+
+
+def test_a_port_that_was_not_known_is_no_other_one(tmp_path):
+    written(tmp_path)
+    assert recalled(tmp_path, ports={}).doubt[0] == Doubt.LOST
 
 
 def test_what_was_not_believed_is_not_believed_after_a_start(tmp_path):

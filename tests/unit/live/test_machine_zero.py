@@ -38,7 +38,7 @@ def test_what_is_saved_is_what_is_loaded(tmp_path):
         ("", "not JSON"),
         ('{"format": 1, "zero_hash": "abc"', "not JSON"),
         ("[]", "not a machine zero"),
-        ('{"format": 3, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "a later release of compd"),
+        ('{"format": 4, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "a later release of compd"),
         ('{"zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "format: is not a machine zero: Field required"),
         ('{"format": 1, "zero_hash": 7, "taken_at": "", "readings_mm": {}}', "zero_hash: is not a machine zero"),
         (
@@ -213,6 +213,21 @@ def test_a_digit_that_was_changed_by_hand_is_refused(tmp_path):
 
 def test_a_file_of_an_earlier_release_has_no_checksum_and_is_used(tmp_path):
     (tmp_path / FILE_NAME).write_text(json.dumps({"format": 1, **ZERO.to_json()}))
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
+
+
+def test_the_file_keeps_the_ports_and_a_recording_does_not(tmp_path):
+    zero = replace(ZERO, ports={"a": "/dev/serial/by-id/usb-one", "b": "192.168.10.20:502:1"})
+    path = zero.save(tmp_path)
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == zero
+    assert "ports" not in zero.to_json()
+    path.write_text(path.read_text().replace("usb-one", "usb-two"))
+    with pytest.raises(StateError, match="changed after it was written"):
+        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+
+
+def test_a_file_without_ports_is_used(tmp_path):
+    (tmp_path / FILE_NAME).write_text(json.dumps({"format": 2, **ZERO.to_json(), "checksum": ZERO.checksum}))
     assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
 
 

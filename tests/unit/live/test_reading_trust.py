@@ -11,7 +11,7 @@ import pytest
 from compd.gauge import Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, good
 from compd.live.acquisition.polled_gauge import PolledGauge
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
-from compd.live.acquisition.reading_trust import LONGEST_OWN_GAP_S, ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
 from compd.live.memory.latest import Latest
 from compd.live.memory.readings import pack
 from compd.live.memory.trust_memory import TrustMemory
@@ -35,7 +35,7 @@ class Shop:
         self.damage: dict[str, list[float | LineFault]] = {name: [] for name in GAUGES}
         self.asked = dict.fromkeys(GAUGES, 0)
         self.latest = Latest([f"{name}.value" for name in GAUGES])
-        self.memory = TrustMemory(self.latest.channels, [tolerance_mm(NOISE_UM)] * len(GAUGES))
+        self.memory = TrustMemory(self.latest.channels, [tolerance_mm(NOISE_UM)] * len(GAUGES), scales=len(GAUGES))
         self._settings = TrustSettings(limits, returns_by_itself, STALE_AFTER_S)
         self._random = np.random.default_rng(5)
         self.start_acquisition()
@@ -215,11 +215,84 @@ def test_a_machine_that_drives_is_believed_all_the_way(way_mm, poll_s, monkeypat
     assert shop.asked["scale_1"] < 1.5 * shop.gauges["scale_1"].polls + 10
 
 
-def test_a_gap_in_a_move_is_no_jump(shop):
-    shop.shows["scale_1"] = driven(shop.now_s, 20.0)
-    shop.poll(5)
-    shop.damage["scale_1"] = [LineFault(Quality.TIMEOUT)] * 10
+WAYS_MM = {"scale_1": 20.0, "scale_2": 14.0, "scale_3": -9.0}
+
+
+def driven_with_a_gap(shop: Shop, begins_s: float, lost_s: float, lost_mm: float, alone: bool = False) -> None:
+    """A move; `begins_s` after its start scale_1 is silent for `lost_s`, and has lost `lost_mm` when it is back."""
+    start_s = shop.now_s
+    for name, way_mm in WAYS_MM.items():
+        if name == "scale_1" or not alone:
+            shop.shows[name] = driven(start_s, way_mm, speed=2.5 * abs(way_mm), acceleration=12.5 * abs(way_mm))
+    while shop.now_s < start_s + begins_s:
+        shop.poll()
+    move = shop.shows["scale_1"]
+    end_s = shop.now_s + lost_s
+    shop.shows["scale_1"] = lambda time_s: move(time_s) + lost_mm
+    while shop.now_s < end_s:
+        shop.damage["scale_1"] = [LineFault(Quality.TIMEOUT)]
+        shop.poll()
+    shop.damage["scale_1"] = []
     shop.poll(60)
+
+
+# in the move's beginning, in its middle, over its end
+@pytest.mark.parametrize("begins_s", [0.1, 0.25, 0.45])
+@pytest.mark.parametrize("lost_s", [0.05, 0.15, 0.4])
+def test_a_gap_in_a_move_of_the_machine_is_no_jump(shop, begins_s, lost_s):
+    driven_with_a_gap(shop, begins_s, lost_s, 0.0)
+    reading = shop.reading("scale_1")
+    assert reading.ok, reading
+    assert reading.value == pytest.approx(shop.shows["scale_1"](reading.time_s), abs=1e-3)
+
+
+@pytest.mark.parametrize("begins_s", [0.1, 0.25, 0.45])
+@pytest.mark.parametrize("lost_s", [0.15, 0.4])
+def test_a_scale_that_has_lost_its_count_in_a_gap_of_a_move_is_not_believed(shop, begins_s, lost_s):
+    """In 0.4 s its acceleration would allow 16 mm."""
+    driven_with_a_gap(shop, begins_s, lost_s, -5.0)
+    assert shop.reading("scale_1").quality is Quality.DISTRUSTED
+
+
+def test_a_link_that_is_jogged_alone_is_followed_over_a_gap_by_its_own_speed(shop):
+    driven_with_a_gap(shop, 0.25, 0.11, 0.0, alone=True)
+    assert shop.reading("scale_1").ok
+
+
+def test_a_link_that_is_jogged_alone_and_loses_its_count_in_a_gap_is_not_believed(shop):
+    driven_with_a_gap(shop, 0.25, 0.11, -2.0, alone=True)
+    assert "came back -" in shop.reading("scale_1").detail
+
+
+def test_a_new_process_follows_a_machine_on_the_move_and_finds_the_scale_that_has_lost_its_count():
+    for lost_mm in (0.0, -5.0):
+        shop = Shop()
+        shop.poll(20)
+        start_s = shop.now_s
+        for name, way_mm in WAYS_MM.items():
+            shop.shows[name] = driven(start_s, 2 * way_mm, speed=2.5 * abs(way_mm), acceleration=12.5 * abs(way_mm))
+        while shop.now_s < start_s + 0.25:
+            shop.poll()
+        shop.now_s += 0.3
+        move = shop.shows["scale_1"]
+        shop.shows["scale_1"] = lambda time_s, move=move, lost_mm=lost_mm: move(time_s) + lost_mm
+        shop.start_acquisition()
+        shop.poll(60)
+        assert shop.reading("scale_1").ok == (lost_mm == 0.0)
+
+
+@pytest.mark.parametrize("shows_mm", [0.0, 3.0])
+def test_a_scale_at_zero_that_may_have_been_without_power_is_asked_for(shop, shows_mm):
+    """It would show zero with any direction and unit; at another place it would show another value."""
+    drive(shop, scale_1=shows_mm)
+    shop.away_s(2.0, "scale_1")
+    shop.poll(20)
+    if shows_mm:
+        assert shop.reading("scale_1").ok
+        return
+    assert "with any direction and unit" in shop.reading("scale_1").detail
+    shop.memory.accept("scale_1")
+    shop.poll(2)
     assert shop.reading("scale_1").ok
 
 
@@ -236,7 +309,15 @@ def test_a_scale_that_comes_back_with_another_value_is_not_believed(shop, away_m
     assert shop.reading("scale_1").value == pytest.approx(away_mm, abs=0.001)
 
 
+def drive(shop: Shop, **ways_mm: float) -> None:
+    """From zero to these places, and let the machine rest there."""
+    for name, way_mm in ways_mm.items():
+        shop.shows[name] = driven(shop.now_s, way_mm) if way_mm else lambda _: 0.0
+    shop.poll(100)
+
+
 def test_a_scale_that_comes_back_with_its_value_is_believed_where_nothing_has_moved(shop):
+    drive(shop, scale_1=3.0)
     shop.away_s(2.0, "scale_1")
     shop.poll(2)
     assert shop.reading("scale_1").ok
@@ -307,6 +388,7 @@ def test_an_absolute_gauge_needs_no_acceptance():
 
 
 def test_after_a_power_cut_of_everything_the_gauges_that_show_what_they_showed_are_believed(shop):
+    drive(shop, scale_1=3.0, scale_2=2.0, scale_3=1.0)
     shop.away_s(2.0, *GAUGES)
     shop.shows["scale_3"] = lambda _: 0.4
     shop.poll(5)
@@ -322,16 +404,26 @@ def test_what_is_not_believed_outlives_the_process_that_polls(shop):
     assert "came back 5.000 mm away" in shop.reading("scale_1").detail
 
 
-def test_a_process_that_was_not_there_for_a_moment_is_no_loss_but_one_that_was_away_for_longer_is(shop):
-    shop.shows["scale_1"] = lambda _: 2.0
-    shop.now_s += 1.0
+@pytest.mark.parametrize("gone_s", [0.2, 1.0, 30.0])
+def test_after_a_process_that_was_not_there_a_gauge_that_shows_what_it_showed_is_believed(shop, gone_s):
+    shop.now_s += gone_s
     shop.start_acquisition()
-    shop.poll(2)
-    assert shop.reading("scale_1").ok, "the machine may have been driven there"
-    shop.now_s += LONGEST_OWN_GAP_S + 1.0
-    shop.shows["scale_1"] = lambda _: 2.1
-    shop.poll(2)
+    shop.poll(3)
+    assert all(shop.reading(name).ok for name in GAUGES)
+    assert shop.reading("scale_1").time_s > shop.now_s - 0.1
+
+
+@pytest.mark.parametrize("gone_s", [0.2, 1.0, 30.0])
+@pytest.mark.parametrize("away_mm", [0.03, -0.2, -5.0])
+def test_after_a_process_that_was_not_there_a_gauge_that_alone_shows_another_value_is_not_believed(
+    shop, gone_s, away_mm
+):
+    shop.now_s += gone_s
+    shop.shows["scale_1"] = lambda _: away_mm
+    shop.start_acquisition()
+    shop.poll(60)
     assert shop.reading("scale_1").quality is Quality.DISTRUSTED
+    assert all(shop.reading(name).ok for name in GAUGES[1:])
 
 
 def test_a_vote_is_heard_and_an_unknown_name_is_refused(shop):

@@ -9,7 +9,7 @@ import pytest
 
 from compd.configuration.operation import LoopSettings
 from compd.gauge import Quality
-from compd.live.loop.reasons import Lost
+from compd.live.loop.reasons import WAITS_FOR_PERSON, Lost
 from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
 from compd.live.loop.states import State
 from tests.support.live_machine import PERIOD_S, machine
@@ -37,6 +37,15 @@ def test_before_the_first_whole_set_there_is_nothing_to_hold(on_stale):
     assert usable.comparators is None
     assert usable.state is State.STARTING
     assert LOST.text in usable.reason
+    assert WAITS_FOR_PERSON not in usable.reason
+
+
+@pytest.mark.parametrize("last", [None, LAST])
+@pytest.mark.parametrize("on_stale", ["hold", "fade", "stop"])
+def test_where_a_person_is_waited_for_every_reason_says_so(on_stale, last):
+    lost = LOST._replace(distrusted=True)
+    usable = usable_comparators(None, last, lost, 100.5, settings(on_stale))
+    assert f"{WAITS_FOR_PERSON}: {LOST.text}" in usable.reason
 
 
 def test_stop_is_at_once():

@@ -45,6 +45,7 @@ def test_zero_names_the_gauges_the_old_zero_and_what_becomes_of_the_correction(l
 
 def test_accept_names_the_gauges_that_wait_and_why(link):
     assert not Orders(link).consequence("accept", "all").possible
+    link.status["waits_for_person"] = "waits for a person: look at scale_1, then `compd accept scale_1`"
     link.status["gauges"] = [
         {
             "channel": "scale_1.position",
@@ -57,6 +58,7 @@ def test_accept_names_the_gauges_that_wait_and_why(link):
     consequence = Orders(link).consequence("accept", "all")
     assert consequence.possible
     assert "scale 1: came back 5.000 mm away" in consequence.text
+    assert consequence.text.startswith("Waits for a person: look at scale_1, then `compd accept scale_1`")
     assert "scale 2" not in consequence.text
     assert Orders(link).consequence("accept", "scale_1").possible
     assert not Orders(link).consequence("accept", "scale_2").possible

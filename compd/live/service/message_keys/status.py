@@ -17,6 +17,9 @@ class ZeroStatusKeys(Keys):
     taken: bool = Field(description="whether there is one that fits this configuration")
     taken_at: str | None = Field(default=None, description="when, UTC, ISO 8601")
     reason: str | None = Field(default=None, description="why there is none")
+    ports_changed: dict[str, str] | None = Field(
+        default=None, description="gauges whose port is another one than when it was taken, each with both"
+    )
 
 
 class LoopStatusKeys(Keys):
@@ -139,3 +142,6 @@ class StatusKeys(VersionKeys):
     )
     lines: dict[str, LineStatusKeys] = Field(description="every line, by name")
     gauges: list[ChannelStatusKeys] = Field(description="every channel of every gauge")
+    waits_for_person: str | None = Field(
+        default=None, description="for people: the gauges that are not believed, and what to do; absent where all are"
+    )
