@@ -45,12 +45,14 @@ class ReadingMotion(NamedTuple):
     braking_mm_per_s2 : by how much its size falls, mm/s2; 0 where it does not brake.
     u_mm_per_s : standard uncertainty of the speed, mm/s; nan where there are not enough readings yet.
     horizon_s : for so long after a reading, s, the motion may be taken to go on.
+    due_s : so long after a reading, s, the next one is there at the latest, unless the gauge is silent.
     """
 
     speed_mm_per_s: float
     braking_mm_per_s2: float
     u_mm_per_s: float
     horizon_s: float
+    due_s: float = 0.0
 
 
 class Reading(NamedTuple):

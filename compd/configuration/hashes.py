@@ -47,6 +47,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "round_trigger": None,
     "gateway_wait_s": None,
     "wake_latency_us": None,
+    "tip_error_um": None,
 }
 # Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
 _FORMER_SPEED_LIMITS: Mapping[str, float] = {

@@ -1,4 +1,4 @@
-"""The readings of wires in one snapshot, carried on to its time, and how uncertain they are by their age.
+"""The readings of wires in one snapshot, carried on to its time, and how wrong they may be by their age.
 
 A reading is as old as its gauge's turn on the line makes it, and each is differently old. Each is carried on by its own
 speed (`compd.live.acquisition.motion_estimate`), which comes with it: so a replay has all that the cycle had. One of a
@@ -14,14 +14,24 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from numba import types
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray, IntArray
 from compd.live.memory.readings import OK_NUMBER, SLOTS
-from compd.model.kernels.jit import FLAG, INDICES, NUMBERS, SCALAR, helper, loop
+from compd.model.kernels.jit import COUNT, FLAG, INDICES, NUMBERS, SCALAR, helper, loop
+from compd.units import UM_PER_MM
 
 # A device samples up to so long after the request or the trigger has left, s; a reading has the earliest time possible.
 SAMPLED_LATER_S = 1e-3
+# Coverage factor for 95 % of a normal distribution (GUM, table G.1).
+COVERAGE = 1.96
+# Links move at speeds of one size, but near a singular pose: of two, one is up to so many times as fast as the other.
+LINK_SPEED_RATIO = 10.0
+
+# Arrays that may be in memory that cannot be written to, such as those of a recording.
+_READ_NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
+_READ_ROWS = types.Array(types.float64, 2, "C", readonly=True)
 
 
 @helper
@@ -63,33 +73,108 @@ def read_values(
     return oldest_s, newest_s, usable
 
 
+@helper
+def _speed_bound(slot: Any) -> float:
+    """How fast a length moves at most at its last reading (mm/s), with 95 %; nan where that is not known yet."""
+    return float(abs(slot.speed_mm_per_s) + COVERAGE * slot.u_mm_per_s)
+
+
 @loop([SLOTS, INDICES, NUMBERS])
-def drifts_mm_per_s(slots: NDArray[Any], wired: IntArray, drifts: FloatArray) -> None:
-    """Fill in how fast each length (k,) may move that is not read any more: its speed and the uncertainty of that.
-
-    nan where it is not known; 0 for a reading without motion.
-    """
+def speed_bounds_mm_per_s(slots: NDArray[Any], wired: IntArray, speeds: FloatArray) -> None:
+    """Fill in how fast each length (k,) moves at most, mm/s; 0 for a reading without motion."""
     for i in range(len(wired)):
         slot = slots[wired[i]]
-        drifts[i] = 0.0 if math.isnan(slot.horizon_s) else abs(slot.speed_mm_per_s) + slot.u_mm_per_s
+        speeds[i] = 0.0 if math.isnan(slot.horizon_s) else _speed_bound(slot)
 
 
-@loop([SLOTS, INDICES, SCALAR, FLAG, NUMBERS])
-def age_uncertainties_mm(
-    slots: NDArray[Any], wired: IntArray, now_s: float, extrapolate: bool, uncertainties_mm: FloatArray
-) -> None:
-    """Fill in the standard uncertainty (k,) in mm of each length by the age of its reading.
+@helper
+def _age_bound(
+    slot: Any,
+    age_s: float,
+    extrapolate: bool,
+    fastest: float,
+    acceleration: float,
+    machine_mm_per_s: float,
+) -> float:
+    """By how much a length (mm) may have left the place to which it is carried on; see `age_bounds_mm`."""
+    if math.isnan(slot.horizon_s):
+        return 0.0
+    if math.isnan(slot.u_mm_per_s):
+        return math.nan
+    speed = abs(slot.speed_mm_per_s)
+    later = SAMPLED_LATER_S * speed
+    if age_s <= 0.0:
+        return later
+    # the speed was measured in the middle of the last round
+    changed = 0.5 * acceleration * age_s * (age_s + 0.5 * slot.due_s)
+    if age_s > slot.due_s:
+        changed = min(changed, machine_mm_per_s * age_s) + COVERAGE * slot.u_mm_per_s * age_s
+    else:
+        changed = min(changed, _speed_bound(slot) * age_s)
+    carried_s = min(age_s, slot.horizon_s) if extrapolate else 0.0
+    bound = speed * (age_s - carried_s) + changed
+    return float(min(bound, (fastest + speed) * age_s) + later)
 
-    nan where its motion is not known yet; 0 for a reading without motion.
+
+@loop([SLOTS, INDICES, COUNT, SCALAR, FLAG, NUMBERS, NUMBERS, SCALAR, NUMBERS])
+def age_bounds_mm(
+    slots: NDArray[Any],
+    wired: IntArray,
+    scales: int,
+    now_s: float,
+    extrapolate: bool,
+    fastest: FloatArray,
+    acceleration: FloatArray,
+    largest_mm: float,
+    bounds_mm: FloatArray,
+) -> float:
+    """Fill in by how much each length (k,) in mm may be wrong by the age of its reading, and return how fast (mm/s) the
+    machine moves by those of the first `scales` of them that answer; inf where none does.
+
+    Since its reading a length has changed its speed by no more than `acceleration` (k,) allows, in mm/s2, nor has it
+    been faster than `fastest` (k,), mm/s. Until its next reading is due, its speed has changed by no more than its own
+    size, as that of a part which brakes, or starts as fast as it goes: one at rest is taken to rest so long. A gauge
+    whose reading was due is silent, and what it measures may have started. It is then no faster than the machine: a
+    scale at most LINK_SPEED_RATIO times as fast as the fastest other one, joints and frame no faster than the links.
+
+    nan where it is not known how a length moves, inf where nothing limits it; 0 for a reading without motion.
     extrapolate : whether readings are carried on, and not used as they were read.
+    largest_mm : of lengths that are no scales, none is further off.
     """
-    for i in range(len(wired)):
+    machine = -1.0
+    for i in range(scales):
         slot = slots[wired[i]]
-        if math.isnan(slot.horizon_s):
-            uncertainties_mm[i] = 0.0
-            continue
-        age_s = now_s - slot.time_s
-        uncertainties_mm[i] = slot.u_mm_per_s * age_s
-        if slot.speed_mm_per_s != 0.0:
-            not_carried_s = max(age_s - slot.horizon_s, 0.0) if extrapolate else age_s
-            uncertainties_mm[i] += abs(slot.speed_mm_per_s) * (SAMPLED_LATER_S + not_carried_s)
+        if slot.quality == OK_NUMBER and not now_s - slot.time_s > slot.due_s:
+            machine = max(machine, 0.0 if math.isnan(slot.horizon_s) else _speed_bound(slot))
+    if machine < 0.0:
+        machine = math.inf
+    for i in range(len(wired)):
+        slot, ratio = slots[wired[i]], LINK_SPEED_RATIO if i < scales else 1.0
+        bound = _age_bound(slot, now_s - slot.time_s, extrapolate, fastest[i], acceleration[i], ratio * machine)
+        bounds_mm[i] = bound if i < scales or math.isnan(bound) else min(bound, largest_mm)
+    return machine
+
+
+@loop([_READ_NUMBERS, _READ_ROWS, _READ_NUMBERS, COUNT])
+def tip_bound_um(noise_um: FloatArray, tip_by_length: FloatArray, lengths_mm: FloatArray, scales: int) -> float:
+    """How far the tip may be from where it is said to be, um: see `compd.live.loop.tip_bound`.
+
+    noise_um (3,) standard uncertainty by noise.  tip_by_length (3, k) mm per mm.  lengths_mm (k,) bound of each length,
+    the scales first.  nan where one of them is.
+    """
+    scattered = 0.0
+    for axis in range(3):
+        scattered += (COVERAGE * noise_um[axis]) ** 2
+        for i in range(scales, len(lengths_mm)):
+            scattered += (UM_PER_MM * tip_by_length[axis, i] * lengths_mm[i]) ** 2
+    furthest = 0.0
+    for signs in range(1 << max(scales - 1, 0)):  # of the last scale one sign is enough
+        square = 0.0
+        for axis in range(3):
+            moved = 0.0
+            for i in range(scales):
+                sign = -1.0 if signs >> i & 1 else 1.0
+                moved += sign * tip_by_length[axis, i] * lengths_mm[i]
+            square += moved * moved
+        furthest = max(furthest, square) if not math.isnan(square) else math.nan
+    return float(UM_PER_MM * math.sqrt(furthest) + math.sqrt(scattered))

@@ -19,6 +19,9 @@ class MotionKeys(Keys):
         default=None, description="standard uncertainty of the speed; absent while it is not known"
     )
     horizon_s: float = Field(description="for so long after the reading the motion is taken to go on, s")
+    due_s: float | None = Field(
+        default=None, description="so long after the reading the next one is there at the latest, s"
+    )
 
 
 class ReadingKeys(Keys):
