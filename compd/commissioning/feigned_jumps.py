@@ -17,11 +17,11 @@ from compd.commissioning.pushed_periods import longest_period_s
 from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.lines import CARRIES
+from compd.configuration.stated_noise import tolerance_mm
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
 from compd.live.acquisition.polled_round import FASTEST_ROUND_S
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
-from compd.live.acquisition.reading_trust import tolerance_mm
 
 
 class FeignedJump(NamedTuple):

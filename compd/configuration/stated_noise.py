@@ -15,6 +15,17 @@ class StatedNoise(NamedTuple):
     source: str
 
 
+# Last digit of a display that stands still, mm, where no noise is stated.
+UNREST_MM = 0.001
+# Two readings of the same value differ by less than this many standard deviations of one: 6 sigma of a difference.
+_SIGMAS = 6 * math.sqrt(2)
+
+
+def tolerance_mm(noise_um: float | None) -> float:
+    """By how much two readings of the same value may differ, mm. noise_um : standard deviation of one, um."""
+    return UNREST_MM if noise_um is None or math.isnan(noise_um) else max(UNREST_MM, _SIGMAS * noise_um * 1e-3)
+
+
 NOT_STATED = StatedNoise(math.nan, "")
 
 

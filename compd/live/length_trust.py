@@ -7,9 +7,9 @@ from typing import Literal
 
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
-from compd.gauge import GaugeOptions
+from compd.configuration.stated_noise import tolerance_mm
 from compd.live.acquisition.possible_motion import MotionLimits
-from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.acquisition.votes.machine_view import WiredLength
 from compd.live.loop.wiring import MachineWires, Wire
 from compd.live.memory.trust_memory import TrustMemory
@@ -18,9 +18,7 @@ from compd.model.machine import MachineModel
 
 def length_memory(configuration: Configuration, wires: MachineWires) -> TrustMemory:
     """The memory for the length channels that are wired."""
-    gauges = configuration.gauges
-    channels = wires.length_channels
-    return TrustMemory(channels, [tolerance_mm(gauges[channel.split(".")[0]].noise_um) for channel in channels])
+    return TrustMemory(wires.length_channels, [tolerance_mm(wire.noise.um) for wire in wires.length_wires])
 
 
 def length_trust(configuration: Configuration, wires: MachineWires, memory: TrustMemory) -> dict[str, ReadingTrust]:
@@ -32,7 +30,7 @@ def length_trust(configuration: Configuration, wires: MachineWires, memory: Trus
 
 def wired_lengths(configuration: Configuration, wires: MachineWires, model: MachineModel) -> list[WiredLength]:
     """What each length channel measures, for the votes."""
-    wiring, gauges = configuration.wiring, configuration.gauges
+    wiring = configuration.wiring
     distance_mm = dict(zip(FRAME_DISTANCES, model.zero.distances_mm.tolist(), strict=True))
     unknown = math.nan
     parts: list[tuple[Literal["scale", "joint", "frame"], int, str, float]] = [
@@ -41,13 +39,9 @@ def wired_lengths(configuration: Configuration, wires: MachineWires, model: Mach
         *(("frame", 0, "", distance_mm[distance]) for distance in FRAME_DISTANCES),
     ]
     return [
-        WiredLength(kind, wire.meaning, wire.sign, link, role, length_mm, _noise_um(gauges[wire.channel.split(".")[0]]))
+        WiredLength(kind, wire.meaning, wire.sign, link, role, length_mm, wire.noise.um)
         for wire, (kind, link, role, length_mm) in zip(wires.length_wires, parts, strict=True)
     ]
-
-
-def _noise_um(options: GaugeOptions) -> float:
-    return math.nan if options.noise_um is None else options.noise_um
 
 
 def _settings(configuration: Configuration, wire: Wire) -> TrustSettings:

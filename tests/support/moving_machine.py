@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.configuration import Configuration, load
+from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
-from compd.live.acquisition.reading_trust import tolerance_mm
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleState
@@ -137,14 +137,14 @@ def lines_of(names: tuple[str, ...]) -> list[Line]:
     scales = [name for name in names if name.startswith("scale")]
     rest = [tuple(name for name in names if name.startswith(kind)) for kind in ("joint", "frame_u", "frame_t")]
     return [
-        *(Line((name,), 0.036 + 0.001 * k, 0.03, 0.004 * k) for k, name in enumerate(scales)),
+        *(Line((name,), 0.020 + 0.001 * k, 0.017, 0.004 * k) for k, name in enumerate(scales)),
         Line(rest[0], 0.040, 0.035, 0.003),
         Line(rest[1], 0.015, 0.010, 0.005),
         Line(rest[2], 0.025, 0.005, 0.007),
     ]
 
 
-def configured(name: str, tip_error_um: float | None | str = "shipped", **loop) -> Configuration:
+def configured(name: str, tip_error_um: float | str | None = "shipped", **loop) -> Configuration:
     """A shipped machine; its limit of the tip's error may be another one, or none."""
     configuration = load(CONFIG / name)
     limits = configuration.limits

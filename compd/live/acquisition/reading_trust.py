@@ -32,10 +32,6 @@ from compd.live.acquisition.possible_motion import (
 from compd.live.acquisition.witnesses import moved_while_away, stood_still
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
-# Last digit of a display that stands still, mm, where no noise is declared.
-UNREST_MM = 0.001
-# Two readings of the same value differ by less than this many standard deviations of one: 6 sigma of a difference.
-_SIGMAS = 6 * math.sqrt(2)
 # A gauge that was not asked for longer, s, may have been switched off: it was away.
 LONGEST_OWN_GAP_S = 10.0
 # After a silence, s, until the others have been read that have begun to move at the same time.
@@ -50,11 +46,6 @@ _AGREEMENT = 0.2
 _SPEED_RATIO = 5.0
 # How much of the acceleration that is there already is no surprise.
 _ACCELERATION_MARGIN = 2.0
-
-
-def tolerance_mm(noise_um: float | None) -> float:
-    """By how much two readings of the same value may differ, mm. noise_um : standard deviation of one, um."""
-    return UNREST_MM if noise_um is None else max(UNREST_MM, _SIGMAS * noise_um * 1e-3)
 
 
 @dataclass(frozen=True)

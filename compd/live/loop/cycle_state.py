@@ -49,7 +49,8 @@ class CycleState(NamedTuple):
     scales_seen : whether the scales have ever been good. Scales that are lost afterwards are `stop`, not `starting`.
     shadow_memory : memory of the shadow model's effects.
     adopting : whether the correction is still slewing towards that of a newly adopted model.
-    tip_noise_um : (3), standard uncertainty of the tip along x, y, z by noise; None where that has not been computed.
+    tip_noise_um : as `TipUncertainty.by_noise_um`; None where that has not been computed. In recordings of releases up
+        to 0.2.0 (3), without the radius.
     tip_correction_mm : (n), the correction with which the last tip of CMM mode was computed; None where the last
         setpoint was invalid or in the other mode.
     zero_vectors : the readings of `zero`; None where they have yet to be read from it.

@@ -2,11 +2,9 @@
 
 It has three parts, which are added (GUM, JCGM 100:2008, F.2.4.5, for what is known and not corrected):
 
-- Noise of the gauges and errors of the fitted numbers: their standard uncertainties along x, y and z
-  (`compd.live.loop.tip_uncertainty`) give that of the distance, u = sqrt(u_x^2 + u_y^2 + u_z^2), which is multiplied by
-  the coverage factor 1.96. Of all normal distributions with this u, the one along a line has the largest 95 % quantile:
-  1.96 u (G. J. Székely, N. K. Bakirov, Probab. Theory Relat. Fields 126 (2003) 184-202). With equal parts in all three
-  directions it is 1.61 u, so that the bound is at most 1.21 times the quantile.
+- Noise of the gauges and errors of the fitted numbers: the radius of the sphere in which the tip is with 95 %, by its
+  covariance (`compd.live.loop.tip_uncertainty`). The coverage factor of the distance's standard uncertainty is 1.61 for
+  an even scatter, and 1.96 for one along a line.
 - Age: how far each length may have gone since it was read (`compd.live.loop.wired_readings`), which holds the skew.
   Links move together, so the scales count with the signs that displace the tip most. What joints and frame may do
   they do each by itself: they count as independent, beside the noise.
@@ -29,7 +27,7 @@ from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleSettings
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators
 from compd.live.loop.tip_uncertainty import TipUncertainty
-from compd.live.loop.wired_readings import COVERAGE, tip_bound_um
+from compd.live.loop.wired_readings import tip_bound_um
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.units import UM_PER_MM
@@ -74,7 +72,7 @@ def tip_bound(
     lengths_mm = length_bounds_mm(snapshot, usable, wanted.nominal_scale_mm, settings)
     if target is not None:
         lengths_mm[:links] = 0.0  # the tip is where the target is
-    um = tip_bound_um(by_noise_um, tip_by_gauge, lengths_mm, links)
+    um = tip_bound_um(float(by_noise_um[-1]), tip_by_gauge, lengths_mm, links)
     absent_um = 0.0
     if (absent_mm := _absent_link_mm(wanted, reached_mm, usable.weight)) is not None:
         absent_um += UM_PER_MM * _norm(tip_by_gauge[:, :links] @ absent_mm)
@@ -174,7 +172,7 @@ def _largest_part(bound: TipBound, snapshot: Snapshot, usable: UsableComparators
     assert bound.u.by_noise_um is not None, "and the noise"
     parts_um = UM_PER_MM * np.sqrt((by_length**2).sum(axis=0)) * bound.lengths_mm
     k = int(np.argmax(parts_um))
-    noise_um = COVERAGE * float(np.linalg.norm(bound.u.by_noise_um))
+    noise_um = float(bound.u.by_noise_um[-1])
     if bound.absent_um >= max(noise_um, float(parts_um[k])):
         return f"what is not corrected, {bound.absent_um:.4g} um"
     if noise_um >= parts_um[k]:

@@ -36,16 +36,35 @@ def stated_noise(configuration: Configuration, wires: MachineWires, readings: in
     )
 
 
+# 95 % quantile of chi-squared over its degrees of freedom, 1, 2 and 3: in between it is below the straight line.
+_CHI_SQUARED_95 = (3.8415, 2.9957, 2.6049)
+
+
 class TipUncertainty(NamedTuple):
     """Of one place of the tip.
 
-    by_noise_um : (3), standard uncertainty along x, y, z of {M}, um; nan where a fitted number's error or the noise of
-        a needed quantity is not known. None where the noise of a gauge is not known.
+    by_noise_um : (4), standard uncertainty along x, y, z of {M}, um, and the radius of the sphere about the tip in
+        which it is with 95 %; nan where a fitted number's error or the noise of a needed quantity is not known. None
+        where the noise of a gauge is not known.
     tip_by_gauge : (3, n + k + 9), by how much a length moves the tip, mm per mm: scales, joints, frame.
     """
 
     by_noise_um: FloatArray | None
     tip_by_gauge: FloatArray | None
+
+
+def radius_95(covariance: FloatArray) -> float:
+    """Radius of the sphere that holds 95 % of a normal distribution with this covariance (3, 3); nan with nan in it.
+
+    The square of the distance is taken for a multiple of a chi-squared variable with the same mean and variance, whose
+    degrees of freedom are 1 for a scatter along a line, 3 for an even one (F. E. Satterthwaite, Biometrics Bulletin 2
+    (1946) 110-114; so does GUM G.4).
+    """
+    mean = float(np.trace(covariance))
+    if not mean > 0.0:
+        return mean
+    freedom = mean * mean / float((covariance * covariance).sum())
+    return math.sqrt(mean * float(np.interp(freedom, (1.0, 2.0, 3.0), _CHI_SQUARED_95)))
 
 
 def tip_uncertainty(
@@ -69,6 +88,9 @@ def tip_uncertainty(
     )
     by_gauge_mm = derivatives.by_gauge * np.concatenate([noise.scale_mm, noise.joint_mm, noise.frame_mm])
     variance = (by_gauge_mm * by_gauge_mm).sum(axis=1) + (derivatives.by_quantity**2).sum(axis=1)
+    covariance = by_gauge_mm @ by_gauge_mm.T + derivatives.by_quantity @ derivatives.by_quantity.T
     if machine.live_effects:
         variance += parameter_variance(derivatives.by_theta[None], machine.live_covariance)[0]
-    return TipUncertainty(np.sqrt(np.maximum(variance, 0.0)) * UM_PER_MM, np.ascontiguousarray(derivatives.by_gauge))
+        covariance += derivatives.by_theta @ machine.live_covariance @ derivatives.by_theta.T
+    by_noise_um = np.append(np.sqrt(np.maximum(variance, 0.0)), radius_95(covariance)) * UM_PER_MM
+    return TipUncertainty(by_noise_um, np.ascontiguousarray(derivatives.by_gauge))

@@ -29,21 +29,29 @@ COVERAGE = 1.96
 # Links move at speeds of one size, but near a singular pose: of two, one is up to so many times as fast as the other.
 LINK_SPEED_RATIO = 10.0
 
+# The next reading is due after so many rounds (`compd.live.acquisition.motion_estimate`).
+ROUNDS_UNTIL_DUE = 2.5
+
 # Arrays that may be in memory that cannot be written to, such as those of a recording.
 _READ_NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 _READ_ROWS = types.Array(types.float64, 2, "C", readonly=True)
 
 
 @helper
-def _extrapolated(slot: Any, now_s: float) -> float:
-    """The value of a length (mm) at the monotonic time `now_s` (s)."""
+def _carried(slot: Any, age_s: float) -> float:
+    """By how much (mm) a length is carried on to `age_s` (s) after its reading."""
     speed = slot.speed_mm_per_s
-    if math.isnan(slot.horizon_s) or speed == 0.0:
-        return float(slot.value)
-    age_s = now_s - slot.time_s
     carried_s = age_s if age_s < slot.horizon_s else slot.horizon_s
     braking = slot.braking_mm_per_s2 if speed > 0.0 else -slot.braking_mm_per_s2
-    return float(slot.value + (speed - 0.5 * braking * carried_s) * carried_s)
+    return float((speed - 0.5 * braking * carried_s) * carried_s)
+
+
+@helper
+def _extrapolated(slot: Any, now_s: float) -> float:
+    """The value of a length (mm) at the monotonic time `now_s` (s)."""
+    if math.isnan(slot.horizon_s) or slot.speed_mm_per_s == 0.0:
+        return float(slot.value)
+    return float(slot.value + _carried(slot, now_s - slot.time_s))
 
 
 @loop([SLOTS, INDICES, NUMBERS, NUMBERS, NUMBERS, SCALAR, FLAG, NUMBERS])
@@ -88,35 +96,62 @@ def speed_bounds_mm_per_s(slots: NDArray[Any], wired: IntArray, speeds: FloatArr
 
 
 @helper
+def _shows_motion(slot: Any, tolerance_mm: float) -> bool:
+    """Whether a length moves by more than its readings scatter from one round to the next."""
+    return bool(_speed_bound(slot) * slot.due_s > ROUNDS_UNTIL_DUE * tolerance_mm)
+
+
+@helper
+def _unseen_speed(slot: Any, acceleration: float) -> float:
+    """How much faster (mm/s) a length may be than its readings show: as if it had begun to accelerate in the window."""
+    if slot.u_mm_per_s == 0.0:
+        return 0.0
+    return math.sqrt(2.0 * acceleration * slot.u_mm_per_s * slot.window_s)
+
+
+@helper
+def _machine_speed(
+    slots: NDArray[Any], wired: IntArray, scales: int, now_s: float, acceleration: FloatArray, tolerance_mm: FloatArray
+) -> float:
+    """How fast (mm/s) the links move at most by the scales that answer: 0 where all stand, inf where none answers."""
+    speed = -1.0
+    for i in range(scales):
+        slot = slots[wired[i]]
+        if slot.quality != OK_NUMBER or now_s - slot.time_s > slot.due_s:
+            continue
+        speed = max(speed, 0.0)
+        if _shows_motion(slot, tolerance_mm[i]):
+            speed = max(speed, _speed_bound(slot) + _unseen_speed(slot, acceleration[i]))
+    return math.inf if speed < 0.0 else speed
+
+
+@helper
 def _age_bound(
     slot: Any,
     age_s: float,
     extrapolate: bool,
     fastest: float,
     acceleration: float,
+    tolerance_mm: float,
     machine_mm_per_s: float,
 ) -> float:
     """By how much a length (mm) may have left the place to which it is carried on; see `age_bounds_mm`."""
-    if math.isnan(slot.horizon_s):
-        return 0.0
     if math.isnan(slot.u_mm_per_s):
         return math.nan
-    speed = abs(slot.speed_mm_per_s)
-    later = SAMPLED_LATER_S * speed
     if age_s <= 0.0:
-        return later
-    # the speed was measured in the middle of the last round
-    changed = 0.5 * acceleration * age_s * (age_s + 0.5 * slot.due_s)
-    if age_s > slot.due_s:
-        changed = min(changed, machine_mm_per_s * age_s) + COVERAGE * slot.u_mm_per_s * age_s
-    else:
-        changed = min(changed, _speed_bound(slot) * age_s)
-    carried_s = min(age_s, slot.horizon_s) if extrapolate else 0.0
-    bound = speed * (age_s - carried_s) + changed
-    return float(min(bound, (fastest + speed) * age_s) + later)
+        return 0.0
+    carried_mm = _carried(slot, age_s) if extrapolate else 0.0
+    # by the limit of acceleration: the mean speed was that of the middle of its window
+    by_limit = abs(slot.mean_mm_per_s * age_s - carried_mm) + 0.5 * acceleration * age_s * (age_s + slot.window_s)
+    by_limit = min(by_limit, fastest * age_s + abs(carried_mm))
+    # by what the machine does
+    speed = _speed_bound(slot) + machine_mm_per_s
+    if _shows_motion(slot, tolerance_mm):
+        speed += _unseen_speed(slot, acceleration)
+    return float(min(by_limit, speed * age_s) + SAMPLED_LATER_S * abs(slot.speed_mm_per_s))
 
 
-@loop([SLOTS, INDICES, COUNT, SCALAR, FLAG, NUMBERS, NUMBERS, SCALAR, NUMBERS])
+@loop([SLOTS, INDICES, COUNT, SCALAR, FLAG, NUMBERS, NUMBERS, NUMBERS, SCALAR, NUMBERS])
 def age_bounds_mm(
     slots: NDArray[Any],
     wired: IntArray,
@@ -125,46 +160,44 @@ def age_bounds_mm(
     extrapolate: bool,
     fastest: FloatArray,
     acceleration: FloatArray,
+    tolerance_mm: FloatArray,
     largest_mm: float,
     bounds_mm: FloatArray,
 ) -> float:
     """Fill in by how much each length (k,) in mm may be wrong by the age of its reading, and return how fast (mm/s) the
-    machine moves by those of the first `scales` of them that answer; inf where none does.
+    links move by those of the first `scales` of them that answer; inf where none does.
 
     Since its reading a length has changed its speed by no more than `acceleration` (k,) allows, in mm/s2, nor has it
-    been faster than `fastest` (k,), mm/s. Until its next reading is due, its speed has changed by no more than its own
-    size, as that of a part which brakes, or starts as fast as it goes: one at rest is taken to rest so long. A gauge
-    whose reading was due is silent, and what it measures may have started. It is then no faster than the machine: a
-    scale at most LINK_SPEED_RATIO times as fast as the fastest other one, joints and frame no faster than the links.
+    been faster than `fastest` (k,), mm/s. Nor has a scale been more than LINK_SPEED_RATIO times as fast as the fastest
+    scale, nor joints and frame faster than the links: while all scales that answer stand, all stands. So a machine at
+    rest is taken to rest until the next reading of its scales is due, and one whose scales are silent is not.
 
     nan where it is not known how a length moves, inf where nothing limits it; 0 for a reading without motion.
     extrapolate : whether readings are carried on, and not used as they were read.
+    tolerance_mm : (k,) by which two readings of the same value may differ.
     largest_mm : of lengths that are no scales, none is further off.
     """
-    machine = -1.0
-    for i in range(scales):
-        slot = slots[wired[i]]
-        if slot.quality == OK_NUMBER and not now_s - slot.time_s > slot.due_s:
-            machine = max(machine, 0.0 if math.isnan(slot.horizon_s) else _speed_bound(slot))
-    if machine < 0.0:
-        machine = math.inf
+    machine = _machine_speed(slots, wired, scales, now_s, acceleration, tolerance_mm)
     for i in range(len(wired)):
-        slot, ratio = slots[wired[i]], LINK_SPEED_RATIO if i < scales else 1.0
-        bound = _age_bound(slot, now_s - slot.time_s, extrapolate, fastest[i], acceleration[i], ratio * machine)
+        slot = slots[wired[i]]
+        if math.isnan(slot.horizon_s):
+            bounds_mm[i] = 0.0
+            continue
+        links = LINK_SPEED_RATIO * machine if i < scales else machine
+        bound = _age_bound(slot, now_s - slot.time_s, extrapolate, fastest[i], acceleration[i], tolerance_mm[i], links)
         bounds_mm[i] = bound if i < scales or math.isnan(bound) else min(bound, largest_mm)
     return machine
 
 
-@loop([_READ_NUMBERS, _READ_ROWS, _READ_NUMBERS, COUNT])
-def tip_bound_um(noise_um: FloatArray, tip_by_length: FloatArray, lengths_mm: FloatArray, scales: int) -> float:
+@loop([SCALAR, _READ_ROWS, _READ_NUMBERS, COUNT])
+def tip_bound_um(noise_um: float, tip_by_length: FloatArray, lengths_mm: FloatArray, scales: int) -> float:
     """How far the tip may be from where it is said to be, um: see `compd.live.loop.tip_bound`.
 
-    noise_um (3,) standard uncertainty by noise.  tip_by_length (3, k) mm per mm.  lengths_mm (k,) bound of each length,
+    noise_um : radius of 95 % by noise, um.  tip_by_length (3, k) mm per mm.  lengths_mm (k,) bound of each length,
     the scales first.  nan where one of them is.
     """
-    scattered = 0.0
+    scattered = noise_um * noise_um
     for axis in range(3):
-        scattered += (COVERAGE * noise_um[axis]) ** 2
         for i in range(scales, len(lengths_mm)):
             scattered += (UM_PER_MM * tip_by_length[axis, i] * lengths_mm[i]) ** 2
     furthest = 0.0

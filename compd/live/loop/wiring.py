@@ -12,7 +12,7 @@ from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
-from compd.configuration.stated_noise import NOT_STATED, StatedNoise
+from compd.configuration.stated_noise import NOT_STATED, StatedNoise, tolerance_mm
 from compd.gauge import Quality, Reading
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.reasons import GaugeFault, Lost, lost
@@ -65,6 +65,7 @@ class Wires:
         self._stale_after_s = np.array([wire.stale_after_s for wire in wires], dtype=float)
         self._sign = np.array([wire.sign for wire in wires], dtype=float)
         self._fastest = np.array([wire.fastest_mm_per_s for wire in wires], dtype=float)
+        self._tolerance_mm = np.array([tolerance_mm(wire.noise.um) for wire in wires], dtype=float)
         self.acceleration_mm_per_s2 = np.array([wire.acceleration_mm_per_s2 for wire in wires], dtype=float)
 
     def zero_vector(self, zero: MachineZero) -> FloatArray:
@@ -111,6 +112,7 @@ class Wires:
             extrapolate,
             self._fastest,
             self.acceleration_mm_per_s2,
+            self._tolerance_mm,
             largest_mm,
             bounds_mm,
         )

@@ -1,8 +1,8 @@
-"""Readings as they are in shared memory, one slot of 232 bytes per channel:
+"""Readings as they are in shared memory, one slot of 248 bytes per channel:
 
 value      8 bytes, float64, in the channel's unit; nan where there is none
 time_s     8 bytes, float64, monotonic
-motion     40 bytes, five float64, a `ReadingMotion`; nan where there is none
+motion     56 bytes, seven float64, a `ReadingMotion`; nan where there is none
 quality    1 byte, number of the Quality
 length     1 byte, of the detail
 (unused)   2 bytes
@@ -26,15 +26,15 @@ from numpy.typing import NDArray
 from compd.gauge import Quality, Reading, ReadingMotion
 from compd.model.kernels.jit import INDICES, helper, loop
 
-_SLOT = struct.Struct("=dddddddBBxxI168s")
-_HEAD = struct.Struct("=dddddddBBxxI")
-_CHECKED = struct.Struct("=dddddddBBxx")
+_SLOT = struct.Struct("=9dBBxxI168s")
+_HEAD = struct.Struct("=9dBBxxI")
+_CHECKED = struct.Struct("=9dBBxx")
 _CHECKED_BYTES = _CHECKED.size
-_LENGTH_PLACE = 57
+_LENGTH_PLACE = 73
 _HEAD_BYTES = _HEAD.size
 SLOT_BYTES = _SLOT.size
 LONGEST_DETAIL = SLOT_BYTES - _HEAD_BYTES
-_NO_MOTION = (math.nan,) * 5
+_NO_MOTION = (math.nan,) * 7
 
 _QUALITIES = tuple(Quality)
 _NUMBERS = {quality: number for number, quality in enumerate(_QUALITIES)}
@@ -49,6 +49,8 @@ SLOT = np.dtype(
         ("braking_mm_per_s2", np.float64),
         ("u_mm_per_s", np.float64),
         ("horizon_s", np.float64),
+        ("mean_mm_per_s", np.float64),
+        ("window_s", np.float64),
         ("due_s", np.float64),
         ("quality", np.uint8),
         ("length", np.uint8),
@@ -66,13 +68,13 @@ _VERSIONS = types.uint64[::1]
 def pack(reading: Reading) -> bytes:
     """A reading as the content of a slot; a longer detail is cut off."""
     value, time_s, quality, detail, motion = reading
-    speed, braking, u, horizon_s, due_s = motion or _NO_MOTION
+    moves = motion or _NO_MOTION
     text = b""
     if detail:
         text = detail.encode(errors="replace")[:LONGEST_DETAIL].decode(errors="ignore").encode()
-    head = _CHECKED.pack(value, time_s, speed, braking, u, horizon_s, due_s, _NUMBERS[quality], len(text))
+    head = _CHECKED.pack(value, time_s, *moves, _NUMBERS[quality], len(text))
     checksum = zlib.crc32(text, zlib.crc32(head))
-    return _SLOT.pack(value, time_s, speed, braking, u, horizon_s, due_s, _NUMBERS[quality], len(text), checksum, text)
+    return _SLOT.pack(value, time_s, *moves, _NUMBERS[quality], len(text), checksum, text)
 
 
 def _crc_table() -> NDArray[np.int64]:

@@ -182,7 +182,8 @@ def _former_step(state: CycleState, inputs: CycleInputs, settings: CycleSettings
     setpoint, after = step(state, inputs, settings)
     if setpoint.values is None:
         return setpoint
-    return setpoint._replace(values=setpoint.values._replace(u_tip_um=after.tip_noise_um))
+    former_um = None if after.tip_noise_um is None else after.tip_noise_um[:3]
+    return setpoint._replace(values=setpoint.values._replace(u_tip_um=former_um))
 
 
 def _recorded_cycle(where: str, message: Message, channels: Sequence[str], links: int) -> RecordedCycle:

@@ -13,9 +13,9 @@ from compd.commissioning.cycle_time import CycleTime, cycle_warnings, measure_cy
 from compd.commissioning.feigned_jumps import feigned_jumps, jump_warnings, named_together, reply_warnings
 from compd.commissioning.line_budget import line_budgets
 from compd.configuration import Configuration, load
+from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Gauge
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
-from compd.live.acquisition.reading_trust import tolerance_mm
 from tests.support.command import run_in_process
 from tests.support.live_models import file_with
 from tests.support.paths import CONFIG
