@@ -169,7 +169,7 @@ def _stuck_comparator(figures: Figures) -> str:
     silent = [
         gauge
         for gauge in dict.fromkeys(d.gauge for d in figures.drifts if not d.length.startswith("scale"))
-        if figures.configuration.gauges[gauge].noise_um is None
+        if math.isnan(figures.configuration.noise_of(gauge).um)
     ]
     without = f"; no `noise_um`, so nobody can tell: {', '.join(silent)}" if silent else ""
     return f"a joint that moves by {DRIFT_UM:g} um unseen: {figures.largest_um('joint'):.1f} um{without}"

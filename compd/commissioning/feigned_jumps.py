@@ -49,6 +49,7 @@ def feigned_jumps(configuration: Configuration, budgets: Sequence[LineBudget]) -
             measures[gauge],
             poll_s.get(options.line, longest_period_s(configuration.lines[options.line], gauges[gauge])),
             options,
+            configuration.noise_of(gauge).um,
         )
         for gauge, options in configuration.gauges.items()
         if gauge in measures
@@ -158,9 +159,9 @@ def _poll_s(budget: LineBudget) -> float:
     return max(budget.usual_s, budget.line.poll_every_s, FASTEST_ROUND_S) if budget.known else math.nan
 
 
-def _jump(gauge: str, measures: tuple[str, ...], poll_s: float, options: GaugeOptions) -> FeignedJump:
+def _jump(gauge: str, measures: tuple[str, ...], poll_s: float, options: GaugeOptions, noise_um: float) -> FeignedJump:
     speed, acceleration = options.fastest_mm_per_s or math.inf, options.acceleration_mm_per_s2 or math.inf
     limits = MotionLimits(speed, acceleration)
     unlimited = math.isinf(speed) and math.isinf(acceleration)
-    jump_mm = math.inf if unlimited else unseen_jump_mm(limits, poll_s, tolerance_mm(options.noise_um))
+    jump_mm = math.inf if unlimited else unseen_jump_mm(limits, poll_s, tolerance_mm(noise_um))
     return FeignedJump(gauge, measures, poll_s, jump_mm)

@@ -1,6 +1,6 @@
-"""A configured machine on the move, on an injected clock: its gauges are polled, and its setpoints compared with the truth.
+"""A configured machine on the move, on an injected clock: its gauges are polled, its setpoints compared with the truth.
 
-The simulated machine stands, drives from place to place and stands again. What its gauges would show and where its tip is
+The simulated machine stands, drives to another place and stands again. What its gauges would show and where its tip is
 are kept on a fine grid; polls take samples of it when a line would, with noise and the last digit of its gauges.
 """
 
@@ -32,14 +32,12 @@ from compd.simulation.truth.world import World
 from tests.support.paths import CONFIG
 
 GRID_S = 1e-3
-PERIOD_S = 5e-3
-REST_S = 1.5  # so long the machine stands before it drives, and at each place
+PERIOD_S = 0.01
+BEGIN_S, DEPARTS_S, END_S = 0.7, 1.5, 2.7  # of the run, and when the machine departs; it has arrived after 2.1 s
 # Drives of the links, mm since machine zero: the tip goes at up to 140 mm/s.
 _NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)
-DRIVES = {
-    3: ((20.0, -14.0, 6.0), (2.0, 9.0, -12.0)),
-    6: ((14.0, -11.0, 6.0, 15.0, -7.0, 4.0), (3.0, 2.0, -5.0, 2.0, 3.0, -4.0)),
-}
+# Where the links drive, mm since machine zero: the tip goes at up to 130 mm/s.
+PLACES_MM = {3: (20.0, -14.0, 6.0), 6: (14.0, -11.0, 6.0, 15.0, -7.0, 4.0)}
 NOISE_MM, DIGIT_MM = {"scale": 5e-6, "joint": 2e-5, "frame": 2e-5}, {"scale": 1e-4, "joint": 1e-4, "frame": 1e-5}
 ROOM_DEGC = 20.0
 TIMEOUT_S = 0.15  # of the scales' lines
@@ -110,25 +108,20 @@ def names_of(configuration: Configuration) -> tuple[str, ...]:
 
 @cache
 def track(name: str) -> Track:
-    """Stand, drive twice, stand. All links arrive at once, the one with the longest way at SPEED_MM_PER_S."""
+    """Stand, drive, stand. All links arrive at once, the one with the longest way at the usual speed of the simulation."""
     configuration = load(CONFIG / name)
     world = World(configuration.geometry, configuration.wiring, 3, strengths=FULLY_MEASURED_WITHOUT_NOISE)
-    names, start_mm = names_of(configuration), np.zeros(len(configuration.wiring.scale))
-    parts = []
-    for place_mm in DRIVES[len(start_mm)]:
-        way_mm, states = np.array(place_mm) - start_mm, []
-        for share in _NODES:
-            world.advance_to(start_mm + share * way_mm, world.posture, 1e-3, 1e-3)
-            states.append([*(world.sense(gauge) for gauge in names), *world.tip_M_mm()])
-        by_share = np.polynomial.Polynomial.fit
-        fitted = [by_share(_NODES, column, len(_NODES) - 1) for column in np.array(states).T]
-        driven = Move(np.zeros(1), np.array([np.abs(way_mm).max()]))
-        times_s = np.arange(0.0, REST_S, GRID_S)
-        shares = np.array([float(driven.position_mm(time_s)[0]) for time_s in times_s]) / np.abs(way_mm).max()
-        parts.append(np.array([column(shares) for column in fitted]).T)
-        start_mm = np.array(place_mm)
-    still = np.repeat(parts[0][:1], round(REST_S / GRID_S), axis=0)
-    rows = np.vstack([still, *parts])
+    names, states = names_of(configuration), []
+    way_mm = np.array(PLACES_MM[len(configuration.wiring.scale)])
+    for share in _NODES:
+        world.advance_to(share * way_mm, world.posture, 1e-3, 1e-3)
+        states.append([*(world.sense(gauge) for gauge in names), *world.tip_M_mm()])
+    by_share = [np.polynomial.Polynomial.fit(_NODES, column, len(_NODES) - 1) for column in np.array(states).T]
+    longest_mm = float(np.abs(way_mm).max())
+    driven = Move(np.zeros(1), np.array([longest_mm]))
+    times_s = np.arange(0.0, END_S + 2 * GRID_S, GRID_S) - DEPARTS_S
+    shares = np.array([float(driven.position_mm(max(time_s, 0.0))[0]) for time_s in times_s]) / longest_mm
+    rows = np.array([column(shares) for column in by_share]).T
     return Track(rows[:, : len(names)], rows[:, len(names) :])
 
 
@@ -137,10 +130,10 @@ def lines_of(names: tuple[str, ...]) -> list[Line]:
     scales = [name for name in names if name.startswith("scale")]
     rest = [tuple(name for name in names if name.startswith(kind)) for kind in ("joint", "frame_u", "frame_t")]
     return [
-        *(Line((name,), 0.020 + 0.001 * k, 0.017, 0.004 * k) for k, name in enumerate(scales)),
-        Line(rest[0], 0.040, 0.035, 0.003),
-        Line(rest[1], 0.015, 0.010, 0.005),
-        Line(rest[2], 0.025, 0.005, 0.007),
+        *(Line((name,), 0.020 + 0.001 * k, 0.017, BEGIN_S + 0.004 * k) for k, name in enumerate(scales)),
+        Line(rest[0], 0.040, 0.035, BEGIN_S + 0.003),
+        Line(rest[1], 0.015, 0.010, BEGIN_S + 0.005),
+        Line(rest[2], 0.025, 0.005, BEGIN_S + 0.007),
     ]
 
 
@@ -150,7 +143,9 @@ def configured(name: str, tip_error_um: float | str | None = "shipped", **loop) 
     limits = configuration.limits
     if tip_error_um != "shipped":
         limits = limits.model_copy(update={"tip_error_um": tip_error_um})
-    return replace(configuration, limits=limits, loop=configuration.loop.model_copy(update=loop))
+    return replace(
+        configuration, limits=limits, loop=configuration.loop.model_copy(update={"rate_hz": 1 / PERIOD_S, **loop})
+    )
 
 
 class _Lines:
@@ -190,12 +185,10 @@ class _Lines:
             return
         begun = []
         for start_s, line in self._next:
-            while start_s <= now_s:
-                if stalled[0] <= start_s < stalled[1]:
-                    start_s = stalled[1]
-                    continue
-                start_s = self._poll(start_s, line)
-            begun.append((start_s, line))
+            next_s = start_s
+            while next_s <= now_s:
+                next_s = stalled[1] if stalled[0] <= next_s < stalled[1] else self._poll(next_s, line)
+            begun.append((next_s, line))
         self._next = begun
         for there_s, stamp_s, line, values in sorted(self._coming, key=lambda coming: coming[0]):
             if there_s <= now_s:
@@ -220,17 +213,14 @@ class _Lines:
 
 
 def told(configuration: Configuration, fault: Fault = NONE, target: Target | None = None, seed: int = 1) -> list[Told]:
-    """Every setpoint of the run, in mode cmm unless there is a target.
-
-    The run begins at rest, drives from REST_S on, and again after 2 REST_S.
-    """
+    """Every setpoint from BEGIN_S to END_S, in mode cmm unless there is a target."""
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
     lines = _Lines(configuration, pipeline, 0.2, fault, seed)
-    lengths = set(pipeline.latest.index[channel] for channel in pipeline.wires.length_channels)
+    lengths = {pipeline.latest.index[channel] for channel in pipeline.wires.length_channels}
     zero = MachineZero(configuration.zero_hash, "2026-01-01T00:00:00+00:00", lines.zero_mm)
     state, truth, setpoints = CycleState.at_start(pipeline.settings.model), track(configuration.path.name), []
-    for tick in range(round(3 * REST_S / PERIOD_S) - 1):
-        now_s = tick * PERIOD_S
+    for tick in range(round((END_S - BEGIN_S) / PERIOD_S)):
+        now_s = BEGIN_S + tick * PERIOD_S
         lines.go_on(now_s)
         readings = [
             reading if slot in lengths else good(ROOM_DEGC, now_s) for slot, reading in enumerate(lines.readings)

@@ -44,7 +44,10 @@ def test_the_shipped_machines_have_limits_and_no_warnings(name: str) -> None:
 def test_a_jump_is_believed_up_to_acceleration_and_noise(tmp_path: Path) -> None:
     configuration = changed(
         tmp_path,
-        ("heads: 9\n    acceleration_mm_per_s2: 20", "heads: 9\n    acceleration_mm_per_s2: 10\n    noise_um: 0.5"),
+        (
+            "noise_um: 0.035\n    heads: 9\n    acceleration_mm_per_s2: 20",
+            "noise_um: 0.5\n    heads: 9\n    acceleration_mm_per_s2: 10",
+        ),
     )
     budgets = line_budgets(configuration)
     poll_s = next(budget.usual_s for budget in budgets if budget.name == "joints")
