@@ -59,6 +59,7 @@ from compd.reading import LineFault, Quality, Reading, ReadingMotion, bad, good
 __all__ = [
     "ByteLine",
     "Channel",
+    "DataSheetNoise",
     "Gauge",
     "GaugeOptions",
     "LineFault",
@@ -204,7 +205,8 @@ class GaugeOptions(BaseModel):
         default=None,
         gt=0,
         allow_inf_nan=False,
-        description="standard deviation of one reading of a length, um; without it the tip's uncertainty is unknown",
+        description="standard deviation of one reading of a length, um, its last digit included; left out: the data "
+        "sheet's, where the driver has it; where neither is known, nor is the bound of the tip's error",
     )
     fastest_mm_per_s: float | None = Field(
         default=None,
@@ -232,6 +234,17 @@ class GaugeOptions(BaseModel):
 
 LineT = TypeVar("LineT")
 LineKind = Literal["bytes", "registers", "nodes", "topics"]
+
+
+class DataSheetNoise(NamedTuple):
+    """What the data sheet of a device says of its scatter.
+
+    um : standard deviation of one reading of a length, um, its last digit included: a digit of d gives d / sqrt(12)
+        (GUM F.2.2.1). source : data sheet and page, and how the figure follows from it.
+    """
+
+    um: float
+    source: str
 
 
 class OptionDoubt(NamedTuple):
@@ -294,6 +307,11 @@ class Gauge(ABC, Generic[LineT]):
         Returns one reading per channel, in their order, each with its own time and quality.
         Raises LineFault where the poll as a whole failed. Any other exception is reported as a defect of the driver.
         """
+
+    @property
+    def noise(self) -> DataSheetNoise | None:
+        """Of its lengths, by the data sheet; `noise_um` in the configuration overrides it. None: nothing is known."""
+        return None
 
     def doubts(self) -> Iterable[OptionDoubt]:
         """What of its options is probably a slip: `compd check` warns of it."""

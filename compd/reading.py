@@ -45,6 +45,9 @@ class ReadingMotion(NamedTuple):
     braking_mm_per_s2 : by how much its size falls, mm/s2; 0 where it does not brake.
     u_mm_per_s : standard uncertainty of the speed, mm/s; nan where there are not enough readings yet.
     horizon_s : for so long after a reading, s, the motion may be taken to go on.
+    mean_mm_per_s : mean speed over the last `window_s`, as the readings show it, mm/s; 0 where none is known.
+    window_s : how long before the reading the first one is that counts for `mean_mm_per_s`, s.
+    due_s : so long after a reading, s, the next one is there at the latest, unless the gauge is silent.
     scatter_mm : standard deviation of one reading at rest, as the last ones show it, mm; nan before it is known.
     """
 
@@ -52,6 +55,9 @@ class ReadingMotion(NamedTuple):
     braking_mm_per_s2: float
     u_mm_per_s: float
     horizon_s: float
+    mean_mm_per_s: float = 0.0
+    window_s: float = 0.0
+    due_s: float = 0.0
     scatter_mm: float = math.nan
 
 

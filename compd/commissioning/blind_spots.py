@@ -22,10 +22,10 @@ from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.errors import KinematicsError
-from compd.live.acquisition.votes.measured_scatter import RATIO
-from compd.live.quantity_limits import UNIT_LIMITS
 from compd.live.acquisition.reading_trust import LEAST_MOTION, tolerance_mm
+from compd.live.acquisition.votes.measured_scatter import RATIO
 from compd.live.acquisition.way_evidence import LEAST_WAY_MM, WAY_SHARE
+from compd.live.quantity_limits import UNIT_LIMITS
 from compd.machine_builder import build_model
 from compd.model.machine import MachineModel
 from compd.model.tool import ToolOnPlate
@@ -178,7 +178,7 @@ def _stuck_comparator(figures: Figures) -> str:
     silent = [
         gauge
         for gauge in dict.fromkeys(d.gauge for d in figures.drifts if not d.length.startswith("scale"))
-        if figures.configuration.gauges[gauge].noise_um is None
+        if math.isnan(figures.configuration.noise_of(gauge).um)
     ]
     without = f"; no `noise_um`, so nobody can tell: {', '.join(silent)}" if silent else ""
     return f"a joint that moves by {DRIFT_UM:g} um unseen: {figures.largest_um('joint'):.1f} um{without}"

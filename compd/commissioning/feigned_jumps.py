@@ -17,11 +17,11 @@ from compd.commissioning.pushed_periods import longest_period_s
 from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.lines import CARRIES
+from compd.configuration.stated_noise import tolerance_mm
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
 from compd.live.acquisition.polled_round import FASTEST_ROUND_S
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
-from compd.live.acquisition.reading_trust import tolerance_mm
 
 # By how much later than planned the next reading comes, and was perhaps sampled, s: 99.9 % of the readings of the
 # shipped tripod, simulated, on two processors: alone, and with four busy processes (tests/benchmarks/bench_polls.py).
@@ -60,6 +60,7 @@ def feigned_jumps(configuration: Configuration, budgets: Sequence[LineBudget]) -
             measures[gauge],
             poll_s.get(options.line, longest_period_s(configuration.lines[options.line], gauges[gauge])),
             options,
+            configuration.noise_of(gauge).um,
         )
         for gauge, options in configuration.gauges.items()
         if gauge in measures
@@ -170,14 +171,15 @@ def _poll_s(budget: LineBudget) -> float:
     return max(budget.usual_s, budget.line.poll_every_s, FASTEST_ROUND_S) if budget.known else math.nan
 
 
-def _jump(gauge: str, measures: tuple[str, ...], poll_s: float, options: GaugeOptions) -> FeignedJump:
-    return FeignedJump(gauge, measures, *(believed_jump(options, poll_s + late_s) for late_s in (LATE_S, LATE_BUSY_S)))
+def _jump(gauge: str, measures: tuple[str, ...], poll_s: float, options: GaugeOptions, noise_um: float) -> FeignedJump:
+    usual, busy = (believed_jump(options, poll_s + late_s, noise_um) for late_s in (LATE_S, LATE_BUSY_S))
+    return FeignedJump(gauge, measures, usual, busy)
 
 
-def believed_jump(options: GaugeOptions, poll_s: float) -> BelievedJump:
+def believed_jump(options: GaugeOptions, poll_s: float, noise_um: float) -> BelievedJump:
     """The largest jump that is believed of a gauge with these limits and noise, with `poll_s` between two readings."""
     speed, acceleration = options.fastest_mm_per_s or math.inf, options.acceleration_mm_per_s2 or math.inf
     limits = MotionLimits(speed, acceleration)
     unlimited = math.isinf(speed) and math.isinf(acceleration)
-    jump_mm = math.inf if unlimited else unseen_jump_mm(limits, poll_s, tolerance_mm(options.noise_um))
+    jump_mm = math.inf if unlimited else unseen_jump_mm(limits, poll_s, tolerance_mm(noise_um))
     return BelievedJump(poll_s, jump_mm)

@@ -56,6 +56,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "fastest_per_s": None,
     "apart": None,
     "standing_temperature_K": VoteSettings().standing_temperature_K,
+    "tip_error_um": None,
 }
 # Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
 _FORMER_SPEED_LIMITS: Mapping[str, float] = {

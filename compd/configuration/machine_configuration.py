@@ -29,6 +29,7 @@ from compd.configuration.operation import (
 from compd.configuration.plausible import implausible
 from compd.configuration.section import Text, readable, unknown_key, validate, validation_problems, value_text
 from compd.configuration.sections import Sections
+from compd.configuration.stated_noise import StatedNoise, stated_noise
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
 from compd.plugins import GAUGES
@@ -138,6 +139,11 @@ class Configuration:
         """A fresh driver object for every gauge."""
         return {name: self.drivers[name](options) for name, options in self.gauges.items()}
 
+    def noise_of(self, gauge: str) -> StatedNoise:
+        """How much the lengths of a gauge scatter. gauge : its name, or that of one of its channels."""
+        name = gauge.split(".", maxsplit=1)[0]
+        return stated_noise(self.gauges[name], self.drivers[name])
+
     def to_dataframe(self) -> pd.DataFrame:
         """One row per channel that is wired, as a pandas data frame.
 
@@ -146,7 +152,8 @@ class Configuration:
         pandas.DataFrame
             `column`, as a recording names the channel, with its unit; `gauge`, with the channel after a dot where
             the gauge has several; `driver` and `line` of the gauge; `link`, nan where it belongs to none; `sign`,
-            +1 or -1; `noise_um`, standard deviation of one reading of a length, nan where it is not stated.
+            +1 or -1; `noise_um`, standard deviation of one reading of a length, nan where neither the configuration
+            nor the driver states it.
 
         Raises
         ------
@@ -185,8 +192,8 @@ class Configuration:
             "link": [link for _, _, link, _ in wires],
             "sign": [sign for _, _, _, sign in wires],
             "noise_um": [
-                option.noise_um if length and option.noise_um is not None else math.nan
-                for option, length in zip(options, lengths, strict=True)
+                self.noise_of(gauge).um if length else math.nan
+                for (_, gauge, _, _), length in zip(wires, lengths, strict=True)
             ],
         }
 

@@ -141,12 +141,17 @@ class AcquisitionSettings(Section):
 
 
 class LimitSettings(Section):
-    """What a correction may be: per link."""
+    """What a correction may be, per link, and how wrong the tip."""
 
     correction_mm: Positive = Field(description="largest correction of one link, to either side")
     slew_mm_per_s: Positive = Field(description="fastest change of a correction")
     on_limit: Literal["clamp", "refuse"] = Field(
         description="clamp: apply the limit and say so; refuse: the setpoint becomes invalid and says so"
+    )
+    tip_error_um: Positive | None = Field(
+        default=None,
+        description="largest bound of the tip's error (`u_tip_um`, 95 %) with which a setpoint is valid, um; beyond it "
+        "and where the bound is not known, the setpoint is `refused`; left out: it is told and not limited",
     )
 
 

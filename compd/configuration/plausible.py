@@ -60,6 +60,11 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
         "corrections change by micrometres a second: this limit would stop no jump",
     ),
     PlausibleRange(
+        "limits.tip_error_um", 0.05, 20_000, "um",
+        "gauges scatter by more: no setpoint would be valid",
+        "a tip that is wrong by centimetres would be valid",
+    ),
+    PlausibleRange(
         "sockets.valid_for_s", 0.002, 2, "s",
         "a setpoint would have ended before it arrives",
         "a controller may go on so long with the last setpoint of a daemon that has died",

@@ -10,7 +10,7 @@ from compd.configuration import Configuration
 from compd.gauge import Gauge
 from compd.live.loop.cycle_state import CycleSettings
 from compd.live.loop.model_loader import ModelLoader, Models
-from compd.live.loop.tip_uncertainty import declared_noise
+from compd.live.loop.tip_uncertainty import stated_noise
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.machine_builder import build_model
@@ -55,7 +55,7 @@ def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]
         limits=configuration.limits,
         valid_for_s=configuration.sockets.valid_for_s,
         stroke_mm=configuration.geometry.link_length_mm,
-        noise=declared_noise(configuration),
+        noise=stated_noise(configuration, wires),
         scales_checked=configuration.votes.following_mm is not None,
     )
     return Pipeline(latest, settings, loader)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from compd.configuration.operation import QuantityWire
-from compd.live.acquisition.possible_motion import SAME_VALUE_SIGMAS
+from compd.configuration.stated_noise import SAME_VALUE_SIGMAS
 from compd.live.acquisition.quantity_trust import QuantityLimits
 from compd.recording.checks import limit_of
 from compd.units import unit_of

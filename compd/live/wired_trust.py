@@ -7,11 +7,11 @@ from typing import Literal
 
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
-from compd.gauge import GaugeOptions
+from compd.configuration.stated_noise import tolerance_mm
 from compd.live.acquisition.gauge_trust import Judge
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.quantity_trust import QuantityLimits, QuantityTrust
-from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.acquisition.votes.machine_view import WiredLength
 from compd.live.loop.wiring import MachineWires, Wire
 from compd.live.memory.trust_memory import TrustMemory
@@ -22,11 +22,11 @@ from compd.units import UM_PER_MM, unit_of
 
 def wired_memory(configuration: Configuration, wires: MachineWires) -> TrustMemory:
     """The memory for the channels that are wired: lengths, then quantities."""
-    gauges, limits = configuration.gauges, _quantity_limits(configuration)
+    limits = _quantity_limits(configuration)
     return TrustMemory(
         [wire.channel for wire in wires.all_wires],
         [
-            *(tolerance_mm(gauges[channel.split(".")[0]].noise_um) for channel in wires.length_channels),
+            *(tolerance_mm(wire.noise.um) for wire in wires.length_wires),
             # what may change by anything is not worth keeping
             *(
                 limits[name].tolerance if math.isfinite(limits[name].fastest_per_s) else math.inf
@@ -54,7 +54,7 @@ def wired_trust(configuration: Configuration, wires: MachineWires, memory: Trust
 
 def wired_channels(configuration: Configuration, wires: MachineWires, model: MachineModel) -> list[WiredLength]:
     """What each channel measures, for the votes: lengths, then quantities."""
-    wiring, gauges = configuration.wiring, configuration.gauges
+    wiring = configuration.wiring
     distance_mm = dict(zip(FRAME_DISTANCES, model.zero.distances_mm.tolist(), strict=True))
     unknown = math.nan
     parts: list[tuple[Literal["scale", "joint", "frame"], int, str, float]] = [
@@ -63,7 +63,7 @@ def wired_channels(configuration: Configuration, wires: MachineWires, model: Mac
         *(("frame", 0, "", distance_mm[distance]) for distance in FRAME_DISTANCES),
     ]
     lengths = [
-        WiredLength(kind, wire.meaning, wire.sign, link, role, length_mm, _noise_mm(gauges[wire.channel.split(".")[0]]))
+        WiredLength(kind, wire.meaning, wire.sign, link, role, length_mm, wire.noise.um / UM_PER_MM)
         for wire, (kind, link, role, length_mm) in zip(wires.length_wires, parts, strict=True)
     ]
     noise = {quantity.name: quantity.noise or unknown for quantity in wiring.quantities}
@@ -72,10 +72,6 @@ def wired_channels(configuration: Configuration, wires: MachineWires, model: Mac
 
 def _quantity_limits(configuration: Configuration) -> dict[str, QuantityLimits]:
     return {quantity.name: quantity_limits(quantity) for quantity in configuration.wiring.quantities}
-
-
-def _noise_mm(options: GaugeOptions) -> float:
-    return math.nan if options.noise_um is None else options.noise_um / UM_PER_MM
 
 
 def _settings(configuration: Configuration, wire: Wire, is_scale: bool) -> TrustSettings:

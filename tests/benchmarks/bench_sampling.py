@@ -24,10 +24,10 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.commissioning.line_budget import Pace, serial_pace
 from compd.configuration import Configuration, load
+from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
-from compd.live.acquisition.reading_trust import tolerance_mm
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.machine_zero import MachineZero

@@ -48,7 +48,11 @@ def warm(live: Machine, degC: float) -> None:
     live.latest.put = put
 
 
-def with_noise(live: Machine, um: float) -> Machine:
+def with_noise(live: Machine, um: float | None, tip_error_um: float | None = None) -> Machine:
+    """The machine with gauges of this noise, and thermometers of none, within this limit of the tip's error."""
     loaded = live.configuration
     gauges = {name: options.model_copy(update={"noise_um": um}) for name, options in loaded.gauges.items()}
-    return Machine(replace(loaded, gauges=gauges))
+    quantities = tuple(quantity.model_copy(update={"noise": None}) for quantity in loaded.wiring.quantities)
+    wiring = loaded.wiring.model_copy(update={"quantities": quantities})
+    limits = loaded.limits.model_copy(update={"tip_error_um": tip_error_um})
+    return Machine(replace(loaded, gauges=gauges, wiring=wiring, limits=limits))

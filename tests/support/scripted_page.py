@@ -48,7 +48,7 @@ class ScriptedLink(DaemonLink):
         """The daemon is there, and its setpoint is in this state."""
         setpoint: dict[str, Any] = {"state": state.value, "valid": state.valid, "reason": reason, "mode": "cmm"}
         if state.valid:
-            setpoint |= {"age_s": 0.02, "tip_M_mm": TIP_MM, "u_tip_um": [0.1, 0.2, 0.3]}
+            setpoint |= {"age_s": 0.02, "tip_M_mm": TIP_MM, "u_tip_um": 0.6}
             setpoint |= {"correction_mm": [0.011, -0.012, 0.013]}
             setpoint |= {"sources_mm": {"joints": [0.01, -0.01, 0.01], "frame": [0.001, -0.002, 0.003]}}
         readings = {column["channel"]: {"value": 1.0, "time_s": time_s - 0.02} for column in COLUMNS}

@@ -13,6 +13,8 @@ The slopes of the windows before, each as long, say more:
   that becomes faster is carried on with the speed that it has, since it may stop to do so at any time.
 - What the slope has changed by from one window to the next, within a second, it may change by again: that is its
   uncertainty.
+
+It also says until when the next reading is due: a gauge that is silent for longer may have begun to move.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from statistics import median
 
 from compd.gauge import ReadingMotion
 from compd.live.acquisition.possible_motion import GaugeSample
@@ -31,6 +34,11 @@ LONGEST_WINDOW_S = 1.0
 LARGEST_GROWTH = 2.0
 # A reading is replaced one round after it was made, and one that waits for the end of its round after two.
 HORIZON_ROUNDS = 2.0
+# By then the next reading is there, by what the duration of rounds scatters; of the last ones the median is the usual.
+DUE_ROUNDS = 2.5
+_USUAL_ROUNDS = 5
+# A part that turns round shows one round without motion, and not two.
+_CALM_ROUNDS = 2
 # Drives come to rest from their full speed within 0.1 to 0.3 s: for longer than this, s, no motion is taken to go on.
 LONGEST_HORIZON_S = 0.15
 # A tolerance is six standard deviations of the difference between two readings.
@@ -54,23 +62,33 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
         return UNKNOWN
     rounds = [history[k].time_s - history[k - 1].time_s for k in range(max(1, last - 1), last + 1)]
     horizon_s = min(HORIZON_ROUNDS * max(rounds), LONGEST_HORIZON_S)
+    due_s = DUE_ROUNDS * median(
+        history[k].time_s - history[k - 1].time_s for k in range(max(1, last - _USUAL_ROUNDS + 1), last + 1)
+    )
+    recent = _recent_speed(history, tolerance_mm)
+    if _stands(history, start, recent, tolerance_mm):
+        start = last - _CALM_ROUNDS
+        duration_s = history[last].time_s - history[start].time_s
     slopes = _slopes(history, start, duration_s)
     now = slopes[0]
+    as_measured = now, duration_s, due_s
     if abs(history[last].value - history[start].value) <= tolerance_mm:
-        return _rounded(0.0, 0.0, abs(now), horizon_s)
+        return _rounded(0.0, 0.0, abs(now), horizon_s, 0.0, rounds[-1], due_s)
     changes = [abs(later - earlier) for later, earlier in pairwise(slopes)]
     u = math.hypot(max(changes, default=abs(now)), tolerance_mm / SIGMAS / duration_s)
+    if recent < math.inf:  # how fast it was before that says nothing any more
+        u = min(u, max(recent, abs(now)))
     before = slopes[1] if len(slopes) > 1 else 0.0
     if now * before <= 0.0 or _has_stopped(history, now, tolerance_mm):
-        return _rounded(0.0, 0.0, max(u, abs(now)), horizon_s)
+        return _rounded(0.0, 0.0, max(u, abs(now)), horizon_s, *as_measured)
     if abs(now) >= abs(before):
         speed = math.copysign(min(abs(now), LARGEST_GROWTH * abs(before)), now)
-        return _rounded(speed, 0.0, max(u, abs(now - speed)), horizon_s)
+        return _rounded(speed, 0.0, max(u, abs(now - speed)), horizon_s, *as_measured)
     braking = (abs(before) - abs(now)) / duration_s
     speed = abs(now) - braking * duration_s / 2  # the slope is the speed in the middle of the window
     if speed <= 0.0:
-        return _rounded(0.0, 0.0, u, horizon_s)
-    return _rounded(math.copysign(speed, now), braking, u, min(horizon_s, speed / braking))
+        return _rounded(0.0, 0.0, u, horizon_s, *as_measured)
+    return _rounded(math.copysign(speed, now), braking, u, min(horizon_s, speed / braking), *as_measured)
 
 
 def _window_start(history: Sequence[GaugeSample], last: int, tolerance_mm: float) -> int:
@@ -84,6 +102,28 @@ def _window_start(history: Sequence[GaugeSample], last: int, tolerance_mm: float
         if abs(newest.value - history[k].value) > tolerance_mm:
             break
     return start
+
+
+def _recent_speed(history: Sequence[GaugeSample], tolerance_mm: float) -> float:
+    """The size of the speed (mm/s) over the last two rounds, where neither shows motion; inf where one does."""
+    if len(history) <= _CALM_ROUNDS:
+        return math.inf
+    newest = history[-1]
+    if any(abs(newest.value - history[-1 - k].value) > tolerance_mm for k in range(1, _CALM_ROUNDS + 1)):
+        return math.inf
+    since = history[-1 - _CALM_ROUNDS]
+    return abs(newest.value - since.value) / (newest.time_s - since.time_s)
+
+
+def _stands(history: Sequence[GaugeSample], start: int, recent: float, tolerance_mm: float) -> bool:
+    """Whether a part has come to rest within the window that begins at `start`: its speed there would show in the last
+    rounds. recent : as of `_recent_speed`.
+    """
+    if recent == math.inf or start >= len(history) - 1 - _CALM_ROUNDS:
+        return False
+    newest, since, begin = history[-1], history[-1 - _CALM_ROUNDS], history[start]
+    speed = abs(newest.value - begin.value) / (newest.time_s - begin.time_s)
+    return (speed - recent) * (newest.time_s - since.time_s) > tolerance_mm
 
 
 def _has_stopped(history: Sequence[GaugeSample], speed: float, tolerance_mm: float) -> bool:
@@ -111,6 +151,9 @@ def _slopes(history: Sequence[GaugeSample], start: int, duration_s: float) -> li
     return slopes
 
 
-def _rounded(speed: float, braking: float, u: float, horizon_s: float) -> ReadingMotion:
-    speed, braking, u = (round(value, _DECIMALS_MM) for value in (speed, braking, u))
-    return ReadingMotion(speed, braking, u, round(horizon_s, _DECIMALS_S))
+def _rounded(
+    speed: float, braking: float, u: float, horizon_s: float, mean: float, window_s: float, due_s: float
+) -> ReadingMotion:
+    speed, braking, u, mean = (round(value, _DECIMALS_MM) for value in (speed, braking, u, mean))
+    horizon_s, window_s, due_s = (round(value, _DECIMALS_S) for value in (horizon_s, window_s, due_s))
+    return ReadingMotion(speed, braking, u, horizon_s, mean, window_s, due_s)

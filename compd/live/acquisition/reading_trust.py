@@ -21,7 +21,6 @@ from compd.gauge import Quality, Reading, bad
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import (
     BASE_S,
-    SAME_VALUE_SIGMAS,
     WINDOW_S,
     GaugeSample,
     Interval,
@@ -36,8 +35,6 @@ from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
 from compd.live.acquisition.witnesses import all_back, moved_while_away, stood_still
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
-# Last digit of a display that stands still, mm, where no noise is declared.
-UNREST_MM = 0.001
 # After a gap, s, until the others have been read that have begun to move at the same time.
 _WAIT_FOR_MOTION_S = 0.3
 # Or for so many gaps as long as its own polls may have, where that is longer.
@@ -59,11 +56,6 @@ _AGREEMENT = 0.2
 _SPEED_RATIO = 5.0
 # How much of the acceleration that is there already is no surprise.
 _ACCELERATION_MARGIN = 2.0
-
-
-def tolerance_mm(noise_um: float | None) -> float:
-    """By how much two readings of the same value may differ, mm. noise_um : standard deviation of one, um."""
-    return UNREST_MM if noise_um is None else max(UNREST_MM, SAME_VALUE_SIGMAS * noise_um * 1e-3)
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,9 @@ def stood_still(memory: TrustMemory, i: int) -> bool:
     """
     n, before = memory.lengths, memory.witness[i]
     compared = (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(before)
-    return bool(compared.any() and (np.abs(memory.value[:n] - before)[compared] <= memory.tolerance_mm[:n][compared]).all())
+    return bool(
+        compared.any() and (np.abs(memory.value[:n] - before)[compared] <= memory.tolerance_mm[:n][compared]).all()
+    )
 
 
 def all_back(memory: TrustMemory, i: int, since_s: float) -> bool:

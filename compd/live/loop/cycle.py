@@ -3,7 +3,7 @@
 `step` reads no clock and does no I/O, and every value that goes in or comes out is immutable. The loop keeps the state
 and calls it; a replay calls it with states and inputs from a recording, and gets the same setpoints bit for bit.
 
-    machine zero -> comparators (stale policy) -> scales -> compensation -> limits -> uncertainty, shadow -> setpoint
+    machine zero -> comparators (stale policy) -> scales -> compensation -> limits -> shadow, bound -> setpoint
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from compd.compensation.compensation import compensate_cmm
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.errors import StateError
 from compd.live.loop.commands import Target
-from compd.live.loop.cycle_readings import Scales, age_uncertainty_mm, read_comparators, read_scales
+from compd.live.loop.cycle_readings import Scales, read_comparators, read_scales
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors
 from compd.live.loop.limits import LimitedCorrection, limit_correction, slewed, stroke_problem
 from compd.live.loop.machine_zero import MachineZero
@@ -28,9 +28,9 @@ from compd.live.loop.reasons import shortened
 from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
-from compd.live.loop.stale_policy import UsableComparators
 from compd.live.loop.states import Mode, State
-from compd.live.loop.tip_uncertainty import TipUncertainty, tip_uncertainty, with_absent, with_age
+from compd.live.loop.tip_bound import refused_bound, tip_bound, with_place
+from compd.live.loop.tip_uncertainty import TipUncertainty, tip_uncertainty
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
@@ -155,10 +155,9 @@ def _compute(
         state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
         return _Outcome(State.REFUSED, refusal), state
 
-    u_tip = TipUncertainty(state.u_tip_um, state.tip_by_gauge)
-    if _uncertainty_is_due(tick, u_tip.by_noise_um, usable, settings):
-        noise = settings.noise if usable.absent_mm is None else with_absent(settings.noise, usable.absent_mm)
-        u_tip = tip_uncertainty(machine, noise, values, compensation.scale_setpoint_mm, warm_start.effects)
+    u_tip = _uncertainty(tick, state, settings) or tip_uncertainty(
+        machine, settings.noise, values, compensation.scale_setpoint_mm, warm_start.effects
+    )
     shadow, shadow_memory = None, state.shadow_memory
     if models.shadow is not None:
         shadow, shadow_memory = evaluate_shadow(
@@ -169,11 +168,13 @@ def _compute(
     tip_correction_mm = (
         None if target is not None else _tip_correction(compensation.correction_mm, limited, state, settings)
     )
+    reached_mm = limited.applied_mm if tip_correction_mm is None else tip_correction_mm
+    bound = tip_bound(u_tip, snapshot, usable, compensation, reached_mm, target, settings)
     next_state = CycleState(
         zero,
         warm_start,
         limited.applied_mm,
-        last_good,
+        last_good if live is None else with_place(live, compensation.nominal_scale_mm, settings),
         scales_seen,
         shadow_memory,
         adopting,
@@ -183,13 +184,18 @@ def _compute(
         models,
         u_tip.tip_by_gauge,
     )
+    if refusal := refused_bound(bound, snapshot, usable, applied.quantities, settings):
+        # what is not published changes no correction
+        kept = next_state._replace(correction_mm=state.correction_mm, adopting=state.adopting)
+        return _Outcome(State.REFUSED, "; ".join(filter(None, (refusal, usable.reason, limited.reason)))), kept
     if tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
         compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
         if code := int(compensation.reason):
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
     reported, reason = _reported(usable, scales, limited)
-    u_tip_um = with_age(*u_tip, lambda: age_uncertainty_mm(snapshot, comparators, target, settings))
-    setpoint_values = _setpoint_values(compensation, limited.applied_mm, u_tip_um, shadow, wires.tool_on_plate)
+    setpoint_values = _setpoint_values(
+        compensation, limited.applied_mm, math.nan if bound is None else bound.um, shadow, wires.tool_on_plate
+    )
     return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state
 
 
@@ -236,13 +242,13 @@ def _with_zero(state: CycleState, zero: MachineZero, zero_vectors: ZeroVectors, 
     )
 
 
-def _uncertainty_is_due(
-    tick: int, u_tip_um: FloatArray | None, usable: UsableComparators, settings: CycleSettings
-) -> bool:
-    """Whether to compute the tip's uncertainty anew: it changes slowly, but for a correction that fades."""
+def _uncertainty(tick: int, state: CycleState, settings: CycleSettings) -> TipUncertainty | None:
+    """The tip's uncertainty of the cycle before, since it changes slowly; None where it is to be computed anew."""
     if settings.noise is None:
-        return False
-    return u_tip_um is None or usable.absent_mm is not None or tick % settings.uncertainty_every == 0
+        return TipUncertainty(None, None)
+    if state.tip_noise_um is None or state.tip_by_gauge is None or tick % settings.uncertainty_every == 0:
+        return None
+    return TipUncertainty(state.tip_noise_um, state.tip_by_gauge)
 
 
 def _tip_correction(
@@ -290,7 +296,7 @@ def _with_tip_as_applied(
 def _setpoint_values(
     compensation: Compensation,
     applied_mm: FloatArray,
-    u_tip_um: FloatArray | None,
+    u_tip_um: float,
     shadow: ShadowResult | None,
     tool_on_plate: bool,
 ) -> SetpointValues:

@@ -1,12 +1,10 @@
-"""The readings of a cycle: comparators by the stale policy, scales, and how uncertain all are by their age."""
+"""The readings of a cycle: comparators by the stale policy, and scales."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from typing import NamedTuple
-
-import numpy as np
 
 from compd.arrays import FloatArray
 from compd.live.loop.commands import Target
@@ -45,7 +43,9 @@ def read_comparators(
         beyond = needed.beyond
     if not lost:
         length_times_s = lengths.oldest_s, lengths.newest_s
-        drift_mm_per_s = () if settings.noise is None else wires.comparators.drift_mm_per_s(snapshot)
+        drift_mm_per_s: tuple[float, ...] = ()
+        if settings.noise is not None:
+            drift_mm_per_s = tuple(wires.comparators.speed_bound_mm_per_s(snapshot).tolist())
         live = ComparatorSet(lengths.values, now_s, oldest_s, quantities, (), length_times_s, drift_mm_per_s)
         usable = usable_comparators(live, last_good, lost, now_s, settings.loop)
         return live, usable._replace(beyond=beyond) if beyond else usable
@@ -99,20 +99,3 @@ def read_scales(
     # no policy replaces a scale: without it the tip is not known
     state = State.FAULT if lost.distrusted else State.STOP if seen else State.STARTING
     return Scales(values, oldest_s, newest_s, state, f"the tip is not known: {lost}")
-
-
-def age_uncertainty_mm(
-    snapshot: Snapshot, comparators: ComparatorSet, target: Target | None, settings: CycleSettings
-) -> FloatArray:
-    """(n + k + 9) standard uncertainty of each length by its age, mm; 0 for the scales where they are not used.
-
-    A held set is not carried on: since its oldest reading each of its lengths may have moved on.
-    """
-    wires, extrapolate = settings.wires, settings.loop.extrapolate
-    age_mm = wires.lengths.age_uncertainty_mm(snapshot, extrapolate)
-    if comparators.time_s < snapshot.time_s and comparators.drift_mm_per_s:
-        held_s = snapshot.time_s - comparators.oldest_s
-        age_mm[len(wires.scale.wires) :] = np.array(comparators.drift_mm_per_s) * held_s
-    if target is not None:
-        age_mm[: len(wires.scale.wires)] = 0.0
-    return age_mm

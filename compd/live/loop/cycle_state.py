@@ -49,13 +49,13 @@ class CycleState(NamedTuple):
     scales_seen : whether the scales have ever been good. Scales that are lost afterwards are `stop`, not `starting`.
     shadow_memory : memory of the shadow model's effects.
     adopting : whether the correction is still slewing towards that of a newly adopted model.
-    u_tip_um : (3), standard uncertainty of the tip without the age of its readings; None where that has not been
-        computed.
+    tip_noise_um : as `TipUncertainty.by_noise_um`; None where that has not been computed. In recordings of releases up
+        to 0.2.0 (3), without the radius.
     tip_correction_mm : (n), the correction with which the last tip of CMM mode was computed; None where the last
         setpoint was invalid or in the other mode.
     zero_vectors : the readings of `zero`; None where they have yet to be read from it.
     models : those of the last cycle; None before the first.
-    tip_by_gauge : (3, n + k + 9), by how much a length moves the tip, computed with `u_tip_um`; None without it.
+    tip_by_gauge : (3, n + k + 9), by how much a length moves the tip, computed with `tip_noise_um`; None without it.
     """
 
     zero: MachineZero | None
@@ -65,7 +65,7 @@ class CycleState(NamedTuple):
     scales_seen: bool = False
     shadow_memory: EffectMemory = EffectMemory()
     adopting: bool = False
-    u_tip_um: FloatArray | None = None
+    tip_noise_um: FloatArray | None = None
     tip_correction_mm: FloatArray | None = None
     zero_vectors: ZeroVectors | None = None
     models: Models | None = None

@@ -67,6 +67,8 @@ def degraded_comparators(
         last_good.quantities if groups[2].lost else quantities,
         times_s,
         _length_times_s(groups[:2], weights, last_good),
+        last_good.drift_mm_per_s,
+        last_good.scale_mm,
     )
     absent = [name for name, weight in zip(GROUPS, weights, strict=True) if weight == 0.0]
     fading = [f"{name} count {weight:.0%}" for name, weight in zip(GROUPS, weights, strict=True) if 0.0 < weight < 1.0]
@@ -76,16 +78,15 @@ def degraded_comparators(
         [*live_s, *(time_s for time_s, weight in zip(times_s, weights, strict=True) if 0.0 < weight < 1.0)],
         default=now_s,
     )
-    missing_mm = (1.0 - by_gauge) * np.abs(known_mm)
-    if weights[2] < 1.0:
-        missing_mm = np.full(len(known_mm), math.inf)  # what an effect would have corrected is not known
+    since_s = [newest.oldest_s if group.lost else now_s for group in groups[:2]]
     usable = UsableComparators(
         newest._replace(change_mm=known_mm * by_gauge, oldest_s=used_s),
         State.DEGRADED if absent and not fading else State.FADE,
         f"{lost}; {'; '.join(what)}",
         math.inf,
         weights[2],
-        missing_mm,
+        now_s - np.repeat(since_s, (joints, len(known_mm) - joints)),
+        (1.0 - by_gauge) * known_mm,
     )
     return newest, usable
 

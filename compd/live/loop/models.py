@@ -39,7 +39,7 @@ def adopt_models(state: CycleState, models: Models) -> CycleState:
         last_good = None
     effects = carry_over(memory, machine, models.applied.machine)
     return state._replace(
-        warm_start=state.warm_start._replace(effects=effects), last_good=last_good, adopting=True, u_tip_um=None
+        warm_start=state.warm_start._replace(effects=effects), last_good=last_good, adopting=True, tip_noise_um=None
     )
 
 

@@ -150,7 +150,7 @@ class CycleUnpacker:
 def _state_fields(state: CycleState) -> tuple[Any, ...]:
     """A state as plain values: arrays as their bytes, which takes a tenth of the time that pickling them does."""
     supports_M_mm, origin_M_mm, rotation_M_P, effects = state.warm_start
-    last_good, u_tip_um, tip_correction_mm = state.last_good, state.u_tip_um, state.tip_correction_mm
+    last_good, tip_noise_um, tip_correction_mm = state.last_good, state.tip_noise_um, state.tip_correction_mm
     tip_by_gauge = state.tip_by_gauge
     return (
         (supports_M_mm.tobytes(), origin_M_mm.tobytes(), rotation_M_P.tobytes()),
@@ -162,7 +162,7 @@ def _state_fields(state: CycleState) -> tuple[Any, ...]:
         state.scales_seen,
         None if state.shadow_memory.is_empty else state.shadow_memory,
         state.adopting,
-        None if u_tip_um is None else u_tip_um.tobytes(),
+        None if tip_noise_um is None else tip_noise_um.tobytes(),
         None if tip_correction_mm is None else tip_correction_mm.tobytes(),
         None if tip_by_gauge is None else tip_by_gauge.tobytes(),
     )
@@ -171,7 +171,7 @@ def _state_fields(state: CycleState) -> tuple[Any, ...]:
 def _state(fields: tuple[Any, ...], zero: MachineZero | None) -> CycleState:
     """The state in the fields, to the bit; without what follows from the inputs of its cycle."""
     (supports, origin, rotation), effects, correction, last_good, scales_seen, shadow_memory, adopting, *rest = fields
-    u_tip, tip, tip_by_gauge = rest
+    tip_noise, tip, tip_by_gauge = rest
     return CycleState(
         zero,
         WarmStart(
@@ -182,7 +182,7 @@ def _state(fields: tuple[Any, ...], zero: MachineZero | None) -> CycleState:
         scales_seen,
         shadow_memory or _NO_MEMORY,
         adopting,
-        None if u_tip is None else _array(u_tip),
+        None if tip_noise is None else _array(tip_noise),
         None if tip is None else _array(tip),
         tip_by_gauge=None if tip_by_gauge is None else _array(tip_by_gauge).reshape(3, -1),
     )

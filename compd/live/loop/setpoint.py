@@ -67,8 +67,8 @@ class SetpointValues(NamedTuple):
     link_length_mm, scale_setpoint_mm : (n).
     correction_mm : (n), what is added to the command, within its limits.
     sources_mm : (n) for joints, frame and each effect: what each asks for, before the limits.
-    u_tip_um : (3), standard uncertainty of `tip_P_mm` with the tool on the plate, else of `tip_M_mm`; nan or None
-        where it is not known.
+    u_tip_um : how far the tip may be from `tip_P_mm` with the tool on the plate, else from `tip_M_mm`, with 95 %; nan
+        where it is not known. Of a recording of a release up to 0.2.0 its standard uncertainty along x, y, z, or None.
     shadow : result of the model that runs beside the applied one; None without one.
     """
 
@@ -82,7 +82,7 @@ class SetpointValues(NamedTuple):
     scale_setpoint_mm: FloatArray
     correction_mm: FloatArray
     sources_mm: CorrectionShares
-    u_tip_um: FloatArray | None = None
+    u_tip_um: float | FloatArray | None = math.nan
     shadow: ShadowResult | None = None
 
 
@@ -122,7 +122,8 @@ class Setpoint(NamedTuple):
         return self.values is not None
 
     def to_json(self) -> bytes:
-        """One line of JSON, with its newline. Keys without a value are absent: there is no null and no NaN.
+        """One line of JSON, with its newline. Keys without a value are absent; of a valid setpoint `u_tip_um` is null
+        where it is not known, and nothing else ever is.
 
         Raises ValueError where a value is not finite.
         """
@@ -236,8 +237,11 @@ def _json_values(values: SetpointValues) -> dict[str, Any]:
     }
     if values.tip_P_mm is not None:
         message["tip_P_mm"] = lengths[12 + 3 * n :]
-    if values.u_tip_um is not None and math.isfinite(values.u_tip_um.sum()):
-        message["u_tip_um"] = _rounded(values.u_tip_um, _DECIMALS_UM)
+    u_tip_um = values.u_tip_um
+    if isinstance(u_tip_um, float):
+        message["u_tip_um"] = round(u_tip_um, _DECIMALS_UM) if math.isfinite(u_tip_um) else None
+    elif u_tip_um is not None and math.isfinite(u_tip_um.sum()):
+        message["u_tip_um"] = _rounded(u_tip_um, _DECIMALS_UM)
     if values.shadow is not None:
         message["shadow"] = {
             name: field if isinstance(field, str) else _rounded(field, _DECIMALS_MM)

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import numpy as np
+
 from compd.arrays import FloatArray
 from compd.configuration.operation import LoopSettings
 from compd.live.loop.reasons import Lost
@@ -29,8 +31,9 @@ class ComparatorSet(NamedTuple):
     quantities : temperatures, forces and the rest that the effects of the applied model need.
     group_times_s : monotonic times from which joints, frame and quantities are, where they differ; else empty.
     length_times_s : monotonic times of the oldest and of the newest reading of a length; empty where that is not known.
-    drift_mm_per_s : (k + 9), how fast each may move while the set is held; empty where the tip's uncertainty is not
-        computed, in a recording of a release up to 0.2.0, and in sets that were degraded.
+    drift_mm_per_s : (k + 9), how fast each moved at most; empty where the bound of the tip's error is not computed, and
+        in a recording of a release up to 0.2.0.
+    scale_mm : (n), where the scales were commanded without compensation; empty where that is not known.
     """
 
     change_mm: FloatArray
@@ -40,6 +43,7 @@ class ComparatorSet(NamedTuple):
     group_times_s: tuple[float, ...] = ()
     length_times_s: tuple[float, ...] = ()
     drift_mm_per_s: tuple[float, ...] = ()
+    scale_mm: tuple[float, ...] = ()
 
 
 class UsableComparators(NamedTuple):
@@ -52,8 +56,9 @@ class UsableComparators(NamedTuple):
     expires_s : monotonic time from which `comparators` must not be used any more; inf where they are live.
     weight : factor between 0 and 1 by which the corrections of the effects are multiplied. `comparators` have been
         multiplied by it already.
-    absent_mm : (k + 9), standard uncertainty of what is taken for each comparator beyond its noise; None for none.
-        Infinite where it is not known.
+    held_s : (k + 9), for how long each comparator that is taken from the last good set has not been read; 0 for one
+        that is live. None where all are.
+    absent_mm : (k + 9), what the comparators showed and is not used; None for nothing.
     beyond : which quantities are beyond the range in which the effects were fitted; "" for none.
     """
 
@@ -62,6 +67,7 @@ class UsableComparators(NamedTuple):
     reason: str
     expires_s: float
     weight: float = 1.0
+    held_s: FloatArray | None = None
     absent_mm: FloatArray | None = None
     beyond: str = ""
 
@@ -94,10 +100,21 @@ def usable_comparators(
         reason = f"{lost}; {settings.on_stale} ended after {settings.hold_s:g} s"
         return UsableComparators(None, ended, reason, now_s)
     if settings.on_stale == "hold":
-        return UsableComparators(last_good, State.HOLD, f"{lost}; the last good set is held", expires_s)
+        return _held(last_good, f"{lost}; the last good set is held", expires_s, now_s)
     weight = 1.0 - elapsed_s / settings.hold_s
-    faded = last_good._replace(change_mm=last_good.change_mm * weight)
-    return UsableComparators(faded, State.FADE, f"{lost}; the last good set counts {weight:.0%}", expires_s, weight)
+    known_mm = last_good.change_mm
+    faded = _held(last_good, f"{lost}; the last good set counts {weight:.0%}", expires_s, now_s)
+    return faded._replace(
+        comparators=last_good._replace(change_mm=known_mm * weight),
+        state=State.FADE,
+        weight=weight,
+        absent_mm=known_mm * (1.0 - weight),
+    )
+
+
+def _held(last_good: ComparatorSet, reason: str, expires_s: float, now_s: float) -> UsableComparators:
+    held_s = np.full(len(last_good.change_mm), now_s - last_good.oldest_s)
+    return UsableComparators(last_good, State.HOLD, reason, expires_s, held_s=held_s)
 
 
 def held_comparators(
@@ -110,4 +127,4 @@ def held_comparators(
     if last_good is None or now_s - last_good.time_s > _LONGEST_END_S:
         return usable_comparators(None, last_good, Lost(why), now_s, settings)
     expires_s = last_good.time_s + _LONGEST_END_S
-    return UsableComparators(last_good, State.HOLD, f"{why}; the last good set is held", expires_s)
+    return _held(last_good, f"{why}; the last good set is held", expires_s, now_s)

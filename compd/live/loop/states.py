@@ -58,8 +58,8 @@ class State(StrEnum):
         _BACK,
     )
     REFUSED = (
-        "refused", 8, False, 4, _BEYOND + "out of reach, not finite, or of lengths that were measured further apart "
-        "than `loop.skew_s`", _LATER,
+        "refused", 8, False, 4, _BEYOND + "out of reach, not finite, of lengths that were measured further apart than "
+        "`loop.skew_s`, or of a tip that may be further off than `limits.tip_error_um`", _LATER,
     )
     DEGRADED = (
         "degraded", 9, True, 2, "a correction that `reason` names is absent; `u_tip_um` says what that costs", _BACK,

@@ -1,9 +1,8 @@
-"""The live tip's standard uncertainty: from the noise that the configuration declares for its gauges, and their age."""
+"""The live tip's standard uncertainty: from the stated noise of its gauges, and the errors of the fitted numbers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation.values import GaugeValues
 from compd.configuration import Configuration
-from compd.configuration.operation import FRAME_DISTANCES, FrameWire
+from compd.live.loop.wiring import MachineWires
 from compd.model.effect_memory import EffectMemory
 from compd.model.machine import MachineModel
 from compd.model.tip_derivatives import tip_derivatives
@@ -19,36 +18,34 @@ from compd.model.uncertainty import GaugeNoise, parameter_variance
 from compd.units import UM_PER_MM
 
 
-def declared_noise(configuration: Configuration) -> GaugeNoise | None:
-    """Of every gauge, in the wiring's order; None where a length gauge declares none: then the tip's is not known."""
-    wiring, gauges = configuration.wiring, configuration.gauges
-    frame: dict[str, FrameWire] = {wire.distance: wire for wire in wiring.frame}
-    scale = sorted(wiring.scale, key=lambda wire: wire.link)
-    scale_mm, joint_mm, frame_mm = (
-        np.array([gauges[wire.gauge.split(".")[0]].noise_um or math.nan for wire in wires]) / UM_PER_MM
-        for wires in (scale, wiring.joint, [frame[distance] for distance in FRAME_DISTANCES])
-    )
-    if not all(np.isfinite(sigma_mm).all() for sigma_mm in (scale_mm, joint_mm, frame_mm)):
+def stated_noise(configuration: Configuration, wires: MachineWires, readings: int = 2) -> GaugeNoise | None:
+    """Of the lengths, which are each the difference of two readings: now and at machine zero.
+
+    At zero many readings are averaged, which makes them no better than one where the last digit stands still. None
+    where a length gauge states none: then the tip's uncertainty is not known.
+
+    readings : as of which a length counts; of releases up to 0.2.0, 1.
+    """
+    lengths_mm = np.array([wire.noise.um * math.sqrt(readings) for wire in wires.length_wires]) / UM_PER_MM
+    if not np.isfinite(lengths_mm).all():
         return None
-    quantities = {quantity.name: quantity.noise for quantity in wiring.quantities if quantity.noise is not None}
-    return GaugeNoise(scale_mm, joint_mm, frame_mm, quantities, "declared in the configuration")
+    links, joints = len(wires.scale.wires), wires.joints
+    quantities = {quantity.name: quantity.noise for quantity in configuration.wiring.quantities if quantity.noise}
+    return GaugeNoise(
+        lengths_mm[:links], lengths_mm[links : links + joints], lengths_mm[links + joints :], quantities, "stated"
+    )
 
 
-def with_absent(noise: GaugeNoise | None, absent_mm: FloatArray) -> GaugeNoise | None:
-    """The noise with what is absent of the comparators (k + 9) as further uncertainty; None where it is not known."""
-    if noise is None or not np.isfinite(absent_mm).all():
-        return None
-    joints = len(noise.joint_mm)
-    return noise._replace(
-        joint_mm=np.hypot(noise.joint_mm, absent_mm[:joints]), frame_mm=np.hypot(noise.frame_mm, absent_mm[joints:])
-    )
+# 95 % quantile of chi-squared over its degrees of freedom, 1, 2 and 3: in between it is below the straight line.
+_CHI_SQUARED_95 = (3.8415, 2.9957, 2.6049)
 
 
 class TipUncertainty(NamedTuple):
     """Of one place of the tip.
 
-    by_noise_um : (3), standard uncertainty without age, um; nan where a fitted number's error or the noise of a needed
-        quantity is not known. None where the noise of a gauge is not known.
+    by_noise_um : (4), standard uncertainty along x, y, z of {M}, um, and the radius of the sphere about the tip in
+        which it is with 95 %; nan where a fitted number's error or the noise of a needed quantity is not known. None
+        where the noise of a gauge is not known.
     tip_by_gauge : (3, n + k + 9), by how much a length moves the tip, mm per mm: scales, joints, frame.
     """
 
@@ -56,24 +53,18 @@ class TipUncertainty(NamedTuple):
     tip_by_gauge: FloatArray | None
 
 
-def with_age(
-    by_noise_um: FloatArray | None, tip_by_gauge: FloatArray | None, age_mm: Callable[[], FloatArray]
-) -> FloatArray | None:
-    """(3,) standard uncertainty of the tip, um, with that of each length by its age; None where there is none.
+def radius_95(covariance: FloatArray) -> float:
+    """Radius of the sphere that holds 95 % of a normal distribution with this covariance (3, 3); nan with nan in it.
 
-    Each length has its own age, and they count as independent: so the skew of a setpoint is in it, too.
-
-    by_noise_um, tip_by_gauge : a `TipUncertainty`; without `tip_by_gauge`, in a recording of a release up to 0.2.0,
-        age does not count. age_mm : gives that of each length by its age, (n + k + 9), mm.
+    The square of the distance is taken for a multiple of a chi-squared variable with the same mean and variance, whose
+    degrees of freedom are 1 for a scatter along a line, 3 for an even one (F. E. Satterthwaite, Biometrics Bulletin 2
+    (1946) 110-114; so does GUM G.4).
     """
-    if by_noise_um is None or tip_by_gauge is None:
-        return by_noise_um
-    length_mm = age_mm()
-    if not length_mm.any():
-        return by_noise_um
-    by_age = tip_by_gauge * (UM_PER_MM * length_mm)
-    total_um: FloatArray = np.sqrt(by_noise_um * by_noise_um + (by_age * by_age).sum(axis=1))
-    return total_um
+    mean = float(np.trace(covariance))
+    if not mean > 0.0:
+        return mean
+    freedom = mean * mean / float((covariance * covariance).sum())
+    return math.sqrt(mean * float(np.interp(freedom, (1.0, 2.0, 3.0), _CHI_SQUARED_95)))
 
 
 def tip_uncertainty(
@@ -97,6 +88,9 @@ def tip_uncertainty(
     )
     by_gauge_mm = derivatives.by_gauge * np.concatenate([noise.scale_mm, noise.joint_mm, noise.frame_mm])
     variance = (by_gauge_mm * by_gauge_mm).sum(axis=1) + (derivatives.by_quantity**2).sum(axis=1)
+    covariance = by_gauge_mm @ by_gauge_mm.T + derivatives.by_quantity @ derivatives.by_quantity.T
     if machine.live_effects:
         variance += parameter_variance(derivatives.by_theta[None], machine.live_covariance)[0]
-    return TipUncertainty(np.sqrt(np.maximum(variance, 0.0)) * UM_PER_MM, derivatives.by_gauge)
+        covariance += derivatives.by_theta @ machine.live_covariance @ derivatives.by_theta.T
+    by_noise_um = np.append(np.sqrt(np.maximum(variance, 0.0)), radius_95(covariance)) * UM_PER_MM
+    return TipUncertainty(by_noise_um, np.ascontiguousarray(derivatives.by_gauge))

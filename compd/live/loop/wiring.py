@@ -12,10 +12,11 @@ from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
+from compd.configuration.stated_noise import NOT_STATED, StatedNoise, tolerance_mm
 from compd.gauge import Quality, Reading
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.reasons import GaugeFault, Lost, lost
-from compd.live.loop.wired_readings import age_uncertainties_mm, drifts_mm_per_s, read_values
+from compd.live.loop.wired_readings import age_bounds_mm, read_values, speed_bounds_mm_per_s
 from compd.live.memory.latest import Latest, Snapshot
 
 ALL_GOOD = Lost()
@@ -43,6 +44,8 @@ class Wire(NamedTuple):
 
     channel : "gauge.channel". meaning : for people, as "joint 4". slot : its index in a snapshot. sign : +1 or -1.
     stale_after_s : age from which a reading must not be used.
+    noise : of a length, how much it scatters, and who says so.
+    fastest_mm_per_s, acceleration_mm_per_s2 : of a length, how what it measures can move; inf without a limit.
     """
 
     channel: str
@@ -50,6 +53,9 @@ class Wire(NamedTuple):
     slot: int
     sign: int
     stale_after_s: float
+    noise: StatedNoise = NOT_STATED
+    fastest_mm_per_s: float = math.inf
+    acceleration_mm_per_s2: float = math.inf
 
 
 class Wires:
@@ -60,6 +66,9 @@ class Wires:
         self._wired = np.array([wire.slot for wire in wires], dtype=np.int64)
         self._stale_after_s = np.array([wire.stale_after_s for wire in wires], dtype=float)
         self._sign = np.array([wire.sign for wire in wires], dtype=float)
+        self._fastest = np.array([wire.fastest_mm_per_s for wire in wires], dtype=float)
+        self._tolerance_mm = np.array([tolerance_mm(wire.noise.um) for wire in wires], dtype=float)
+        self.acceleration_mm_per_s2 = np.array([wire.acceleration_mm_per_s2 for wire in wires], dtype=float)
 
     def zero_vector(self, zero: MachineZero) -> FloatArray:
         """(k,) raw readings (mm) at machine zero."""
@@ -81,20 +90,35 @@ class Wires:
         values[[fault is not None for fault in faults]] = math.nan
         return WiredValues(values, oldest_s, newest_s, lost(fault for fault in faults if fault is not None))
 
-    def drift_mm_per_s(self, snapshot: Snapshot) -> tuple[float, ...]:
-        """(k) how fast each length may move while it is held, mm/s."""
-        drifts = np.empty(len(self.wires))
-        drifts_mm_per_s(snapshot.readings.slots, self._wired, drifts)
-        return tuple(drifts.tolist())
+    def speed_bound_mm_per_s(self, snapshot: Snapshot) -> FloatArray:
+        """(k) how fast each length moves at most, by its last readings, mm/s; nan where that is not known yet."""
+        speeds = np.empty(len(self.wires))
+        speed_bounds_mm_per_s(snapshot.readings.slots, self._wired, speeds)
+        return speeds
 
-    def age_uncertainty_mm(self, snapshot: Snapshot, extrapolate: bool) -> FloatArray:
-        """(k) standard uncertainty of each length by its age, mm.
+    def age_bound_mm(
+        self, snapshot: Snapshot, scales: int, extrapolate: bool, largest_mm: float
+    ) -> tuple[FloatArray, float]:
+        """(k) by how much each length may be wrong by the age of its reading, mm, and how fast the machine moves, mm/s.
 
-        0 for one that is not good; nan where it is not known how it moves.
+        0 for a length that is not good, nan where it is not known how it moves, inf where nothing limits how it may
+        have moved since. The speed is the largest that the scales show which answer; inf where none does.
+        scales : so many of the wires, the first ones, are scales.  largest_mm : of the others, none is further off.
         """
-        uncertainties_mm = np.empty(len(self.wires))
-        age_uncertainties_mm(snapshot.readings.slots, self._wired, snapshot.time_s, extrapolate, uncertainties_mm)
-        return uncertainties_mm
+        bounds_mm = np.empty(len(self.wires))
+        speed_mm_per_s = age_bounds_mm(
+            snapshot.readings.slots,
+            self._wired,
+            scales,
+            snapshot.time_s,
+            extrapolate,
+            self._fastest,
+            self.acceleration_mm_per_s2,
+            self._tolerance_mm,
+            largest_mm,
+            bounds_mm,
+        )
+        return bounds_mm, speed_mm_per_s
 
     def lost(self, snapshot: Snapshot) -> Lost:
         """Which readings are not good or too old, and why."""
@@ -134,9 +158,17 @@ class MachineWires:
         def wire(reference: str, meaning: str, sign: int = 1) -> Wire:
             channel = resolve_channel(reference, configuration.gauges, configuration.drivers)
             assert channel is not None, f"{reference} was checked when the configuration was loaded"
-            own_limit_s = configuration.gauges[channel.split(".")[0]].stale_after_s
-            stale_after_s = configuration.loop.stale_after_s if own_limit_s is None else own_limit_s
-            return Wire(channel, meaning, latest.index[channel], sign, stale_after_s)
+            options = configuration.gauges[channel.split(".")[0]]
+            return Wire(
+                channel,
+                meaning,
+                latest.index[channel],
+                sign,
+                configuration.loop.stale_after_s if options.stale_after_s is None else options.stale_after_s,
+                configuration.noise_of(channel),
+                options.fastest_mm_per_s or math.inf,
+                options.acceleration_mm_per_s2 or math.inf,
+            )
 
         frame: dict[str, FrameWire] = {entry.distance: entry for entry in wiring.frame}
         scale = sorted(wiring.scale, key=lambda entry: entry.link)

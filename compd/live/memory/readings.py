@@ -1,8 +1,8 @@
-"""Readings as they are in shared memory, one slot of 232 bytes per channel:
+"""Readings as they are in shared memory, one slot of 256 bytes per channel:
 
 value      8 bytes, float64, in the channel's unit; nan where there is none
 time_s     8 bytes, float64, monotonic
-motion     40 bytes, five float64, a `ReadingMotion`; nan where there is none
+motion     64 bytes, eight float64, a `ReadingMotion`; nan where there is none
 quality    1 byte, number of the Quality
 length     1 byte, of the detail
 (unused)   2 bytes
@@ -26,15 +26,15 @@ from numpy.typing import NDArray
 from compd.gauge import Quality, Reading, ReadingMotion
 from compd.model.kernels.jit import INDICES, helper, loop
 
-_SLOT = struct.Struct("=dddddddBBxxI168s")
-_HEAD = struct.Struct("=dddddddBBxxI")
-_CHECKED = struct.Struct("=dddddddBBxx")
+_SLOT = struct.Struct("=10dBBxxI168s")
+_HEAD = struct.Struct("=10dBBxxI")
+_CHECKED = struct.Struct("=10dBBxx")
 _CHECKED_BYTES = _CHECKED.size
-_LENGTH_PLACE = 57
+_LENGTH_PLACE = 81
 _HEAD_BYTES = _HEAD.size
 SLOT_BYTES = _SLOT.size
 LONGEST_DETAIL = SLOT_BYTES - _HEAD_BYTES
-_NO_MOTION = (math.nan,) * 5
+_NO_MOTION = (math.nan,) * 8
 
 _QUALITIES = tuple(Quality)
 _NUMBERS = {quality: number for number, quality in enumerate(_QUALITIES)}
@@ -49,6 +49,9 @@ SLOT = np.dtype(
         ("braking_mm_per_s2", np.float64),
         ("u_mm_per_s", np.float64),
         ("horizon_s", np.float64),
+        ("mean_mm_per_s", np.float64),
+        ("window_s", np.float64),
+        ("due_s", np.float64),
         ("scatter_mm", np.float64),
         ("quality", np.uint8),
         ("length", np.uint8),
@@ -66,14 +69,13 @@ _VERSIONS = types.uint64[::1]
 def pack(reading: Reading) -> bytes:
     """A reading as the content of a slot; a longer detail is cut off."""
     value, time_s, quality, detail, motion = reading
-    speed, braking, u, horizon_s, scatter_mm = motion or _NO_MOTION
+    moves = motion or _NO_MOTION
     text = b""
     if detail:
         text = detail.encode(errors="replace")[:LONGEST_DETAIL].decode(errors="ignore").encode()
-    numbers = (value, time_s, speed, braking, u, horizon_s, scatter_mm)
-    head = _CHECKED.pack(*numbers, _NUMBERS[quality], len(text))
+    head = _CHECKED.pack(value, time_s, *moves, _NUMBERS[quality], len(text))
     checksum = zlib.crc32(text, zlib.crc32(head))
-    return _SLOT.pack(*numbers, _NUMBERS[quality], len(text), checksum, text)
+    return _SLOT.pack(value, time_s, *moves, _NUMBERS[quality], len(text), checksum, text)
 
 
 def _crc_table() -> NDArray[np.int64]:
@@ -203,8 +205,8 @@ class Readings(Sequence[Reading]):
         if isinstance(index, slice):
             return tuple(self[i] for i in range(*index.indices(len(self))))
         start = range(len(self))[index] * SLOT_BYTES
-        value, time_s, *numbers, number, length, _ = _HEAD.unpack_from(self.image, start)
-        motion = ReadingMotion(*numbers)
+        value, time_s, *moves, number, length, _ = _HEAD.unpack_from(self.image, start)
+        motion = ReadingMotion(*moves)
         text = start + _HEAD_BYTES
         detail = self.image[text : text + length].decode() if length else ""
         return Reading(value, time_s, _QUALITIES[number], detail, None if math.isnan(motion.horizon_s) else motion)

@@ -5,16 +5,21 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.live.loop.cycle import step
+from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.model_loader import LiveModel, Models
-from compd.live.pipeline import build_pipeline
+from compd.live.loop.setpoint import Setpoint
+from compd.live.loop.tip_uncertainty import stated_noise
+from compd.live.pipeline import Pipeline, build_pipeline
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER, Message
 from compd.live.service.readings_message import RecordedCycle, parse_readings
+from compd.live.service.state_json import FORMER_TIP_NOISE
 from compd.recording.columns import SKEW_COLUMN
 from compd.recording.open_part import ARROW, OpenPart
 from compd.recording.table_file import CSV, SUFFIXES, row_count
@@ -150,6 +155,7 @@ def replay_cycles(
     files = [*recording.model_files(), *model_files]
     read = [pipeline.loader.read(file, plausible=False) for file in files]
     models = {"": pipeline.loader.without_effects} | {model.hash: model for model in read}
+    former = _former_settings(pipeline, configuration)
     for where, message in recording.cycles():
         recorded = _recorded_cycle(where, message, pipeline.latest.channels, configuration.geometry.links)
         applied = _model(where, message.get("model", ""), models)
@@ -157,10 +163,29 @@ def replay_cycles(
         used = Models(applied, shadow)
         # the recorded state is that after the models were adopted
         state, inputs = recorded.state._replace(models=used), recorded.inputs._replace(models=used)
-        setpoint, _ = step(state, inputs, pipeline.settings)
+        if FORMER_TIP_NOISE in message["carried"]:
+            setpoint = _former_step(state, inputs, former)
+        else:
+            setpoint, _ = step(state, inputs, pipeline.settings)
         if SKEW_COLUMN not in message["setpoint"]:  # nor had the setpoints of releases up to 0.2.0
             setpoint = setpoint._replace(skew_s=math.nan)
         yield ReplayedCycle(where, inputs.tick, recorded.setpoint_line, setpoint.to_json())
+
+
+def _former_settings(pipeline: Pipeline, configuration: Configuration) -> CycleSettings:
+    """As of releases up to 0.2.0: what they told of the tip's uncertainty was that by noise, and nothing limited it."""
+    limits = pipeline.settings.limits.model_copy(update={"tip_error_um": None})
+    noise = stated_noise(configuration, pipeline.wires, readings=1)
+    return replace(pipeline.settings, limits=limits, noise=noise)
+
+
+def _former_step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> Setpoint:
+    """The setpoint as these releases made it, with the tip's standard uncertainty along x, y, z."""
+    setpoint, after = step(state, inputs, settings)
+    if setpoint.values is None:
+        return setpoint
+    former_um = None if after.tip_noise_um is None else after.tip_noise_um[:3]
+    return setpoint._replace(values=setpoint.values._replace(u_tip_um=former_um))
 
 
 def _recorded_cycle(where: str, message: Message, channels: Sequence[str], links: int) -> RecordedCycle:

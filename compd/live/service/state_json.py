@@ -28,6 +28,8 @@ _KINDS: Mapping[str, Any] = {
     "Motion": Motion,
 }
 _TAGS: Mapping[type, str] = {kind: tag for tag, kind in _KINDS.items()}
+# What recordings call that have the tip's standard uncertainty in their setpoints, and not the bound of its error.
+FORMER_TIP_NOISE = "u_tip_um"
 # Names of the fields in recordings, and in the class; fields that are not listed are not written. The other classes
 # have the same names in both.
 _CYCLE_STATE_FIELDS: Mapping[str, str] = {
@@ -38,14 +40,14 @@ _CYCLE_STATE_FIELDS: Mapping[str, str] = {
     "scales_seen": "scales_seen",
     "shadow": "shadow_memory",
     "adopting": "adopting",
-    "u_tip_um": "u_tip_um",
+    "tip_noise_um": "tip_noise_um",
     "tip_correction_mm": "tip_correction_mm",
     "tip_by_gauge": "tip_by_gauge",
 }
 _MEMORY_FIELDS = ("motion", "memories", "commanded")
 
 # Of a set of comparators: not written where they are empty.
-_MAY_BE_EMPTY = ("group_times_s", "length_times_s", "drift_mm_per_s")
+_MAY_BE_EMPTY = ("group_times_s", "length_times_s", "drift_mm_per_s", "scale_mm")
 
 
 def to_plain(value: Any) -> Any:
@@ -93,7 +95,9 @@ def from_plain(data: Any) -> Any:
         case {"kind": tag, **fields}:
             kind = _KINDS[tag]
             fields_of = _MEMORY_FIELDS if kind is EffectMemory else kind._fields
-            names = _CYCLE_STATE_FIELDS if kind is CycleState else {name: name for name in fields_of}
+            names = {name: name for name in fields_of}
+            if kind is CycleState:
+                names = {**_CYCLE_STATE_FIELDS, FORMER_TIP_NOISE: "tip_noise_um"}
             return kind(**{names[str(name)]: from_plain(part) for name, part in fields.items()})
         case {"mapping": items}:
             return {name: from_plain(part) for name, part in items.items()}

@@ -106,12 +106,15 @@ class StatusReport:
         stale_after_s = {wire.channel: wire.stale_after_s for wire in self.wires.all_wires}
         meanings = {wire.channel: wire.meaning for wire in self.wires.all_wires}
         warnings = self.trust.warnings.read() or {}
+        noises = {wire.channel: wire.noise for wire in self.wires.length_wires}
         for channel, reading in zip(self.latest.channels, self.latest.snapshot(now_s).readings, strict=True):
             age_s = now_s - reading.time_s
             stale = reading.ok and age_s > stale_after_s.get(channel, math.inf)
             entry: dict[str, Any] = {"channel": channel, "quality": Quality.STALE if stale else reading.quality}
             if channel in meanings:
                 entry["measures"] = meanings[channel]
+            if channel in noises:
+                entry["noise_um"], entry["noise_from"] = noises[channel].um, noises[channel].source or None
             if reading.quality is not Quality.NEVER_READ:
                 entry["age_s"] = round(age_s, 4)
             if reading.ok and not stale:

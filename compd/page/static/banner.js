@@ -1,6 +1,6 @@
 // State and reason in words, on top of everything; what is not the present is grey.
 import { SILENT_S } from "./age.js";
-import { ago, tipText } from "./format.js";
+import { ago, isKnown, tipText } from "./format.js";
 import { appearance, stateName } from "./states.js";
 
 const at = (id) => document.getElementById(id);
@@ -42,7 +42,7 @@ export function showBanner(page, behind_s) {
   write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
   write("tip", setpoint?.valid ? tipText(setpoint.tip_M_mm, setpoint.u_tip_um) : "");
   const skew = setpoint?.skew_s === undefined ? "" : `, skew ${ago(setpoint.skew_s)}`;
-  write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${skew}${setpoint.u_tip_um ? "" : "; ± not known"}` : "");
+  write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${skew}${isKnown(setpoint.u_tip_um) ? "" : "; how far it may be wrong is not known"}` : "");
   const own = page.slow?.browsers ?? [];
   const armed = own.filter((browser) => browser.armed_s > 0);
   write("connected", own.length ? `${own.length} looking${armed.length ? `, ${armed.map((b) => b.name).join(", ")} armed` : ""}` : "");

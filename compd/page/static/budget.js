@@ -1,7 +1,7 @@
 // What has moved the tip: one bar for each axis, stacked by cause, with the uncertainty as a whisker, and the shadow
 // model's sum as an outline.
 import { keptScale, outline, stack, whisker } from "./bar.js";
-import { causeColour, element, signed } from "./format.js";
+import { causeColour, element, isKnown, signed } from "./format.js";
 
 export class Budget {
   constructor(place) {
@@ -38,17 +38,17 @@ export class Budget {
       }
       const parts = vectors.map((vector) => vector[axis]);
       const sum = parts.reduce((a, b) => a + b, 0);
-      const u = setpoint.u_tip_um ? 2 * setpoint.u_tip_um[axis] : NaN;
+      const u = setpoint.u_tip_um;
       stack(bar, parts, this.scale_um);
-      if (Number.isFinite(u)) whisker(bar, sum, u, this.scale_um);
+      if (isKnown(u)) whisker(bar, sum, u, this.scale_um);
       if (shadow_budget) outline(bar, shadow_budget[axis], this.scale_um);
-      number.textContent = `${signed(sum)}${Number.isFinite(u) ? ` ± ${u.toFixed(1)}` : ""} µm`;
+      number.textContent = `${signed(sum)}${isKnown(u) ? ` ± ${u.toFixed(1)}` : ""} µm`;
     });
   }
 
   drawLegend(causes, { u_tip_um, shadow }) {
     const why = shadow?.reason ?? "";
-    const key = [...causes, Boolean(u_tip_um), Boolean(shadow), why].join();
+    const key = [...causes, isKnown(u_tip_um), Boolean(shadow), why].join();
     if (key === this.key) return;
     this.key = key;
     const patch = (name, text, colour) => {
@@ -59,7 +59,7 @@ export class Budget {
     const entries = causes.map((cause, k) => patch("", cause.replaceAll("_", " "), causeColour(k)));
     if (causes.length) {
       entries.push(patch("sum", "sum"));
-      entries.push(u_tip_um ? patch("whisker", "uncertainty, 95 %") : element("span", {}, "uncertainty not known: a gauge declares no noise_um"));
+      entries.push(isKnown(u_tip_um) ? patch("whisker", "bound of the tip's error, 95 %") : element("span", {}, "bound of the tip's error not known: see noise_um"));
     }
     if (shadow) entries.push(patch("shadow", why ? `shadow model, not applied: ${why}` : "shadow model, not applied"));
     this.legend.replaceChildren(...entries);

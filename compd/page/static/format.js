@@ -5,13 +5,16 @@ export function signed(value, digits = 1) {
   return (value < 0 && Number(text) !== 0 ? "−" : "+") + text;
 }
 
-// The tip in {M}; blanks as wide as a figure keep y and z where they are, as far as a metre.
+// The tip in {M}, and how far it may be from there; blanks as wide as a figure keep y and z where they are, as far as a
+// metre.
 export function tipText(tip_M_mm, u_tip_um) {
-  const axes = ["x", "y", "z"].map((axis, k) => {
-    const u = u_tip_um ? ` ± ${(2 * u_tip_um[k]).toFixed(1)} µm` : "";
-    return `${axis} ${signed(tip_M_mm[k], 4)}${u}`.padStart(k ? 11 + u.length : 0, "\u2007");
-  });
-  return `${axes.join("  ")} mm`;
+  const axes = ["x", "y", "z"].map((axis, k) => `${axis} ${signed(tip_M_mm[k], 4)}`.padStart(k ? 11 : 0, "\u2007"));
+  return `${axes.join("  ")} mm${isKnown(u_tip_um) ? `, within ${u_tip_um.toFixed(1)} µm` : ""}`;
+}
+
+// Whether a bound of the tip's error is told: it is null where it is not known, and absent in an invalid setpoint.
+export function isKnown(u_tip_um) {
+  return Number.isFinite(u_tip_um);
 }
 
 // Date and time by ISO 8601, in this computer's zone: no country reads them otherwise.

@@ -21,9 +21,10 @@ from compd.commissioning.feigned_jumps import (
 )
 from compd.commissioning.line_budget import line_budgets
 from compd.configuration import Configuration, load
+from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Gauge, GaugeOptions, Quality, Reading, good
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample, MotionLimits, unseen_jump_mm
-from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.memory.trust_memory import TrustMemory
 from tests.support.command import run_in_process
 from tests.support.live_models import file_with
@@ -53,7 +54,10 @@ def test_the_shipped_machines_have_limits_and_no_warnings(name: str) -> None:
 def test_a_jump_is_believed_up_to_acceleration_and_noise(tmp_path: Path) -> None:
     configuration = changed(
         tmp_path,
-        ("heads: 9\n    acceleration_mm_per_s2: 20", "heads: 9\n    acceleration_mm_per_s2: 10\n    noise_um: 0.5"),
+        (
+            "noise_um: 0.035\n    heads: 9\n    acceleration_mm_per_s2: 20",
+            "noise_um: 0.5\n    heads: 9\n    acceleration_mm_per_s2: 10",
+        ),
     )
     budgets = line_budgets(configuration)
     poll_s = next(budget.usual_s for budget in budgets if budget.name == "joints")

@@ -200,7 +200,7 @@ PROBLEMS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
     ),
     "a driver that is a number": (swap(("driver: modbus", "driver: 5")), [("gauges.frame_u", "needs `driver:`")]),
     "a gauge that is a list": (
-        swap(("{driver: heidenhain_nd28x, line: scale_1, acceleration_mm_per_s2: 300}", "[a]")),
+        swap(("{driver: heidenhain_nd28x, line: scale_1, acceleration_mm_per_s2: 300, noise_um: 0.03}", "[a]")),
         [("gauges.scale_1", "needs `driver:`")],
     ),
     "one scale for two links": (
@@ -264,7 +264,7 @@ WARNINGS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
         [("geometry.link_length_mm", "targets will be refused")],
     ),
     "a gauge's own times": (
-        swap(("heads: 9", "heads: 9\n    stale_after_s: 5000\n    noise_um: 500")),
+        swap(("noise_um: 0.035\n    heads: 9", "heads: 9\n    stale_after_s: 5000\n    noise_um: 500")),
         [("gauges.joints.stale_after_s", "5000 s"), ("gauges.joints.noise_um", "corrects nothing")],
     ),
     "a setpoint shorter than a period": (

@@ -12,7 +12,6 @@ from compd.configuration import Configuration, load
 from compd.gauge import Quality, Reading, good
 from compd.live import port_names
 from compd.live.acquisition.possible_motion import GaugeSample
-from compd.live.length_trust import length_memory, length_trust
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import Doubt
@@ -20,6 +19,7 @@ from compd.live.port_names import changed_ports
 from compd.live.port_names import port_names as ports_of
 from compd.live.service import last_readings
 from compd.live.service.last_readings import LastReadings
+from compd.live.wired_trust import wired_memory, wired_trust
 from tests.support.hand_clock import HandClock
 from tests.support.paths import CONFIG
 
@@ -46,7 +46,7 @@ class Shop:
 
     def _begin(self) -> None:
         """As the daemon does at its start."""
-        self.memory = length_memory(self.configuration, self.wires)
+        self.memory = wired_memory(self.configuration, self.wires)
         self.ports = ports_of(self.configuration)
         self._last = LastReadings(self.directory, self.configuration.zero_hash, self.memory, self.clock, self.ports)
         self._last.recall()
@@ -54,7 +54,7 @@ class Shop:
 
     def replace_acquisition(self, gone_s: float = 0.0) -> None:
         self.clock.now_s += gone_s
-        self.trust = length_trust(self.configuration, self.wires, self.memory)
+        self.trust = wired_trust(self.configuration, self.wires, self.memory)
 
     def restart(self, gone_s: float) -> None:
         self._last._write_if_changed()

@@ -11,20 +11,15 @@ from compd.gauge import Quality
 from compd.live.loop.commands import Target
 from compd.live.loop.reasons import LONGEST_REASON_BYTES
 from compd.live.loop.states import State
-from compd.live.loop.tip_uncertainty import declared_noise
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine
+from tests.support.live_models import thermal, warm, with_noise
 
 FRAME = ("cabinet.t1", "cabinet.t2", "cabinet.t3")
 
 
 @pytest.fixture
 def tripod():
-    tripod = machine(on_stale="degrade")
-    gauges = {
-        name: options.model_copy(update={"noise_um": 0.1}) for name, options in tripod.configuration.gauges.items()
-    }
-    noise = declared_noise(replace(tripod.configuration, gauges=gauges))
-    tripod.settings = replace(tripod.settings, noise=noise)
+    tripod = with_noise(machine(on_stale="degrade"), 0.1)
     tripod.change_mm["joints.1"] = 0.02
     tripod.change_mm["cabinet.t1"] = 0.03
     tripod.settle()
@@ -52,11 +47,35 @@ def test_what_is_lost_fades_and_is_then_absent_while_the_rest_goes_on(tripod):
     assert tripod.step().values.sources_mm["joints"] != pytest.approx(before.values.sources_mm["joints"], abs=1e-4)
 
 
-def test_what_is_absent_counts_in_the_uncertainty_of_the_tip(tripod):
-    before = np.linalg.norm(tripod.step().values.u_tip_um)
+def test_what_is_absent_counts_in_the_bound_of_the_tip_s_error(tripod):
+    right = tripod.settle()
     tripod.faults |= dict.fromkeys(FRAME, Quality.LINE_LOST)
-    last = after_fade(tripod)[-1]
-    assert np.linalg.norm(last.values.u_tip_um) > 10.0 > before, "30 um of the frame are not corrected any more"
+    for setpoint in after_fade(tripod)[::50]:
+        error_um = 1e3 * np.linalg.norm(setpoint.values.tip_M_mm - right.values.tip_M_mm)
+        assert error_um < setpoint.values.u_tip_um < error_um + 2 * right.values.u_tip_um
+    assert error_um > 10.0, "30 um of the frame are not corrected any more"
+
+
+def test_what_a_faded_set_does_not_correct_counts_in_the_bound():
+    tripod = with_noise(machine(on_stale="fade"), 0.1)
+    tripod.change_mm |= {"joints.1": 0.02, "cabinet.t1": 0.03}
+    right = tripod.settle()
+    tripod.faults |= dict.fromkeys(FRAME, Quality.LINE_LOST)
+    for setpoint in after_fade(tripod)[10:900:50]:
+        assert setpoint.state is State.FADE
+        error_um = 1e3 * np.linalg.norm(setpoint.values.tip_M_mm - right.values.tip_M_mm)
+        assert error_um < setpoint.values.u_tip_um < 1.1 * error_um + 2 * right.values.u_tip_um
+
+
+def test_what_a_limit_does_not_let_through_counts_in_the_bound():
+    tripod = with_noise(machine(), 0.1)
+    tripod.change_mm["joints.1"] = 0.3
+    clamped = [tripod.step() for _ in range(200)][-1]
+    assert clamped.state is State.CLAMPED
+    free = with_noise(machine(correction_mm=1.0), 0.1)
+    free.change_mm["joints.1"] = 0.3
+    error_um = 1e3 * np.linalg.norm(clamped.values.tip_M_mm - free.settle().values.tip_M_mm)
+    assert error_um < clamped.values.u_tip_um < 1.05 * error_um + 2.0
 
 
 def test_the_correction_slews_on_every_change_there_and_back(tripod):
@@ -77,11 +96,24 @@ def test_before_everything_has_been_good_once_nothing_is_published():
     assert tripod.step().state is State.STARTING
 
 
-def test_effects_whose_thermometer_is_lost_leave_the_uncertainty_unknown(tripod):
-    """There is no telling what they would have corrected."""
+def test_every_group_that_is_absent_is_named(tripod):
     tripod.faults |= dict.fromkeys(FRAME, Quality.TIMEOUT)
     tripod.faults["joints.1"] = Quality.TIMEOUT
     assert "the correction of joints and frame is absent" in after_fade(tripod)[-1].reason
+
+
+def test_effects_whose_thermometer_is_lost_count_as_what_they_corrected_and_then_leave_the_bound_unknown(tmp_path):
+    tripod = machine(on_stale="degrade", tip_error_um=None)
+    tripod.commands.models = thermal(tripod, tmp_path)
+    warm(tripod, 25.0)
+    right = tripod.settle()
+    tripod.faults |= dict.fromkeys((f"cabinet.link_{k}" for k in (1, 2, 3)), Quality.TIMEOUT)
+    setpoints = after_fade(tripod)
+    fading = setpoints[500]
+    error_um = 1e3 * np.linalg.norm(fading.values.tip_M_mm - right.values.tip_M_mm)
+    assert 3.0 < error_um < fading.values.u_tip_um < 1.05 * error_um + right.values.u_tip_um
+    assert setpoints[-1].state is State.DEGRADED
+    assert np.isnan(setpoints[-1].values.u_tip_um), "nobody knows what they would correct now"
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from compd.gauge import Quality, Reading, ReadingMotion, bad, good
+from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.loop.wiring import Wire, Wires
@@ -24,15 +24,16 @@ def motion(values, times_s=None):
     return estimated_motion(samples, TOLERANCE_MM)
 
 
-SCALE = Wires([Wire("scale_1.position", "scale 1", 0, 1, math.inf)])
+A_MM_PER_S2 = 300.0
+SCALE = Wires([Wire("scale_1.position", "scale 1", 0, 1, math.inf, acceleration_mm_per_s2=A_MM_PER_S2)])
 
 
 def extrapolated(reading, now_s):
     return SCALE.read(Snapshot(now_s, Readings.of([reading])), np.zeros(1), extrapolate=True).values[0]
 
 
-def age_uncertainty_mm(reading, now_s, extrapolate):
-    return SCALE.age_uncertainty_mm(Snapshot(now_s, Readings.of([reading])), extrapolate)[0]
+def age_bound_mm(reading, now_s, extrapolate=True):
+    return SCALE.age_bound_mm(Snapshot(now_s, Readings.of([reading])), 1, extrapolate, math.inf)[0][0]
 
 
 def carried(values, age_s):
@@ -76,8 +77,10 @@ def test_what_the_last_two_readings_show_at_rest_is_at_rest_however_it_came_ther
         values = [*moving, *[end] * (1 + rounds_at_rest)]
         shown = motion(values, [round_s * k for k in range(len(values))])
         assert shown.speed_mm_per_s == 0.0
-        if (1 + rounds_at_rest) * round_s < 0.5:
-            assert shown.u_mm_per_s >= last_mm / round_s / (1 + rounds_at_rest), "it may move again as it did"
+        if rounds_at_rest == 1 and round_s < 0.25:
+            assert shown.u_mm_per_s >= last_mm / round_s / 2, "it may be where it turns round"
+        if rounds_at_rest > 1:
+            assert shown.u_mm_per_s < 0.01, "it stands"
 
 
 def test_a_motion_that_turns_is_not_carried_on():
@@ -118,17 +121,54 @@ def test_too_few_readings_have_no_known_motion():
     assert math.isnan(motion([1.0]).u_mm_per_s)
     reading = good(1.0, 0.0)._replace(motion=motion([1.0]))
     assert extrapolated(reading, 0.1) == 1.0
-    assert math.isnan(age_uncertainty_mm(reading, 0.1, extrapolate=True))
+    assert math.isnan(age_bound_mm(reading, 0.1))
 
 
 def test_readings_at_the_same_time_have_no_speed():
     assert motion([0.0, 1.0], [5.0, 5.0]).speed_mm_per_s == 0.0
 
 
-def test_the_uncertainty_grows_with_age_and_is_larger_where_nothing_is_carried_on():
-    reading = Reading(1.0, 10.0, Quality.OK, "", ReadingMotion(50.0, 0.0, 2.0, 0.08))
-    assert age_uncertainty_mm(reading, 10.05, extrapolate=True) == pytest.approx(0.05 * 2.0 + 0.05)
-    assert age_uncertainty_mm(reading, 10.05, extrapolate=False) == pytest.approx(0.05 * 52.0 + 0.05)
-    beyond = age_uncertainty_mm(reading, 10.18, extrapolate=True)
-    assert beyond == pytest.approx(0.18 * 2.0 + 0.1 * 50.0 + 0.05), "silent: the motion goes on unseen"
-    assert age_uncertainty_mm(bad(10.0, Quality.TIMEOUT), 10.05, extrapolate=True) == 0.0
+def test_the_bound_is_what_a_limited_acceleration_allows():
+    shown = motion([50.0 * ROUND_S * k for k in range(12)])
+    reading = Reading(1.0, 10.0, Quality.OK, "", shown)
+    for age_s in (0.02, 0.05, 0.08, 0.4):
+        not_carried_mm = 50.0 * max(age_s - shown.horizon_s, 0.0)
+        by_limit_mm = 0.5 * A_MM_PER_S2 * age_s * (age_s + ROUND_S)
+        assert age_bound_mm(reading, 10.0 + age_s) == pytest.approx(by_limit_mm + not_carried_mm + 0.05, rel=1e-6)
+    assert age_bound_mm(reading, 10.05, extrapolate=False) == pytest.approx(
+        0.05 * 50.0 + 0.5 * A_MM_PER_S2 * 0.05 * (0.05 + ROUND_S) + 0.05, rel=1e-6
+    )
+
+
+def test_a_length_at_rest_is_taken_to_rest_until_its_next_reading_is_due():
+    rng = np.random.default_rng(4)
+    reading = Reading(1.0, 10.0, Quality.OK, "", motion(rng.normal(0.0, 1e-5, 30).tolist()))
+    assert age_bound_mm(reading, 10.0 + 2 * ROUND_S) < 1e-4
+    silent_s = 3 * ROUND_S
+    assert age_bound_mm(reading, 10.0 + silent_s) >= 0.5 * A_MM_PER_S2 * silent_s**2
+
+
+def test_without_a_limit_of_its_motion_a_silent_gauge_may_be_anywhere():
+    free = Wires([Wire("scale_1.position", "scale 1", 0, 1, math.inf)])
+    reading = Reading(1.0, 10.0, Quality.OK, "", motion([0.0] * 12))
+    bound_mm, _ = free.age_bound_mm(Snapshot(10.5, Readings.of([reading])), 1, True, math.inf)
+    assert math.isinf(bound_mm[0])
+
+
+def test_a_silent_scale_stands_while_all_others_stand_and_moves_with_them():
+    wires = Wires(
+        [
+            Wire(f"scale_{k}.position", f"scale {k}", k - 1, 1, math.inf, acceleration_mm_per_s2=A_MM_PER_S2)
+            for k in (1, 2)
+        ]
+    )
+    standing, driven = motion([0.0] * 12), motion([50.0 * ROUND_S * k for k in range(12)])
+    silent = Reading(1.0, 10.0, Quality.OK, "", standing)
+    for other, lowest_mm, highest_mm in ((standing, 0.0, 1e-6), (driven, 6.0, 8.0)):
+        readings = Readings.of([silent, Reading(1.0, 10.18, Quality.OK, "", other)])
+        bounds_mm, _ = wires.age_bound_mm(Snapshot(10.2, readings), 2, True, math.inf)
+        assert lowest_mm <= bounds_mm[0] <= highest_mm
+
+
+def test_a_reading_without_a_motion_has_no_bound_by_age():
+    assert age_bound_mm(bad(10.0, Quality.TIMEOUT), 10.05) == 0.0

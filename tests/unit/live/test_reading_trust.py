@@ -8,10 +8,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
+from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, good
 from compd.live.acquisition.polled_gauge import PolledGauge
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
-from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.memory.latest import Latest
 from compd.live.memory.readings import pack
 from compd.live.memory.trust_memory import TrustMemory

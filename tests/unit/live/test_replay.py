@@ -151,14 +151,15 @@ def test_the_names_in_a_recording_stay_whatever_the_classes_are_called():
     run = Run(machine())
     _, message, _ = list(run.quiet(2))[-1]
     carried = message["carried"]
-    names = {"kind", "zero", "warm", "correction_mm", "last_good", "scales_seen", "shadow", "adopting", "u_tip_um"}
-    names |= {"tip_correction_mm"}  # since 0.3.0
+    names = {"kind", "zero", "warm", "correction_mm", "last_good", "scales_seen", "shadow", "adopting"}
+    names |= {"tip_correction_mm", "tip_noise_um", "tip_by_gauge"}  # since 0.3.0
     assert set(carried) == names
     kinds = {name: carried[name]["kind"] for name in ("warm", "last_good", "shadow")}
     assert kinds == {"warm": "WarmStart", "last_good": "Comparators", "shadow": "Remembered"}
     assert carried["kind"] == "Carried"
     comparators = {"kind", "change_mm", "time_s", "oldest_s", "quantities"}
-    assert set(carried["last_good"]) == comparators | {"length_times_s"}  # the last one since 0.3.0
+    since = {"length_times_s", "drift_mm_per_s", "scale_mm"}  # 0.3.0
+    assert set(carried["last_good"]) == comparators | since
 
 
 def test_a_cycle_without_zero_reads_back_as_it_was():

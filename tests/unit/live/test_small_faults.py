@@ -15,9 +15,9 @@ from compd.configuration import load
 from compd.gauge import Reading, good
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.acquisition.votes.votes import LOOK_EVERY_S, Votes
-from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.live.memory.latest import Latest
 from compd.live.pipeline import build_pipeline
+from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from tests.support.paths import CONFIG
 
 MACHINES = ("tripod-cmm.yaml", "hexapod.yaml")

@@ -1,7 +1,8 @@
-"""The uncertainty of the tip in the live loop: of gauges and parameters, or not told."""
+"""The tip's uncertainty by noise in the live loop: of gauges and parameters, and the radius in which the tip is."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,15 +10,39 @@ import pytest
 
 from compd.compensation.compensation import compensate_cmm
 from compd.compensation.values import GaugeValues, WarmStart
+from compd.configuration import load
 from compd.live.loop.model_loader import Models
+from compd.live.loop.states import State
+from compd.live.loop.tip_uncertainty import radius_95
 from tests.support.live_machine import Machine, machine
 from tests.support.live_models import file_with, thermal, with_noise
 
+MACHINES = pytest.mark.parametrize(("name", "links"), [("tripod-cmm.yaml", 3), ("hexapod.yaml", 6)])
+BOTH = pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
 
-def test_without_declared_noise_the_uncertainty_is_absent():
-    tripod = machine()
-    assert tripod.step().values.u_tip_um is None
-    assert b"u_tip_um" not in tripod.step().to_json()
+
+def told(setpoint):
+    return json.loads(setpoint.to_json())["u_tip_um"]
+
+
+@BOTH
+def test_a_shipped_machine_tells_the_bound_in_every_valid_setpoint(name):
+    live = machine(name)
+    assert 0.1 < told(live.settle()) < 1.0
+    live.faults["scale_1.position"] = "timeout"
+    assert "u_tip_um" not in json.loads(live.step().to_json())
+
+
+@BOTH
+def test_without_stated_noise_the_bound_is_null_and_with_a_limit_refused_by_name(name):
+    live = with_noise(machine(name), None)
+    setpoint = live.step()
+    assert setpoint.valid
+    assert told(setpoint) is None
+    refused = with_noise(machine(name), None, tip_error_um=100.0).step()
+    assert (refused.valid, refused.state) == (False, State.REFUSED)
+    assert "nobody states how much scale_1, scale_2, scale_3 and" in refused.reason
+    assert "`noise_um`" in refused.reason
 
 
 def test_noise_moves_no_machine_zero():
@@ -26,16 +51,18 @@ def test_noise_moves_no_machine_zero():
     assert with_noise(tripod, 0.1).configuration.config_hash != tripod.configuration.config_hash
 
 
-@pytest.mark.parametrize(("name", "links"), [("tripod-cmm.yaml", 3), ("hexapod.yaml", 6)])
+@MACHINES
 def test_the_uncertainty_is_that_of_gauges_and_parameters_changed_one_by_one(tmp_path, name, links):
     live = with_noise(machine(name), 0.2)
     machine_name = live.configuration.machine
     live.change_mm |= {channel: 0.003 * (k % 3) for k, channel in enumerate(live.wires.length_channels)}
-    gauges_alone = live.settle().values.u_tip_um
+    live.settle()
+    gauges_alone = live.state.tip_noise_um
     file = file_with(tmp_path / "m.yaml", "link_zero", "tool_offset", name=machine_name, links=links)
     model = live.loader.read(file)
     live.commands.models = Models(model)
-    u_tip_um = live.settle().values.u_tip_um
+    live.settle()
+    by_noise_um = live.state.tip_noise_um
 
     def tip_um(at, step):
         values = {"scale_mm": np.zeros(links), "joint_mm": np.zeros(live.wires.joints), "frame_mm": np.zeros(9)}
@@ -53,28 +80,70 @@ def test_the_uncertainty_is_that_of_gauges_and_parameters_changed_one_by_one(tmp
         compensation, _ = compensate_cmm(changed, GaugeValues(**values, quantities={}), WarmStart.at_zero(changed))
         return compensation.tip_M_mm * 1e3
 
-    def variance(places, step, sigma):
-        return sum(((tip_um(at, step) - tip_um(at, -step)) / (2 * step) * sigma) ** 2 for at in places)
+    def covariance(places, step, sigma):
+        moved = [(tip_um(at, step) - tip_um(at, -step)) / (2 * step) * sigma for at in places]
+        return sum(np.outer(each, each) for each in moved)
 
-    gauges = variance(range(len(live.wires.length_channels)), 1e-3, 0.2e-3)
+    # a length is the difference of two readings: now and at machine zero
+    gauges = covariance(range(len(live.wires.length_channels)), 1e-3, np.sqrt(2) * 0.2e-3)
     places = [(e, k) for e, fitted in enumerate(model.machine.effects) for k in range(len(fitted.theta))]
-    parameters = variance(places, 1.0, 0.1)
-    assert gauges_alone == pytest.approx(np.sqrt(gauges), rel=1e-3)
-    assert u_tip_um == pytest.approx(np.sqrt(gauges + parameters), rel=1e-3)
-    assert live.step().to_json().count(b'"u_tip_um":[') == 1
+    parameters = covariance(places, 1.0, 0.1)
+    for by_um, expected in ((gauges_alone, gauges), (by_noise_um, gauges + parameters)):
+        assert by_um[:3] == pytest.approx(np.sqrt(np.diag(expected)), rel=1e-3)
+        assert by_um[3] == pytest.approx(radius_95(expected), rel=1e-3)
+    assert told(live.step()) == pytest.approx(by_noise_um[3], rel=1e-3)
 
 
-def test_what_is_not_known_makes_the_tip_uncertain_without_a_number(tmp_path):
-    live = with_noise(machine(), 0.2)
-    live.commands.models = thermal(live, tmp_path)
-    assert np.isnan(live.settle().values.u_tip_um).all(), "no noise is declared for the thermometers"
-    assert b"u_tip_um" not in live.step().to_json()
-    loaded = live.configuration
-    quantities = tuple(q.model_copy(update={"noise": 0.02}) for q in loaded.wiring.quantities)
-    known = Machine(replace(loaded, wiring=loaded.wiring.model_copy(update={"quantities": quantities})))
-    known.commands.models = thermal(known, tmp_path)
-    assert np.isfinite(known.settle().values.u_tip_um).all()
-    unsure = known.commands.models.applied
+@pytest.mark.parametrize(
+    "sigmas", [(1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (1.0, 1.0, 1.0), (1.0, 0.6, 0.3), (1.0, 0.2, 0.2)]
+)
+def test_the_sphere_holds_95_per_cent(sigmas):
+    rng = np.random.default_rng(5)
+    turned, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    errors = rng.normal(size=(200_000, 3)) * sigmas @ turned.T
+    radius = radius_95(turned @ np.diag(np.square(sigmas)) @ turned.T)
+    assert np.mean(np.linalg.norm(errors, axis=1) <= radius) == pytest.approx(0.95, abs=0.004)
+
+
+@BOTH
+def test_what_is_not_known_of_an_effect_leaves_the_bound_unknown_and_is_named(tmp_path, name):
+    live = with_noise(machine(name), 0.2)
+    limited = with_noise(machine(name), 0.2, tip_error_um=100.0)
+    links = live.model.links
+    file = file_with(
+        tmp_path / "thermal.yaml", "link_expansion", name=live.configuration.machine, links=links, link_expansion=10.0
+    )
+    for each in (live, limited):
+        each.commands.models = Models(each.loader.read(file))
+    assert told(live.settle()) is None, "no noise is stated for the thermometers"
+    reason = limited.step().reason
+    assert "nobody states how much temperature_link_1_degC" in reason
+    assert "`noise`" in reason
+
+
+def test_errors_of_fitted_numbers_that_are_not_known_are_named(tmp_path):
+    tripod = machine()
+    tripod.commands.models = thermal(tripod, tmp_path)
+    assert told(tripod.settle()) > 0.4
+    unsure = tripod.commands.models.applied
     unknown = replace(unsure.machine, covariance=np.full((1, 1), np.nan))
-    known.commands.models = Models(replace(unsure, machine=unknown))
-    assert np.isnan(known.settle().values.u_tip_um).all()
+    tripod.commands.models = Models(replace(unsure, machine=unknown))
+    assert "the errors of its fitted numbers" in tripod.step().reason
+
+
+def test_the_data_sheet_of_a_driver_counts_where_the_configuration_says_nothing(tmp_path):
+    file = tmp_path / "sheet.py"
+    file.write_text(
+        "from compd.gauge import DataSheetNoise\n"
+        "from compd_drivers.heidenhain_nd28x import HeidenhainNd28x\n"
+        "class Sheet(HeidenhainNd28x):\n"
+        "    noise = DataSheetNoise(0.05, 'data sheet 1234, page 5')\n"
+    )
+    text = machine().configuration.path.read_text()
+    text = text.replace("driver: heidenhain_nd28x, line: scale_1", f"driver: '{file}:Sheet', line: scale_1")
+    own, sheet = tmp_path / "own.yaml", tmp_path / "sheet.yaml"
+    own.write_text(text)
+    sheet.write_text(text.replace(", noise_um: 0.03", "", 1))
+    assert load(own).noise_of("scale_1.position") == (0.03, "configuration")
+    assert load(sheet).noise_of("scale_1.position") == (0.05, "driver: data sheet 1234, page 5")
+    assert told(Machine(load(sheet)).settle()) > told(Machine(load(own)).settle())

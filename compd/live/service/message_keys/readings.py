@@ -19,6 +19,11 @@ class MotionKeys(Keys):
         default=None, description="standard uncertainty of the speed; absent while it is not known"
     )
     horizon_s: float = Field(description="for so long after the reading the motion is taken to go on, s")
+    mean_mm_per_s: float | None = Field(default=None, description="mean speed over the last `window_s`")
+    window_s: float | None = Field(default=None, description="how long before the reading that window begins, s")
+    due_s: float | None = Field(
+        default=None, description="so long after the reading the next one is there at the latest, s"
+    )
     scatter_mm: float | None = Field(
         default=None,
         description="standard deviation of one reading at rest, as the last ones show it; absent while it is not known",

@@ -87,12 +87,12 @@ class SetpointKeys(SentMessage):
         description="how much each cause asks for, for each link, mm: `joints`, `frame`, then by its id what each "
         "effect adds to those before it; their sum is the correction before its limits",
     )
-    u_tip_um: Vector | None = Field(
+    u_tip_um: float | None = Field(
         default=None,
-        description="standard uncertainty of the tip in x, y, z of {M}, um, with the tool on the plate that of "
-        "`tip_P_mm`: to first order, from the gauges' noise and the errors of the fitted parameters, computed anew "
-        "once a second, and from the age of each length and how surely its motion is known, in every cycle; absent "
-        "while any of them is not known",
+        description="how far the tip may be from `tip_M_mm`, with the tool on the plate `tip_P_mm`, um: 95 % bound "
+        "of the distance, in every valid setpoint; null where it is not known. It has the gauges' noise and the errors "
+        "of the fitted parameters, how far each length may have gone since it was read, and what is not corrected. "
+        "`limits.tip_error_um` limits it",
     )
     shadow: ShadowKeys | None = Field(
         default=None, description="what the shadow model asks for in this cycle; absent without a shadow"

@@ -105,6 +105,12 @@ class ChannelStatusKeys(Keys):
     channel: str = Field(description='"gauge.channel"')
     quality: Quality = Field(description="`ok`, or why there is no value")
     measures: str | None = Field(default=None, description="what the wiring says that it measures")
+    noise_um: float | None = Field(
+        default=None, description="of a length: standard deviation of one reading, um; absent where nobody states it"
+    )
+    noise_from: str | None = Field(
+        default=None, description="who states it: `configuration`, or `driver` with the source in its data sheet"
+    )
     age_s: float | None = Field(default=None, description="age of its reading, s")
     value: float | None = Field(default=None, description="raw value, before sign and machine zero, in its unit")
     detail: str | None = Field(default=None, description="what the device sent or the line saw")
