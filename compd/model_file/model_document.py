@@ -2,15 +2,16 @@
 
 Each step keeps what it replaced, so that it can be undone. `compd.model_file.model_file` makes effects of the data.
 
-    format: 2               # 1 was written by release 0.1.0, with the same keys; a file without it counts as 1
+    format: 3               # 1 and 2, of releases before 0.6, have no `counts_from`; a file without it counts as 1
     machine: tripod-cmm     # name of the configuration, or "external"
     geometry: 9f3a...       # hash of the geometry that it was fitted on; left out where that is not known
     release: 0.2.0          # of compd, that wrote it
     effects:
-    - effect: link_sag      # an id, /absolute/file.py:NAME, or a formula written out
-      shape: {n: 3.0}       # values of its nonlinear constants
+    - effect: link_expansion  # an id, /absolute/file.py:NAME, or a formula written out
+      counts_from: machine zero  # "20 degC" where it was fitted without the quantities there, and without the key
+      shape: {}             # values of its nonlinear constants
       parameters:
-      - {name: s, value: 1.0, std: 0.1, unit: um}
+      - {name: a, value: 11.0, std: 0.1, unit: ppm/K}
     covariance: [[0.01]]    # of all fitted numbers jointly, in the order of the file
     steps: []               # see ModelStep
 """
@@ -33,7 +34,7 @@ from compd.files.file_kind import FileKind
 from compd.release import __version__
 from compd.text.secrets import has_secret, holds_secret
 
-FORMAT = 2
+FORMAT = 3
 Kind = Literal["add", "remove", "fit", "undo"]
 # An effect's id, /absolute/file.py:NAME, or a formula written out.
 Declaration: TypeAlias = str | dict[str, Any]
@@ -100,6 +101,11 @@ class EffectEntry(FilePart):
     """One effect with its fitted parameters."""
 
     effect: Declaration = Field(description="an id of the library, /absolute/file.py:NAME, or a formula's declaration")
+    counts_from: Literal["machine zero", "20 degC"] = Field(
+        default="20 degC",
+        description="the quantities from which it counts: `machine zero`; or `20 degC`, 1013.25 hPa and 0 of anything "
+        "else, as in files of releases before 0.6",
+    )
     shape: Annotated[dict[str, float], _EmptyMapping] = Field(
         default={}, description="values of its nonlinear constants, by name"
     )
@@ -110,7 +116,7 @@ class ModelDocument(FilePart):
     """The keys of the file."""
 
     format: Annotated[int, Field(ge=1)] = Field(
-        default=1, description=f"number of the format: {FORMAT}; 1, of release 0.1, has the same keys"
+        default=1, description=f"number of the format: {FORMAT}; 1 and 2, of releases before 0.6, lack some keys"
     )
     machine: str = Field(description='name of the machine\'s configuration, or "external"')
     geometry: str = Field(

@@ -99,6 +99,15 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
                 "measure again from the first zero: it survives a restart of the daemon",
             ),
         )
+        if recording.sidecar.quantities_at_zero != first.sidecar.quantities_at_zero:
+            comparisons += (
+                (
+                    "has other quantities at machine zero",
+                    _at_zero_text(recording),
+                    _at_zero_text(first),
+                    "write the same `quantities_at_zero:` in both, if both were measured from one machine zero",
+                ),
+            )
         problems += [
             Problem(where=str(recording.sidecar.path), what=what, value=value, allowed=allowed, next_step=next_step)
             for what, value, allowed, next_step in comparisons
@@ -125,6 +134,13 @@ def _reference_text(recording: Recording) -> str:
 
 def _folds_text(recording: Recording) -> str:
     return ", ".join(recording.sidecar.folds) or "no `folds:`"
+
+
+def _at_zero_text(recording: Recording) -> str:
+    at_zero = recording.sidecar.quantities_at_zero
+    if at_zero is None:
+        return "no `quantities_at_zero:`"
+    return ", ".join(f"{name} {value:g}" for name, value in at_zero.items()) or "none"
 
 
 def _zero_time(recording: Recording) -> str:
@@ -218,4 +234,11 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
         for recording, start_s in zip(recordings, starts_s, strict=True)
     ]
     first = recordings[0].sidecar
-    return sidecar_contents(first.machine, reference_contents, excluded, {"merge": sources}, folds=first.folds)
+    return sidecar_contents(
+        first.machine,
+        reference_contents,
+        excluded,
+        {"merge": sources},
+        folds=first.folds,
+        quantities_at_zero=first.quantities_at_zero,
+    )

@@ -119,6 +119,8 @@ def _compute(
     if zero is not state.zero or zero_vectors is None:
         zero_vectors = ZeroVectors(wires.scale.zero_vector(zero), wires.comparators.zero_vector(zero))
         state = _with_zero(state, zero, zero_vectors, settings)
+    if missing := applied.missing_at_zero(zero):
+        return _Outcome(State.NO_ZERO, missing), state
 
     live, usable = read_comparators(state.last_good, inputs, zero_vectors.comparators_mm, applied, settings)
     comparators = usable.comparators
@@ -136,7 +138,8 @@ def _compute(
     last_good = state.last_good if live is None else live
 
     change_mm, joints = comparators.change_mm, wires.joints
-    values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s)
+    joint_mm, frame_mm = change_mm[:joints], change_mm[joints:]
+    values = GaugeValues(scale_mm, joint_mm, frame_mm, comparators.quantities, snapshot.time_s, zero.quantities)
     machine = applied.machine if usable.weight == 1.0 else applied.machine.with_effect_weight(usable.weight)
     started = state.warm_start
     compensation, warm_start = compensate(machine, values, target, started)

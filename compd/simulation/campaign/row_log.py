@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,9 +27,10 @@ UM = 1e-3
 
 @dataclass
 class LoggedRows:
-    """Values by column of a recording. indicated_mm, reference_mm : (3,) per row, tip by the gauges and true."""
+    """Values by column of a recording. quantities_at_zero : by column, when the log began. indicated_mm, reference_mm : (3,) per row, tip by the gauges and true."""
 
     columns: dict[str, list[float]] = field(default_factory=dict)
+    quantities_at_zero: dict[str, float] = field(default_factory=dict)
     indicated_mm: list[FloatArray] = field(default_factory=list)
     reference_mm: list[FloatArray] = field(default_factory=list)
 
@@ -44,7 +45,7 @@ class LoggedRows:
 
 
 class RowLog:
-    """Reads gauges and reference of a world that the campaign moves."""
+    """Reads gauges and reference of a world that the campaign moves. It begins while the world is at machine zero."""
 
     def __init__(
         self,
@@ -62,7 +63,7 @@ class RowLog:
         self._world, self._rng = world, rng
         self._reference = reference
         self._indicated = IndicatedTip(world.mechanism, wiring) if reference.sigma_um == 0 else None
-        self.rows = LoggedRows()
+        self.rows = LoggedRows(quantities_at_zero={name: world.sense(name) for name in _others(world.names)})
 
     def add(self, session: int, visit: int, point: int | None, direction: FloatArray, measured: bool = True) -> None:
         """Add a row. direction : (n,) of each link's last motion. measured : whether the reference measures, too."""
@@ -71,7 +72,6 @@ class RowLog:
         links = world.mechanism.links
         joints = [name for name in readings if name.startswith("joint_")]
         frames = [name for name in readings if name.startswith("frame_")]
-        others = [name for name in readings if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
         self.rows.add(
             {
                 "time_s": round(world.time_s, 6),
@@ -80,7 +80,7 @@ class RowLog:
                 "visit": visit,
                 **{column: readings[f"scale_{i}"] for i, column in enumerate(scale_columns(links), 1)},
                 **{f"{name}_um": readings[name] / UM for name in (*joints, *frames)},
-                **{name: round(readings[name], 3) for name in others},
+                **{name: round(readings[name], 3) for name in _others(readings)},
                 **dict(zip(approach_columns(links), direction, strict=True)),
                 **(self._reference_values(point) if measured else dict.fromkeys(self._reference_columns(), np.nan)),
             }
@@ -127,3 +127,8 @@ class RowLog:
         true_mm = np.linalg.norm(away_mm) - places.length_error_mm
         length_mm = float(self._reference.measure(np.array([true_mm]), self._rng)[0])
         return {"ball": end, DISTANCE_COLUMN: round(length_mm, 6)}
+
+
+def _others(names: Iterable[str]) -> list[str]:
+    """Those that are no lengths."""
+    return [name for name in names if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
