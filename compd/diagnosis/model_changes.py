@@ -84,7 +84,8 @@ def remove(model: ModelFile, effect_id: str, aligned: AlignedRecording, refine: 
 def refit(model: ModelFile, aligned: AlignedRecording, refine: Refinement = unrefined) -> ModelFile:
     """Fit all effects again from zero, nonlinear constants as they are, `refine` as of `add`.
 
-    They then count from machine zero where the recording has the quantities there, else from 20 degC. Raises StateError where there are none.
+    They then count from machine zero where the recording has the quantities there, else from 20 degC.
+    Raises StateError where there are none.
     """
     if not model.fitted:
         raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))

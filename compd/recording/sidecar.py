@@ -174,8 +174,8 @@ SECTIONS: Mapping[str, Any] = {
         BeforeValidator(_checked_quantities),
         Field(
             description="temperatures, forces and so on when machine zero was taken, by the names of their columns: "
-            "from them effects count. Without the key, as in recordings of releases before 0.6, they count from 20 degC, "
-            "1013.25 hPa and 0 of anything else"
+            "from them effects count. Without the key, as in recordings of releases before 0.6, they count from "
+            "20 degC, 1013.25 hPa and 0 of anything else"
         ),
     ],
     "excluded_rows": Annotated[
@@ -230,6 +230,16 @@ class Sidecar:
     def external(self) -> bool:
         """The recording carries the user's own model's prediction."""
         return self.machine == EXTERNAL
+
+    @property
+    def counts_from(self) -> str:
+        """From where effects of measured quantities count, for people; "" for an external model's, which count as they
+        are written."""
+        if self.external:
+            return ""
+        if self.quantities_at_zero is None:
+            return "20 degC, 1013.25 hPa and 0 of other quantities: the sidecar has no `quantities_at_zero:`"
+        return "machine zero"
 
     @property
     def unit(self) -> str:

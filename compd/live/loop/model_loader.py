@@ -88,8 +88,8 @@ class LiveModel:
             return ""
         missing = ", ".join(sorted(self.needed_at_zero - zero.quantities.keys()))
         return (
-            f"machine zero of {zero.taken_at} has no {missing}, from which effects of the model count: bring the machine "
-            "to its zero position and run `compd zero`"
+            f"machine zero of {zero.taken_at} has no {missing}, from which effects of the model count: bring the "
+            "machine to its zero position and run `compd zero`"
         )
 
     @property

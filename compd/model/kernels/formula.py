@@ -131,7 +131,7 @@ def _column(row: EffectRow, quantities: FloatArray, axial_N: FloatArray, kind: i
 
 
 @helper
-def _run(
+def _run(  # noqa: PLR0912  one branch for each kind of operation
     operations: IntArray,
     lags: IntArray,
     numbers: FloatArray,

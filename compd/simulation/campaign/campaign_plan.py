@@ -102,7 +102,7 @@ def draw_campaign_plan(
     """Plan number `number` for the machine of `seed`.
 
     points_mm : (points, n) scale values to use instead of random points. passes : per session. warm_up_s : time for
-    which the machine is on, with its drives hard at work, before the first row of each session. air_at_zero : when machine zero is taken, at
+    which the machine is on, with its drives hard at work, before the first row of each session. air_at_zero : at
     time 0.
     """
     rng = np.random.default_rng([seed, 1, number])

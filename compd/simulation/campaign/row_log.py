@@ -27,7 +27,10 @@ UM = 1e-3
 
 @dataclass
 class LoggedRows:
-    """Values by column of a recording. quantities_at_zero : by column, when the log began. indicated_mm, reference_mm : (3,) per row, tip by the gauges and true."""
+    """Values by column of a recording. quantities_at_zero : by column, when the log began.
+
+    indicated_mm, reference_mm : (3,) per row, tip by the gauges and true.
+    """
 
     columns: dict[str, list[float]] = field(default_factory=dict)
     quantities_at_zero: dict[str, float] = field(default_factory=dict)

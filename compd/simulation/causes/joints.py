@@ -78,9 +78,9 @@ class JointRunout(Cause):
 
 
 class PlatformExpansion(Cause):
-    """Thermal expansion of the platform: joint centre c_i moves by alpha c_i (T_arm,i - its value at machine zero), in {P}.
+    """Thermal expansion of the platform: joint centre c_i moves by alpha c_i dT_arm,i, in {P}, dT since machine zero.
 
-    T_arm,i is the platform's temperature plus 7.5 % of what the end of link i departs from it. Strength: alpha.
+    dT_arm,i is the platform's plus 7.5 % of what the end of link i departs from it. Strength: alpha.
     """
 
     id = "platform_expansion"

@@ -38,7 +38,7 @@ def test_what_is_saved_is_what_is_loaded(tmp_path):
         ("", "not JSON"),
         ('{"format": 1, "zero_hash": "abc"', "not JSON"),
         ("[]", "not a machine zero"),
-        ('{"format": 3, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "a later release of compd"),
+        ('{"format": 4, "zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "a later release of compd"),
         ('{"zero_hash": "abc", "taken_at": "", "readings_mm": {}}', "format: is not a machine zero: Field required"),
         ('{"format": 1, "zero_hash": 7, "taken_at": "", "readings_mm": {}}', "zero_hash: is not a machine zero"),
         (
