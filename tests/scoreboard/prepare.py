@@ -117,10 +117,9 @@ def _period_mm(case: Case) -> float:
 
 def _plan(case: Case, mechanism: Mechanism, number: int) -> CampaignPlan:
     """What is measured in the campaign with this number."""
-    if case.family == "short" and number == 0:
-        return draw_campaign_plan(mechanism, case.seed, number, air_at_zero=_air_at_zero(case)).single_visits(SHORT_ROWS)
     warm_up_s = WARM_UP_S if case.family == "warm-start" else 0.0
-    return draw_campaign_plan(mechanism, case.seed, number, warm_up_s=warm_up_s, air_at_zero=_air_at_zero(case))
+    plan = draw_campaign_plan(mechanism, case.seed, number, warm_up_s=warm_up_s, air_at_zero=_air_at_zero(case))
+    return plan.single_visits(SHORT_ROWS) if case.family == "short" and number == 0 else plan
 
 
 def _air_at_zero(case: Case) -> AirAtZero:

@@ -12,6 +12,7 @@ from compd.cli.options import MachineOption, OverwriteOption
 
 if TYPE_CHECKING:
     from compd.comparison.comparison import Comparison
+    from compd.model.effect import FittedEffect
 
 # More sentences than this nobody reads in a terminal.
 MOST_SENTENCES = 6

@@ -33,9 +33,7 @@ load_machine = cache(lambda name: load(shipped_configuration(name)))
 def world(name: str, air: AirAtZero, causes: Sequence[Cause] = ()) -> World:
     configuration = load_machine(name)
     strengths = replace(FULLY_MEASURED_WITHOUT_NOISE, room_swing_K=0.0)
-    return World(
-        configuration.geometry, configuration.wiring, 1, strengths=strengths, causes=causes, air_at_zero=air
-    )
+    return World(configuration.geometry, configuration.wiring, 1, strengths=strengths, causes=causes, air_at_zero=air)
 
 
 @MACHINES
