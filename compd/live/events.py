@@ -57,6 +57,7 @@ KEYS: Mapping[str, str] = {
     "process": "name of a process of the daemon",
     "quality": "quality of the gauge's last poll",
     "rate_hz": "cycles per second",
+    "quantities": "names of temperatures, forces and so on",
     "reason": "why, in words",
     "rest_s": "until the gauge is asked again, s",
     "signal": "name of the signal",

@@ -101,11 +101,12 @@ def _python_basis(
     effect: Effect, basis: Basis, rows: Observations, constants: ConstantValues, memory: Memory
 ) -> tuple[FloatArray, Memory]:
     """Of an effect in Python, less what it adds at machine zero where it counts from there."""
-    if effect.counts_from != "machine zero" or not is_measured(effect):
+    if effect.counts_from != "machine zero":
         return basis(rows if rows.quantities_at_zero is None else rows.from_standard, constants, memory)
     values, after = basis(rows, constants, memory)
-    at_zero, _ = basis(rows.at_machine_zero, constants, None)
-    return values - at_zero, after
+    if is_measured(effect):
+        values = values - basis(rows.at_machine_zero, constants, None)[0]
+    return values, after
 
 
 def program_numbers(effect: Effect, program: BasisProgram, constants: ConstantValues) -> FloatArray:

@@ -98,16 +98,13 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
                 _zero_time(first),
                 "measure again from the first zero: it survives a restart of the daemon",
             ),
+            (
+                "has other quantities at machine zero",
+                _at_zero_text(recording),
+                _at_zero_text(first),
+                "write the same `quantities_at_zero:` in both, if both were measured from one machine zero",
+            ),
         )
-        if recording.sidecar.quantities_at_zero != first.sidecar.quantities_at_zero:
-            comparisons += (
-                (
-                    "has other quantities at machine zero",
-                    _at_zero_text(recording),
-                    _at_zero_text(first),
-                    "write the same `quantities_at_zero:` in both, if both were measured from one machine zero",
-                ),
-            )
         problems += [
             Problem(where=str(recording.sidecar.path), what=what, value=value, allowed=allowed, next_step=next_step)
             for what, value, allowed, next_step in comparisons
@@ -140,7 +137,7 @@ def _at_zero_text(recording: Recording) -> str:
     at_zero = recording.sidecar.quantities_at_zero
     if at_zero is None:
         return "no `quantities_at_zero:`"
-    return ", ".join(f"{name} {value:g}" for name, value in at_zero.items()) or "none"
+    return ", ".join(f"{name} {value!r}" for name, value in sorted(at_zero.items())) or "none"
 
 
 def _zero_time(recording: Recording) -> str:

@@ -279,6 +279,15 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
         )
     elif reference.balls is not None:
         reference = reference.model_copy(update={"balls": path.parent / reference.balls})
+    if sections["quantities_at_zero"] is not None and sections["machine"] == EXTERNAL:
+        problems.append(
+            Problem(
+                where=document.where(("quantities_at_zero",)),
+                what="belongs to a machine with a machine zero; an external model's effects count as they are written",
+                allowed=f"the name of a configuration, not `machine: {EXTERNAL}`",
+                next_step="delete it",
+            )
+        )
     exclusions: tuple[Exclusion, ...] = sections["excluded_rows"] or ()
     return Sidecar(
         path,

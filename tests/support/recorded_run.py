@@ -97,7 +97,8 @@ class Run:
 
     def take_zero(self):
         readings = {name: RAW_AT_ZERO_MM + change for name, change in self.machine.change_mm.items()}
-        self.machine.commands.zero = MachineZero(self.machine.configuration.zero_hash, "later", readings)
+        zero = self.machine.commands.zero
+        self.machine.commands.zero = replace(zero, taken_at="later", readings_mm=readings)
 
     @contextmanager
     def recorder(self, name: Path, limits=ROOMY, reports=None, **watch):

@@ -60,12 +60,14 @@ def expansion(live: Machine, tmp_path, name, links) -> Models:
 @pytest.mark.parametrize("degC", [15.0, 20.2, 23.0, 27.0])
 def test_nothing_is_corrected_where_machine_zero_was_taken(tmp_path, name, links, degC):
     live = machine(f"{name}.yaml")
+    cold = live.latest.put
     warm(live, degC)
     answer = take_zero(live, tmp_path)
     assert answer["class"] == "ZERO"
     assert set(answer["quantities"].values()) == {degC}
     live.commands.models = expansion(live, tmp_path, name, links)
     assert live.settle().values.sources_mm["link_expansion"] == pytest.approx(np.zeros(links), abs=1e-12)
+    live.latest.put = cold
     warm(live, degC + 1.0)
     grown = live.settle().values
     assert grown.sources_mm["link_expansion"] == pytest.approx(-1e-6 * PPM_PER_K * grown.link_length_mm, rel=1e-4)

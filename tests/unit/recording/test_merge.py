@@ -88,7 +88,7 @@ def test_recordings_from_other_quantities_at_machine_zero_do_not_go_together(tmp
     again = recording(tmp_path / "again", csv_text(6), SIDECAR + cold)
     merge_recordings([first, again], tmp_path / "both.csv")
     assert read_recording(tmp_path / "both.csv").sidecar.quantities_at_zero == {"temperature_room_degC": 15.0}
-    for sidecar, value in ((SIDECAR + warm, "temperature_room_degC 23"), (SIDECAR, "no `quantities_at_zero:`")):
+    for sidecar, value in ((SIDECAR + warm, "temperature_room_degC 23.0"), (SIDECAR, "no `quantities_at_zero:`")):
         other = recording(tmp_path / value[:2], csv_text(6), sidecar)
         with pytest.raises(RecordingError, match="has other quantities at machine zero") as caught:
             merge_recordings([first, other], tmp_path / "not.csv")
