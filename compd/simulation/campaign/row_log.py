@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,7 +66,8 @@ class RowLog:
         self._world, self._rng = world, rng
         self._reference = reference
         self._indicated = IndicatedTip(world.mechanism, wiring) if reference.sigma_um == 0 else None
-        self.rows = LoggedRows(quantities_at_zero={name: world.sense(name) for name in _others(world.names)})
+        # machine zero averages for a second, which leaves next to nothing of a thermometer's noise
+        self.rows = LoggedRows(quantities_at_zero=world.quantities())
 
     def add(self, session: int, visit: int, point: int | None, direction: FloatArray, measured: bool = True) -> None:
         """Add a row. direction : (n,) of each link's last motion. measured : whether the reference measures, too."""
@@ -75,6 +76,7 @@ class RowLog:
         links = world.mechanism.links
         joints = [name for name in readings if name.startswith("joint_")]
         frames = [name for name in readings if name.startswith("frame_")]
+        others = [name for name in readings if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
         self.rows.add(
             {
                 "time_s": round(world.time_s, 6),
@@ -83,7 +85,7 @@ class RowLog:
                 "visit": visit,
                 **{column: readings[f"scale_{i}"] for i, column in enumerate(scale_columns(links), 1)},
                 **{f"{name}_um": readings[name] / UM for name in (*joints, *frames)},
-                **{name: round(readings[name], 3) for name in _others(readings)},
+                **{name: round(readings[name], 3) for name in others},
                 **dict(zip(approach_columns(links), direction, strict=True)),
                 **(self._reference_values(point) if measured else dict.fromkeys(self._reference_columns(), np.nan)),
             }
@@ -130,8 +132,3 @@ class RowLog:
         true_mm = np.linalg.norm(away_mm) - places.length_error_mm
         length_mm = float(self._reference.measure(np.array([true_mm]), self._rng)[0])
         return {"ball": end, DISTANCE_COLUMN: round(length_mm, 6)}
-
-
-def _others(names: Iterable[str]) -> list[str]:
-    """Those that are no lengths."""
-    return [name for name in names if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]

@@ -291,6 +291,10 @@ class World:
         except KinematicsError:
             return self._state
 
+    def quantities(self) -> dict[str, float]:
+        """What thermometers, barometer, hygrometer and load cell show without noise, by name."""
+        return {**self._warm.thermometers_degC(), **self._air_and_load()}
+
     @property
     def names(self) -> list[str]:
         """Names of everything that can be sensed."""
@@ -328,8 +332,13 @@ class World:
             frame_mm = cause.frame_reading_mm(frame_mm, warm)
         return {
             **self._sensors.read(scale_mm, joint_mm, frame_mm, warm.thermometers_degC()),
-            "pressure_hPa": self._weather.pressure_hPa(warm.time_s),
-            "humidity_pct": self._weather.humidity_pct(warm.time_s),
+            **self._air_and_load(),
+        }
+
+    def _air_and_load(self) -> dict[str, float]:
+        return {
+            "pressure_hPa": self._weather.pressure_hPa(self._warm.time_s),
+            "humidity_pct": self._weather.humidity_pct(self._warm.time_s),
             **{f"force_{axis}_N": float(force) for axis, force in zip("xyz", self.force_M_N, strict=True)},
         }
 
