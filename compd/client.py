@@ -289,8 +289,8 @@ class Client:
         Returns
         -------
         dict
-            ZERO with `taken_at`, `path` of the file, `readings_mm` by channel and, where there was a machine zero
-            before, `changed_mm` by channel.
+            ZERO with `taken_at`, `path` of the file, `readings_mm` by channel, `quantities` by name (those that could
+            not be read are listed in `without`) and, where there was a machine zero before, `changed_mm` by channel.
 
         Raises
         ------
@@ -361,8 +361,9 @@ class Client:
         Returns
         -------
         dict
-            MODEL with `applied` and, if there is one, `shadow`: `effects`, `not_live`, `model` (the file's hash) and
-            `file`; `kept`, whether the daemon starts with the applied model again, and `kept_text`, what keeps it.
+            MODEL with `applied` and, if there is one, `shadow`: `effects`, `not_live`, `from_20_degC`, `model` (the
+            file's hash) and `file`; `kept`, whether the daemon starts with the applied model again, and `kept_text`,
+            what keeps it.
 
         Raises
         ------

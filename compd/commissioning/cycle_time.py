@@ -55,7 +55,10 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
     file = configuration.state.model_file
     model = pipeline.loader.load(None if file is None else ModelText.read(Path(file)))
     try_model(settings.model, (), str(configuration.path))
-    zero = MachineZero(configuration.zero_hash, "", dict.fromkeys(wires.length_channels, _RAW_MM))
+    lengths, quantities = wires.length_channels, wires.quantity_names
+    zero = MachineZero(
+        configuration.zero_hash, "", dict.fromkeys(lengths, _RAW_MM), dict.fromkeys(quantities, _QUANTITY)
+    )
     commands = Commands(zero, Models(model))
     packer = CyclePacker(Directions(wires.scale.wires))
     numbers = count()
@@ -107,6 +110,7 @@ def _compensation_time(machine: MachineModel, quantities: Sequence[str], clock: 
         np.zeros(9),
         dict.fromkeys(quantities, np.array(_QUANTITY)),
         0.0,
+        dict.fromkeys(quantities, _QUANTITY),
     )
     warm = WarmStart.at_zero(machine)
     times_s = []

@@ -167,6 +167,7 @@ def _effect_inputs(
             name: np.broadcast_to(quantity, rows.lead or (1,)).reshape(count)
             for name, quantity in values.quantities.items()
         },
+        values.quantities_at_zero,
         rows.time_s,
         bare["bare_frame"]["base_joints_M_mm"][:, :n],
         Pose(

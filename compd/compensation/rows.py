@@ -18,6 +18,7 @@ class Rows(NamedTuple):
     """The arguments of a compensation as the kernel takes them: N rows, contiguous, of float64.
 
     lead : the leading axes of the result; () for a single snapshot.
+    quantities : (N, q + z), those that the effects need and those from which they count, as in the model's program.
     wanted : (N, 6) tip in {M} and in {P}.  warm : one row, or N.
     """
 
@@ -42,9 +43,12 @@ def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wante
         lead = np.broadcast_shapes(*(part.shape[: part.ndim - core] for part, core in parts))
     count = math.prod(lead)
     names = model.program.quantities
-    quantities = np.empty((count, len(names)))
+    references = model.program.references
+    quantities = np.empty((count, len(names) + len(references)))
     for place, name in enumerate(names):
         quantities[:, place] = _quantity(values.quantities, name)
+    for place, (name, value) in enumerate(references, start=len(names)):
+        quantities[:, place] = _at_zero(values.quantities_at_zero, name) if value is None else value
     wanted_mm, attitude_M_P = np.empty((count, 6)), np.empty((count, 3, 3))
     if wanted:
         wanted_mm[:, :3] = _row_copy(wanted.tip_M_mm, lead, 1)
@@ -73,6 +77,20 @@ def _row_copy(values: FloatArray, lead: tuple[int, ...], core: int) -> FloatArra
         return np.array(values, dtype=np.float64, ndmin=core + 1)
     shape = values.shape[values.ndim - core :]
     return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64).reshape(math.prod(lead), *shape)
+
+
+def _at_zero(quantities: Mapping[str, float], name: str) -> float:
+    if name not in quantities:
+        raise CompdError(
+            Problem(
+                where="rows for effects",
+                what="this quantity was not measured at machine zero, from where effects count",
+                value=name,
+                allowed=", ".join(sorted(quantities)) or "nothing was",
+                next_step="take machine zero again: `compd zero`",
+            )
+        )
+    return quantities[name]
 
 
 def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 from compd.arrays import FloatArray, IntArray
@@ -18,6 +19,7 @@ class GaugeValues(NamedTuple):
     scale_mm : (..., n).  joint_mm : (..., k), in the wiring's order.  frame_mm : (..., 9), t1..t3, u1..u6.
     quantities : anything else by its name with unit (temperatures, forces), each (...): what effects need, or empty.
     time_s : (...), monotonic, for effects with a memory; rows follow each other in time.
+    quantities_at_zero : the quantities at machine zero, by name: those from which effects count, or empty.
     """
 
     scale_mm: FloatArray
@@ -25,6 +27,7 @@ class GaugeValues(NamedTuple):
     frame_mm: FloatArray
     quantities: Mapping[str, FloatArray]
     time_s: FloatArray | float = math.nan
+    quantities_at_zero: Mapping[str, float] = MappingProxyType({})
 
 
 class WarmStart(NamedTuple):

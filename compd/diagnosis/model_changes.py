@@ -20,6 +20,7 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect, FittedEffect
+from compd.model.effect_basis import counted_from, recounted
 from compd.model.effect_needs import needed_quantities
 from compd.model.library import load_library
 from compd.model.observations import Observations
@@ -56,7 +57,7 @@ def add(
             )
         )
     before = compare(aligned, model.fitted, model.covariance)
-    result = search_constants(aligned, model.fitted, effect, before.floor.by_axis_um)
+    result = search_constants(aligned, model.fitted, counted_from(effect, aligned.rows), before.floor.by_axis_um)
     extended = replace(model, declared=(*model.declared, declared))
     return _changed(extended, model, refine(result, before.floor.by_axis_um), before, "add", effect.id)
 
@@ -85,12 +86,17 @@ def remove(model: ModelFile, effect_id: str, aligned: AlignedRecording, refine: 
 def refit(model: ModelFile, aligned: AlignedRecording, refine: Refinement = unrefined) -> ModelFile:
     """Fit all effects again from zero, nonlinear constants as they are, `refine` as of `add`.
 
+    They then count from machine zero where the recording has the quantities there, else from 20 degC.
     Raises StateError where there are none.
     """
     if not model.fitted:
         raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))
     before = compare(aligned, model.fitted, model.covariance)
-    unfitted = [initial_effect(fitted.effect, fitted.constants, aligned.rows.links) for fitted in model.fitted]
+    effects = [recounted(fitted.effect, aligned.rows) for fitted in model.fitted]
+    unfitted = [
+        initial_effect(effect, fitted.constants, aligned.rows.links)
+        for effect, fitted in zip(effects, model.fitted, strict=True)
+    ]
     result = fit(aligned, unfitted, before.floor.by_axis_um)
     return _changed(model, model, refine(result, before.floor.by_axis_um), before, "fit", "")
 

@@ -287,6 +287,7 @@ def _sidecar(
         provenance,
         recording.sidecar.notes,
         recording.sidecar.folds,
+        recording.sidecar.quantities_at_zero,
     )
 
 

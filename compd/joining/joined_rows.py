@@ -95,7 +95,9 @@ def joined_sidecar(
         joined["next_best"] = {"shift": next_best[0], "distances_rms_mm": round(next_best[1], 6)}
     provenance = {**recording.sidecar.provenance, "join": joined}
     sidecar = recording.sidecar
-    return sidecar_contents(recording.machine, reference, {}, provenance, sidecar.notes, sidecar.folds)
+    return sidecar_contents(
+        recording.machine, reference, {}, provenance, sidecar.notes, sidecar.folds, sidecar.quantities_at_zero
+    )
 
 
 def _has_attitude(export: InstrumentExport) -> bool:

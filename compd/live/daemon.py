@@ -30,7 +30,7 @@ from compd.live.acquisition.votes.votes import Votes
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
-from compd.live.loop.model_loader import ModelLoader, Models, try_model
+from compd.live.loop.model_loader import ModelLoader, Models, try_model, warn_of_datum
 from compd.live.loop.sent_cycle import SentSetpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.poll_requests import PollRequests
@@ -356,4 +356,5 @@ def _first_models(configuration: Configuration, loader: ModelLoader) -> Models:
     for warning in model.warnings:
         _log.warning("model file", reason=str(warning))
     _log.info("model", file=file, hash=model.hash, effects=[fitted.effect.id for fitted in model.machine.live_effects])
+    warn_of_datum(model, _log)
     return Models(model)

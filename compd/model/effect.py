@@ -16,6 +16,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.effect_dispatch import kernel_number
 from compd.model.observations import Observations
+from compd.model.reference_conditions import Datum
 
 Port: TypeAlias = Literal[
     "scale", "joint", "frame", "link", "base_joint", "platform_joint", "revolute_axis", "plate", "tool", "reference"
@@ -231,6 +232,11 @@ class Effect:
         What it adds depends on its comparators' own readings.
     registration : bool
         A rigid motion of the reference's whole frame, as laying two frames over one another takes away.
+    counts_from : str
+        From which conditions what it adds counts. ``"machine zero"``: from the measured quantities there, so that it
+        adds nothing while they are as they were then. ``"20 degC"``: from 20 degC, 1013.25 hPa and 0 of anything else,
+        as in releases before 0.6; so it is where nobody knows the quantities at machine zero. ``"its own"``: it has a
+        reference of its own, as a graduation that is true at 20 degC, or needs no measured quantity.
     declared : str or dict
         What a model file names it by: the mapping that it was declared with as a formula, or
         ``"/absolute/file.py:NAME"``; ``""`` for its id.
@@ -269,6 +275,7 @@ class Effect:
     unknown_states: tuple[int, ...] = ()
     follows_reading: bool = False
     registration: bool = False
+    counts_from: Datum = "machine zero"
     declared: str | Mapping[str, Any] = ""
 
     @property

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem
-from compd.model.effect import BasisProgram, ConstantValues, Effect, Memory, Port
-from compd.model.effect_needs import needed_quantities
+from compd.model.effect import Basis, BasisProgram, ConstantValues, Effect, Memory, Port
+from compd.model.effect_needs import is_measured, needed_quantities
 from compd.model.kernels.effect_row import MACHINE, MOST_LINKS, ROW
 from compd.model.kernels.effect_rows import basis_of_rows
 from compd.model.observations import MachineConstants, Observations
+from compd.model.reference_conditions import standard_value
 
 # Rows whose structures exist at the same time: of 4000, they take 8 MB.
 _ROWS_AT_ONCE = 4000
@@ -45,19 +48,26 @@ def evaluate_basis(
 ) -> tuple[FloatArray, Memory]:
     """The basis (N, sum of port sizes, P), mm (rad for directions) per unit, and the memory after the rows.
 
-    memory : None at the start.  Raises CompdError where a quantity that the effect needs is not measured.
+    An effect that counts from machine zero does so from the quantities of the rows there; where these do not have them,
+    from the standard conditions.
+    memory : None at the start.  Raises CompdError where a quantity that the effect needs is not measured, or was not at
+    machine zero.
     """
+    effect = counted_from(effect, rows)
     if callable(effect.basis):
-        return effect.basis(rows, constants, memory)
+        return _python_basis(effect, effect.basis, rows, constants, memory)
     sizes = port_sizes(rows.links, rows.joint_mm.shape[1], len(rows.revolute_axes_P))
     program = effect.basis.program(effect, rows.links, sizes)
     basis = np.zeros((len(rows), sum(sizes[port] for port in effect.ports), len(effect.columns(rows.links))))
     remembered = pack_memory(program.states, memory)
     numbers = program_numbers(effect, program, constants)
     machine = machine_structure(rows.constants)
-    quantities = np.zeros((len(rows), len(names := needed_quantities(effect, rows.links))))
+    names = needed_quantities(effect, rows.links)
+    quantities = np.zeros((len(rows), 2 * len(names)))
     for place, name in enumerate(names):
         quantities[:, place] = rows.quantity(name)
+        from_zero = effect.counts_from == "machine zero"
+        quantities[:, len(names) + place] = rows.reference_value(name) if from_zero else standard_value(name)
     for begin in range(0, len(rows), _ROWS_AT_ONCE):
         chunk = slice(begin, begin + _ROWS_AT_ONCE)
         basis_of_rows(
@@ -71,6 +81,32 @@ def evaluate_basis(
             basis[chunk],
         )
     return basis, unpack_memory(program.states, remembered)
+
+
+def counted_from(effect: Effect, rows: Observations) -> Effect:
+    """The effect as it counts in these rows: from 20 degC where their quantities at machine zero are not known."""
+    if effect.counts_from == "machine zero" and rows.quantities_at_zero is None and is_measured(effect):
+        return replace(effect, counts_from="20 degC")
+    return effect
+
+
+def recounted(effect: Effect, rows: Observations) -> Effect:
+    """The effect as it counts when it is fitted anew on these rows."""
+    if effect.counts_from == "20 degC":
+        effect = replace(effect, counts_from="machine zero")
+    return counted_from(effect, rows)
+
+
+def _python_basis(
+    effect: Effect, basis: Basis, rows: Observations, constants: ConstantValues, memory: Memory
+) -> tuple[FloatArray, Memory]:
+    """Of an effect in Python, less what it adds at machine zero where it counts from there."""
+    if effect.counts_from != "machine zero":
+        return basis(rows if rows.quantities_at_zero is None else rows.from_standard, constants, memory)
+    values, after = basis(rows, constants, memory)
+    if is_measured(effect):
+        values = values - basis(rows.at_machine_zero, constants, None)[0]
+    return values, after
 
 
 def program_numbers(effect: Effect, program: BasisProgram, constants: ConstantValues) -> FloatArray:
@@ -124,7 +160,11 @@ def machine_structure(constants: MachineConstants) -> NDArray[np.void]:
     for name in ("weight_N", "weight_at_P_mm", "frame_zero_mm", "plate_points_M_mm", "plate_thickness_mm"):
         machine[name] = getattr(constants, name)
     machine["instrument_M_mm"] = constants.instrument_M_mm
-    for name in ("platform_joints_P_mm", "revolute_axes_P", "zero_directions_M", "zero_axes_M", "zero_axial_force_N"):
+    machine["zero_rotation_M_P"] = math.nan if constants.zero is None else constants.zero.rotation_M_P
+    for name in (
+        *("platform_joints_P_mm", "revolute_axes_P", "zero_directions_M", "zero_axes_M"),
+        *("zero_axial_force_N", "zero_axial_per_force"),
+    ):
         values = getattr(constants, name)
         machine[name][: len(values)] = values
     return structure

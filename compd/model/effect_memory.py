@@ -88,7 +88,7 @@ def carry_over(memory: EffectMemory, old: MachineModel, new: MachineModel) -> Ef
         fitted.effect.id: memory.memories[fitted.effect.id]
         for fitted in new.live_effects
         if fitted.effect.id in memory.memories
-        and before[fitted.effect.id].effect is fitted.effect
+        and before[fitted.effect.id].effect == fitted.effect
         and before[fitted.effect.id].constants == fitted.constants
     }
     return EffectMemory(memory.motion, memories, memory.commanded)

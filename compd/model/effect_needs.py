@@ -81,11 +81,24 @@ def needed_quantities(effect: Effect, links: int) -> list[str]:
     return quantities
 
 
-def unmet_needs(effect: Effect, available: Collection[str], links: int) -> list[Problem]:
+def is_measured(effect: Effect) -> bool:
+    """Whether the effect is computed from measured quantities, which count from some conditions."""
+    return effect.counts_from != "its own" and bool(needed_quantities(effect, 1))
+
+
+def needed_at_zero(effect: Effect, links: int) -> list[str]:
+    """The measured quantities whose values at machine zero the effect needs, by their full names."""
+    return needed_quantities(effect, links) if effect.counts_from == "machine zero" else []
+
+
+def unmet_needs(
+    effect: Effect, available: Collection[str], links: int, at_zero: Collection[str] | None = None
+) -> list[Problem]:
     """One problem for each thing that the effect needs and does not get; empty where it can be used.
 
     available : names of the quantities that gauges or columns deliver, and of the settings that the machine has
         (`Observations.available`, or `available_settings` beside the wiring's quantities).
+    at_zero : names of the quantities that are known at machine zero; None where effects do not count from there.
     """
     problems = [
         Problem(
@@ -100,6 +113,18 @@ def unmet_needs(effect: Effect, available: Collection[str], links: int) -> list[
         if need in _NO_QUANTITIES and need not in available:
             missing, next_step = _NO_QUANTITIES[need]
             problems.append(Problem(where=f"effect {effect.id}", what=f"needs {missing}", next_step=next_step))
+    if at_zero is not None:
+        problems += [
+            Problem(
+                where=f"effect {effect.id}",
+                what=f"needs {name} as it was at machine zero, where it was not measured",
+                allowed=", ".join(sorted(at_zero)) or "nothing was measured there",
+                next_step="take machine zero again: `compd zero`; in a recording write it into its sidecar, under "
+                "`quantities_at_zero:`",
+            )
+            for name in needed_at_zero(effect, links)
+            if name in available and name not in at_zero
+        ]
     if not _reaches_prediction(effect, available, links):
         problems.append(
             Problem(

@@ -16,6 +16,7 @@ from compd.model.effect_needs import needed_quantities
 from compd.model.kernels.effect_row import MACHINE
 from compd.model.kernels.solver_structures import EFFECT, FRAME, GIVEN, LENGTHS, MECHANISM
 from compd.model.observations import MachineConstants
+from compd.model.reference_conditions import standard_value
 
 # In the order in which the kernel has the ports' numbers behind one another.
 LIVE_PORTS: tuple[Port, ...] = (
@@ -41,8 +42,11 @@ class EffectProgram(NamedTuple):
     effects : (K,) structures, see `compd.model.kernels.solver_structures.EFFECT`.
     machine : (1,) structure of what all rows have in common.
     theta, numbers, code, quantity_places, targets : of all effects, behind one another. The places of an effect's
-        quantities in `quantities`, and those of its ports' numbers among all ports'.
+        quantities, now and then at machine zero, in a row of `quantities` and `references` behind one another; and
+        those of its ports' numbers among all ports'.
     quantities : names of all that are needed.
+    references : those from which effects count: each name of `quantities`, and its value; None where that is the one at
+        machine zero.
     states : where each array of each effect's memory begins and ends, by the effect's id.
     size : of all ports together.
     given : places of the effects that are plain Python: what they add is computed outside the kernel.
@@ -56,9 +60,15 @@ class EffectProgram(NamedTuple):
     quantity_places: IntArray
     targets: IntArray
     quantities: tuple[str, ...]
+    references: tuple[tuple[str, float | None], ...]
     states: Mapping[str, tuple[tuple[int, int], ...]]
     size: int
     given: tuple[int, ...]
+
+    @property
+    def needed_at_zero(self) -> frozenset[str]:
+        """Names of the quantities whose values at machine zero are needed."""
+        return frozenset(name for name, value in self.references if value is None)
 
     def pack_memories(self, memories: Mapping[str, Memory]) -> FloatArray:
         """The memories of all effects with a kernel, behind one another; nan for one that has none yet."""
@@ -84,7 +94,9 @@ def build_program(
     """The program of live effects on a machine with so many links, joint comparators and revolute axes."""
     sizes = port_sizes(links, joints, axes)
     begins = dict(zip(LIVE_PORTS, accumulate((sizes[port] for port in LIVE_PORTS), initial=0), strict=False))
-    quantities: dict[str, int] = {}
+    all_needed = (name for each in fitted for name in needed_quantities(each.effect, links))
+    quantities = {name: place for place, name in enumerate(dict.fromkeys(all_needed))}
+    references: dict[tuple[str, float | None], int] = {}
     effects = np.zeros(len(fitted), dtype=EFFECT)
     parts: dict[str, list[Any]] = {"theta": [], "numbers": [], "code": [], "quantities": [], "memory": []}
     targets: list[int] = []
@@ -108,7 +120,13 @@ def build_program(
             ends = list(accumulate(program.states, initial=sum(map(len, parts["memory"]))))
             states[effect.id] = tuple(pairwise(ends))
         names = needed_quantities(effect, links)
-        own["quantities"] = [quantities.setdefault(name, len(quantities)) for name in names]
+        from_zero = effect.counts_from == "machine zero"
+        own["quantities"] = [quantities[name] for name in names]
+        own["quantities"] += [
+            len(quantities)
+            + references.setdefault((name, None if from_zero else standard_value(name)), len(references))
+            for name in names
+        ]
         for name, values in own.items():
             structure[f"{name}_begin"] = sum(map(len, parts[name]))
             structure[f"{name}_end"] = structure[f"{name}_begin"] + len(values)
@@ -122,6 +140,7 @@ def build_program(
         np.array([place for own in parts["quantities"] for place in own], dtype=np.int64),
         np.array(targets, dtype=np.int64),
         tuple(quantities),
+        tuple(references),
         states,
         sum(sizes[port] for port in LIVE_PORTS),
         tuple(np.flatnonzero(effects["number"] == GIVEN).tolist()),

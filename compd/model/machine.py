@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,26 +17,10 @@ from compd.model.frame import FrameGeometry, base_pose, distances_mm, solve_fram
 from compd.model.kernels.rotation import compose, to_inner, to_outer
 from compd.model.kernels.solver_structures import MODEL
 from compd.model.kinematics import Mechanism, forward_kinematics, inverse_kinematics
-from compd.model.observations import MachineConstants, MachineDetails
+from compd.model.observations import AtZero, MachineConstants, MachineDetails
 from compd.model.solve_status import require
 from compd.model.statics import link_forces
 from compd.model.tool import Arrangement, Contact
-
-
-class AtZero(NamedTuple):
-    """The machine at machine zero, where every gauge reads zero.
-
-    base_joints_M_mm : (n, 3).  platform_origin_M_mm : (3,).  rotation_M_P : (3, 3).
-    contact : tip_M_mm (3,), tip_P_mm (3,).
-    link_length_mm : (n,), l0.  distances_mm : (9,), t0_1..t0_3, u0_1..u0_6.
-    """
-
-    base_joints_M_mm: FloatArray
-    platform_origin_M_mm: FloatArray
-    rotation_M_P: FloatArray
-    contact: Contact
-    link_length_mm: FloatArray
-    distances_mm: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,15 +192,9 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         level = np.cross(directions_M, [0.0, 0.0, 1.0])
         axes_M = np.where(np.linalg.norm(level, axis=1, keepdims=True) > 1e-6, level, [1.0, 0.0, 0.0])
     axes_M = axes_M - (axes_M * directions_M).sum(axis=1, keepdims=True) * directions_M
-    weight_alone = link_forces(
-        model.mechanism(zero.base_joints_M_mm),
-        zero.platform_origin_M_mm,
-        zero.rotation_M_P,
-        np.zeros(3),
-        zero.contact.tip_M_mm,
-        model.weight_N,
-        model.weight_at_P_mm,
-    )
+    at_zero = (model.mechanism(zero.base_joints_M_mm), zero.platform_origin_M_mm, zero.rotation_M_P)
+    weight_alone = link_forces(*at_zero, np.zeros(3), zero.contact.tip_M_mm, model.weight_N, model.weight_at_P_mm)
+    by_force = link_forces(*at_zero, np.eye(3), zero.contact.tip_M_mm, 0.0, model.weight_at_P_mm)
     return MachineConstants(
         platform_joints_P_mm=model.platform_joints_P_mm,
         revolute_axes_P=model.revolute_axes_P,
@@ -224,6 +202,7 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         zero_directions_M=directions_M,
         zero_axes_M=axes_M / np.linalg.norm(axes_M, axis=1, keepdims=True),
         zero_axial_force_N=weight_alone.axial_N,
+        zero_axial_per_force=by_force.axial_N.T,
         weight_N=model.weight_N,
         weight_at_P_mm=model.weight_at_P_mm,
         frame_zero_mm=zero.distances_mm,
@@ -231,6 +210,7 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         plate_thickness_mm=details.plate_thickness_mm,
         scale_signal_period_mm=details.scale_signal_period_mm,
         instrument_M_mm=np.array(details.instrument_M_mm),
+        zero=zero,
     )
 
 

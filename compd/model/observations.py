@@ -14,9 +14,9 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import CompdError, Problem
 from compd.model.kernels.rotation import to_outer
 from compd.model.kinematics import Mechanism
-from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
+from compd.model.reference_conditions import standard_value
 from compd.model.statics import link_forces
-from compd.model.tool import Arrangement
+from compd.model.tool import Arrangement, Contact
 
 # What a machine of known kinematics gives in every recording and live: its pose with all lengths and directions, the
 # scales, which way the links last moved and how fast, and the rows' order in time.
@@ -39,6 +39,22 @@ class MachineDetails(NamedTuple):
     instrument_M_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
+class AtZero(NamedTuple):
+    """The machine at machine zero, where every gauge reads zero.
+
+    base_joints_M_mm : (n, 3).  platform_origin_M_mm : (3,).  rotation_M_P : (3, 3).
+    contact : tip_M_mm (3,), tip_P_mm (3,).
+    link_length_mm : (n,), l0.  distances_mm : (9,), t0_1..t0_3, u0_1..u0_6.
+    """
+
+    base_joints_M_mm: FloatArray
+    platform_origin_M_mm: FloatArray
+    rotation_M_P: FloatArray
+    contact: Contact
+    link_length_mm: FloatArray
+    distances_mm: FloatArray
+
+
 class MachineConstants(NamedTuple):
     """What effects need of the machine beyond the readings; computed once per machine, nan where it is not described.
 
@@ -48,10 +64,12 @@ class MachineConstants(NamedTuple):
     zero_directions_M (n, 3): unit vectors of the links at machine zero, from base to platform.
     zero_axes_M (n, 3): unit vector square to each link at machine zero, towards which its base joint's first angle
         counts: the revolute axis on a tripod, horizontal on a hexapod.
-    zero_axial_force_N (n,): with the platform's weight alone.  weight_N, weight_at_P_mm (3,): the platform's.
+    zero_axial_force_N (n,): at machine zero with the platform's weight alone.  zero_axial_per_force (n, 3): what each
+        component of an external force at the tip adds there, 1.  weight_N, weight_at_P_mm (3,): the platform's.
     frame_zero_mm (9,): t1..t3, u1..u6 at machine zero.  plate_points_M_mm (3, 3).
     plate_thickness_mm, scale_signal_period_mm.
     instrument_M_mm (3,): where the reference instrument's beam starts; the origin of {M} unless configured.
+    zero : the machine at machine zero; None where its kinematics is not known.
     """
 
     platform_joints_P_mm: FloatArray
@@ -60,6 +78,7 @@ class MachineConstants(NamedTuple):
     zero_directions_M: FloatArray
     zero_axes_M: FloatArray
     zero_axial_force_N: FloatArray
+    zero_axial_per_force: FloatArray
     weight_N: float
     weight_at_P_mm: FloatArray
     frame_zero_mm: FloatArray
@@ -67,6 +86,7 @@ class MachineConstants(NamedTuple):
     plate_thickness_mm: float
     scale_signal_period_mm: float
     instrument_M_mm: FloatArray
+    zero: AtZero | None
 
 
 @dataclass(frozen=True)
@@ -82,6 +102,8 @@ class Observations:
     link_mm (N, n), directions_M (N, n, 3) from base to platform joint, base_joints_M_mm (N, n, 3).
     origin_M_mm (N, 3), rotation_M_P (N, 3, 3): the moving platform.  tip_M_mm (N, 3).
     recorded : of a machine without known kinematics, what of GIVEN_BY_KINEMATICS was recorded all the same.
+    quantities_at_zero : the quantities when machine zero was taken, by name, from which effects count; None where they
+        are not known: effects then count from the standard conditions.
     """
 
     constants: MachineConstants
@@ -101,6 +123,7 @@ class Observations:
     rotation_M_P: FloatArray
     tip_M_mm: FloatArray
     recorded: frozenset[str] = frozenset()
+    quantities_at_zero: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
         refused = [name for name in self.quantities if name.startswith(ANSWER_PREFIXES)]
@@ -123,7 +146,7 @@ class Observations:
         chosen: dict[str, Any] = {
             column.name: getattr(self, column.name)[index]
             for column in fields(self)
-            if column.name not in ("constants", "quantities", "recorded")
+            if column.name not in ("constants", "quantities", "recorded", "quantities_at_zero")
         }
         quantities = {name: values[index] for name, values in self.quantities.items()}
         return replace(self, **chosen, quantities=quantities)
@@ -174,13 +197,68 @@ class Observations:
             )
         return self.quantities[name]
 
+    def reference_value(self, name: str) -> float:
+        """From which a quantity counts: its value at machine zero, where that is not known the standard one.
+
+        Raises CompdError where others were measured at machine zero and this one was not.
+        """
+        if self.quantities_at_zero is None:
+            return standard_value(name)
+        if name not in self.quantities_at_zero:
+            raise CompdError(
+                Problem(
+                    where="rows for effects",
+                    what="this quantity was not measured at machine zero, from where effects count",
+                    value=name,
+                    allowed=", ".join(sorted(self.quantities_at_zero)) or "nothing was",
+                    next_step="take machine zero with it, or write it into the sidecar under `quantities_at_zero:`",
+                )
+            )
+        return self.quantities_at_zero[name]
+
+    def since_zero(self, name: str) -> FloatArray:
+        """(N,) a quantity less its `reference_value`."""
+        return self.quantity(name) - self.reference_value(name)
+
+    @cached_property
+    def from_standard(self) -> Observations:
+        """The same rows, in which effects count from the standard conditions."""
+        return replace(self, quantities_at_zero=None)
+
+    @cached_property
+    def at_machine_zero(self) -> Observations:
+        """One row: the machine at machine zero, at rest, with its quantities there; time 0."""
+        zero, at_zero = self.constants.zero, self.quantities_at_zero
+        assert zero is not None, "effects count from machine zero where the kinematics is known"
+        assert at_zero is not None, "and where the quantities there are known"
+        n, k = self.links, self.joint_mm.shape[1]
+        return Observations(
+            constants=self.constants,
+            scale_mm=np.zeros((1, n)),
+            joint_mm=np.zeros((1, k)),
+            frame_mm=np.zeros((1, 9)),
+            quantities={name: np.array([value]) for name, value in at_zero.items()},
+            time_s=np.zeros(1),
+            session_start=np.ones(1, dtype=bool),
+            direction=np.zeros((1, n)),
+            velocity_mm_per_s=np.zeros((1, n)),
+            joint_velocity_mm_per_s=np.zeros((1, k)),
+            link_mm=zero.link_length_mm[None],
+            directions_M=self.constants.zero_directions_M[None],
+            base_joints_M_mm=zero.base_joints_M_mm[None],
+            origin_M_mm=zero.platform_origin_M_mm[None],
+            rotation_M_P=zero.rotation_M_P[None],
+            tip_M_mm=zero.contact.tip_M_mm[None],
+            quantities_at_zero=at_zero,
+        )
+
     def warming_K(self, place: str) -> FloatArray:
-        """(N,) `temperature_<place>_degC` above the reference temperature."""
-        return self.quantity(f"temperature_{place}_degC") - REFERENCE_TEMPERATURE_degC
+        """(N,) `temperature_<place>_degC` since machine zero; above 20 degC where that is not known."""
+        return self.since_zero(f"temperature_{place}_degC")
 
     @cached_property
     def link_warming_K(self) -> FloatArray:
-        """(N, n) each link's temperature above the reference temperature."""
+        """(N, n) each link's temperature since machine zero; above 20 degC where that is not known."""
         return np.stack([self.warming_K(f"link_{i + 1}") for i in range(self.links)], axis=1)
 
     @cached_property

@@ -29,12 +29,13 @@ def observe(
     time_s: ArrayLike,
     session_start: BoolArray,
     movement: Movement,
+    quantities_at_zero: Mapping[str, float] | None = None,
 ) -> Observations:
     """N rows by equations (1), (3) and forward kinematics; Newton starts at machine zero, so that no row needs another.
 
     constants : of this machine, from `machine_constants`.
     scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9): changes since machine zero.  quantities: (N,) each.
-    time_s (N,).  session_start (N,): True where a row has no history.
+    time_s (N,).  session_start (N,): True where a row has no history.  quantities_at_zero: as in `Observations`.
     A row that has no pose is nan in everything that the pose gives.
     Raises CompdError where a quantity is a column of the reference.
     """
@@ -58,6 +59,7 @@ def observe(
         time_s=np.asarray(time_s, dtype=np.float64),
         session_start=session_start,
         movement=movement,
+        quantities_at_zero=quantities_at_zero,
     )
 
 
@@ -74,6 +76,7 @@ def observe_at_pose(
     time_s: FloatArray,
     session_start: BoolArray,
     movement: Movement,
+    quantities_at_zero: Mapping[str, float] | None,
 ) -> Observations:
     """N rows whose base joints (N, n, 3), pose and tip (N, 3) are solved already; the rest as in `observe`."""
     joints_M = to_outer(pose.rotation_M_P[:, None], pose.origin_M_mm[:, None], constants.platform_joints_P_mm)
@@ -94,6 +97,7 @@ def observe_at_pose(
         origin_M_mm=pose.origin_M_mm,
         rotation_M_P=pose.rotation_M_P,
         tip_M_mm=tip_M_mm,
+        quantities_at_zero=quantities_at_zero,
     )
 
 
@@ -122,6 +126,7 @@ def observe_external(
         zero_directions_M=no_vectors,
         zero_axes_M=no_vectors,
         zero_axial_force_N=np.zeros(0),
+        zero_axial_per_force=no_vectors,
         weight_N=np.nan,
         weight_at_P_mm=unknown,
         frame_zero_mm=np.full(9, np.nan),
@@ -129,6 +134,7 @@ def observe_external(
         plate_thickness_mm=np.nan,
         scale_signal_period_mm=np.nan,
         instrument_M_mm=np.zeros(3),
+        zero=None,
     )
     return Observations(
         constants=constants,

@@ -23,6 +23,7 @@ class EffectInputs(NamedTuple):
     """What effects are computed from in N snapshots.
 
     scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9): changes since machine zero.  quantities : (N,) each.
+    quantities_at_zero : the same at machine zero.
     time_s (N,): monotonic.  base_joints_M_mm (N, n, 3), pose, tip_M_mm (N, 3): by the kinematics alone.
     """
 
@@ -30,6 +31,7 @@ class EffectInputs(NamedTuple):
     joint_mm: FloatArray
     frame_mm: FloatArray
     quantities: Mapping[str, FloatArray]
+    quantities_at_zero: Mapping[str, float]
     time_s: FloatArray
     base_joints_M_mm: FloatArray
     pose: Pose
@@ -76,6 +78,7 @@ def _observations(model: MachineModel, inputs: EffectInputs, memory: EffectMemor
         time_s=inputs.time_s,
         session_start=session_start,
         movement=_movement(model, inputs, memory, commanded),
+        quantities_at_zero=inputs.quantities_at_zero,
     )
 
 

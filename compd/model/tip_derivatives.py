@@ -39,6 +39,7 @@ def tip_derivatives(
     joint_mm: FloatArray,
     frame_mm: FloatArray,
     quantities: Mapping[str, FloatArray],
+    quantities_at_zero: Mapping[str, float],
     sigmas: Mapping[str, float],
     time_s: float,
     effects: EffectMemory,
@@ -46,6 +47,7 @@ def tip_derivatives(
     """Of one snapshot, at the pose without effects.
 
     scale_mm (n,), joint_mm (k,), frame_mm (9,) : changes since machine zero.  quantities : those that the effects need.
+    quantities_at_zero : the same at machine zero.
     sigmas : standard deviation of each, in its own unit; nan for one that is not named.
     effects : what they remember after this snapshot.
     The noise of the scales also changes what an effect at the port `scale` adds; that is left out: at most a few per
@@ -54,6 +56,7 @@ def tip_derivatives(
     program = model.program
     packed = effects.pack(model, len(joint_mm))
     values = np.array([quantities[name] for name in program.quantities], dtype=np.float64)
+    references = [quantities_at_zero[name] if value is None else value for name, value in program.references]
     raised = values + np.array([sigmas.get(name, np.nan) for name in program.quantities], dtype=np.float64)
     by_port = np.empty((3, program.size))
     by_theta, by_quantity = np.empty((3, len(program.theta))), np.empty((3, len(values)))
@@ -69,7 +72,7 @@ def tip_derivatives(
         np.array(scale_mm),
         np.array(joint_mm),
         np.array(frame_mm),
-        values,
+        np.concatenate([values, references]),
         time_s,
         raised,
         model.zero.platform_origin_M_mm.copy(),
@@ -84,7 +87,7 @@ def tip_derivatives(
     )
     derivatives = TipDerivatives(by_port[:, : model.links + len(joint_mm) + 9], by_theta, by_quantity)
     if program.given:
-        rows = _rows(model, scale_mm, joint_mm, frame_mm, quantities, time_s, effects)
+        rows = _rows(model, scale_mm, joint_mm, frame_mm, quantities, quantities_at_zero, time_s, effects)
         _add_python_effects(model, rows, raised, effects, by_port, derivatives)
     return derivatives
 
@@ -95,6 +98,7 @@ def _rows(
     joint_mm: FloatArray,
     frame_mm: FloatArray,
     quantities: Mapping[str, FloatArray],
+    quantities_at_zero: Mapping[str, float],
     time_s: float,
     effects: EffectMemory,
 ) -> Observations:
@@ -113,6 +117,7 @@ def _rows(
         movement=Movement.unknown(scale_mm[None], joint_mm[None])
         if motion is None
         else Movement.from_motions([motion]),
+        quantities_at_zero=quantities_at_zero,
     )
 
 
@@ -133,7 +138,8 @@ def _add_python_effects(
         begin = structure["targets_begin"]
         by_added = by_port[:, program.targets[begin : begin + structure["size"]]]
         derivatives.by_theta[:, structure["theta_begin"] : structure["theta_end"]] = by_added @ basis
-        for quantity in program.quantity_places[structure["quantities_begin"] : structure["quantities_end"]]:
+        needed = program.quantity_places[structure["quantities_begin"] : structure["quantities_end"]]
+        for quantity in needed[: len(needed) // 2]:
             changed = {**rows.quantities, program.quantities[quantity]: raised[quantity : quantity + 1]}
             moved = evaluate_basis(fitted.effect, replace(rows, quantities=changed), fitted.constants, memory)[0][0]
             derivatives.by_quantity[:, quantity] += by_added @ ((moved - basis) @ fitted.theta)

@@ -2,16 +2,17 @@
 
 Each step keeps what it replaced, so that it can be undone. `compd.model_file.model_file` makes effects of the data.
 
-    format: 3               # 2 and 1, of releases up to 0.9, have no `fitted_range` and no `checksum`
+    format: 3               # 1 and 2, of releases before 0.6, have no `counts_from`, `fitted_range` and `checksum`
     machine: tripod-cmm     # name of the configuration, or "external"
     geometry: 9f3a...       # hash of the geometry that it was fitted on; left out where that is not known
     release: 0.2.0          # of compd, that wrote it
     effects:
-    - effect: link_sag      # an id, /absolute/file.py:NAME, or a formula written out
-      shape: {n: 3.0}       # values of its nonlinear constants
+    - effect: link_expansion  # an id, /absolute/file.py:NAME, or a formula written out
+      counts_from: machine zero  # "20 degC" where it was fitted without the quantities there, and without the key
+      shape: {}             # values of its nonlinear constants
       parameters:
-      - {name: s, value: 1.0, std: 0.1, unit: um}
-      plausible: {s: [0, 5]}  # only where a person means another range than the effect's own
+      - {name: a, value: 11.0, std: 0.1, unit: ppm/K}
+      plausible: {a: [0, 30]}  # only where a person means another range than the effect's own
     covariance: [[0.01]]    # of all fitted numbers jointly, in the order of the file
     fitted_range: {temperature_link_1_degC: [19.2, 24.6]}  # of each quantity that the effects read
     steps: []               # see ModelStep
@@ -132,6 +133,11 @@ class EffectEntry(FilePart):
     """One effect with its fitted parameters."""
 
     effect: Declaration = Field(description="an id of the library, /absolute/file.py:NAME, or a formula's declaration")
+    counts_from: Literal["machine zero", "20 degC"] = Field(
+        default="20 degC",
+        description="the quantities from which it counts: `machine zero`; or `20 degC`, 1013.25 hPa and 0 of anything "
+        "else, as in files of releases before 0.6",
+    )
     shape: Annotated[dict[str, float], _EmptyMapping] = Field(
         default={}, description="values of its nonlinear constants, by name"
     )
@@ -147,7 +153,7 @@ class ModelDocument(FilePart):
     """The keys of the file."""
 
     format: Annotated[int, Field(ge=1)] = Field(
-        default=1, description=f"number of the format: {FORMAT}; up to 2 without `fitted_range` and `checksum`"
+        default=1, description=f"number of the format: {FORMAT}; 1 and 2, of releases before 0.6, lack some keys"
     )
     machine: str = Field(description='name of the machine\'s configuration, or "external"')
     geometry: str = Field(

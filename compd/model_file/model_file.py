@@ -18,6 +18,7 @@ from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect, FittedEffect
 from compd.model.effect_needs import needed_quantities
+from compd.model.effect_needs import is_measured
 from compd.model.library import find_effect
 from compd.model_file.model_document import (
     Declaration,
@@ -144,6 +145,7 @@ class ModelFile:
         effects = [
             {
                 "effect": declared if isinstance(declared, str) else dict(declared),
+                **({"counts_from": fitted.effect.counts_from} if is_measured(fitted.effect) else {}),
                 "shape": {name: float(value) for name, value in fitted.constants.items()},
                 "parameters": _estimates(fitted, self.links),
                 **({"plausible": _lists(meant)} if (meant := self.plausible.get(fitted.effect.id)) else {}),
@@ -248,7 +250,10 @@ def read_model_file(
     for number, entry in enumerate(document.effects, start=1):
         where = f"{path}, effect {number}"
         try:
-            found.append((find_effect(entry.effect, where, code=code), entry, where))
+            effect = find_effect(entry.effect, where, code=code)
+            if is_measured(effect):
+                effect = replace(effect, counts_from=entry.counts_from)
+            found.append((effect, entry, where))
         except CompdError as error:
             problems += error.problems
     if links is None:

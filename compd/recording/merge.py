@@ -98,6 +98,12 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
                 _zero_time(first),
                 "measure again from the first zero: it survives a restart of the daemon",
             ),
+            (
+                "has other quantities at machine zero",
+                _at_zero_text(recording),
+                _at_zero_text(first),
+                "write the same `quantities_at_zero:` in both, if both were measured from one machine zero",
+            ),
         )
         problems += [
             Problem(where=str(recording.sidecar.path), what=what, value=value, allowed=allowed, next_step=next_step)
@@ -125,6 +131,13 @@ def _reference_text(recording: Recording) -> str:
 
 def _folds_text(recording: Recording) -> str:
     return ", ".join(recording.sidecar.folds) or "no `folds:`"
+
+
+def _at_zero_text(recording: Recording) -> str:
+    at_zero = recording.sidecar.quantities_at_zero
+    if at_zero is None:
+        return "no `quantities_at_zero:`"
+    return ", ".join(f"{name} {value!r}" for name, value in sorted(at_zero.items())) or "none"
 
 
 def _zero_time(recording: Recording) -> str:
@@ -218,4 +231,11 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
         for recording, start_s in zip(recordings, starts_s, strict=True)
     ]
     first = recordings[0].sidecar
-    return sidecar_contents(first.machine, reference_contents, excluded, {"merge": sources}, folds=first.folds)
+    return sidecar_contents(
+        first.machine,
+        reference_contents,
+        excluded,
+        {"merge": sources},
+        folds=first.folds,
+        quantities_at_zero=first.quantities_at_zero,
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,8 +19,8 @@ from compd.files.file_kind import FileKind
 from compd.recording.reference import Quantity, Reference
 from compd.units import REFERENCE_UNITS
 
-# What this release writes. Format 1, of release 0.1, has the same keys but no `format:`.
-FORMAT = 2
+# What this release writes. Format 1, of release 0.1, has no `format:`; neither 1 nor 2 has `quantities_at_zero`.
+FORMAT = 3
 EXTERNAL = "external"
 # What cross-validation may leave out as a whole, beside the values of a column.
 TIME, PLACE = "time", "place"
@@ -115,6 +116,24 @@ def _checked_folds(value: Any) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
+def _checked_quantities(value: Any) -> dict[str, float] | None:
+    if value is None:
+        return None
+    if not isinstance(value, dict) or not all(
+        isinstance(name, str)
+        and isinstance(number, int | float)
+        and not isinstance(number, bool)
+        and math.isfinite(number)
+        for name, number in value.items()
+    ):
+        raise refusal(
+            "is no mapping of quantities to numbers",
+            "temperature_link_1_degC: 20.31",
+            "write each with its unit in its name, as its column is called",
+        )
+    return {name: float(number) for name, number in value.items()}
+
+
 def _mapping_or_nothing(value: Any) -> Any:
     if value is not None and not isinstance(value, dict):
         raise refusal("is of the wrong kind", "`key: value` lines")
@@ -148,6 +167,15 @@ SECTIONS: Mapping[str, Any] = {
             description=f"what cross-validation leaves out as a whole, one of these or a list: `{TIME}`, sessions or "
             f"blocks of time; `{PLACE}`, sectors of the workspace; the name of a column, each of its values, or eight "
             f"classes of a quantity with many values. Without the key `{TIME}`, and `{PLACE}` where it is known"
+        ),
+    ],
+    "quantities_at_zero": Annotated[
+        dict[str, float] | None,
+        BeforeValidator(_checked_quantities),
+        Field(
+            description="temperatures, forces and so on when machine zero was taken, by the names of their columns: "
+            "from them effects count. Without the key, as in recordings of releases before 0.6, they count from "
+            "20 degC, 1013.25 hPa and 0 of anything else"
         ),
     ],
     "excluded_rows": Annotated[
@@ -185,6 +213,7 @@ class Sidecar:
     excluded : spreadsheet row (header = 1) -> the person's reason.
     provenance, notes : how the recording came to be; kept, never interpreted.
     format : number of the format that the file was written in.
+    quantities_at_zero : by name, from which effects count; None where the sidecar does not say.
     """
 
     path: Path
@@ -195,11 +224,22 @@ class Sidecar:
     notes: str = ""
     format: int = FORMAT
     folds: tuple[str, ...] = ()
+    quantities_at_zero: Mapping[str, float] | None = None
 
     @property
     def external(self) -> bool:
         """The recording carries the user's own model's prediction."""
         return self.machine == EXTERNAL
+
+    @property
+    def counts_from(self) -> str:
+        """From where effects of measured quantities count, for people; "" for an external model's, which count as they
+        are written."""
+        if self.external:
+            return ""
+        if self.quantities_at_zero is None:
+            return "20 degC, 1013.25 hPa and 0 of other quantities: the sidecar has no `quantities_at_zero:`"
+        return "machine zero"
 
     @property
     def unit(self) -> str:
@@ -239,6 +279,15 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
         )
     elif reference.balls is not None:
         reference = reference.model_copy(update={"balls": path.parent / reference.balls})
+    if sections["quantities_at_zero"] is not None and sections["machine"] == EXTERNAL:
+        problems.append(
+            Problem(
+                where=document.where(("quantities_at_zero",)),
+                what="belongs to a machine with a machine zero; an external model's effects count as they are written",
+                allowed=f"the name of a configuration, not `machine: {EXTERNAL}`",
+                next_step="delete it",
+            )
+        )
     exclusions: tuple[Exclusion, ...] = sections["excluded_rows"] or ()
     return Sidecar(
         path,
@@ -249,6 +298,7 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
         sections["notes"] or "",
         sections["format"] or FORMAT,
         sections["folds"] or (),
+        sections["quantities_at_zero"],
     )
 
 
@@ -259,6 +309,7 @@ def sidecar_contents(
     provenance: Mapping[str, Any] | None = None,
     notes: str = "",
     folds: Sequence[str] = (),
+    quantities_at_zero: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """What a sidecar is to hold, as plain data; keys without a value are left out.
 
@@ -268,11 +319,14 @@ def sidecar_contents(
         "machine": machine,
         "reference": reference,
         "folds": list(folds),
+        "quantities_at_zero": None if quantities_at_zero is None else dict(quantities_at_zero),
         "excluded_rows": [{"row": row, "reason": reason} for row, reason in (excluded or {}).items()],
         "provenance": provenance,
         "notes": notes,
     }
-    return {key: value for key, value in contents.items() if value}
+    return {
+        key: value for key, value in contents.items() if value or (key == "quantities_at_zero" and value is not None)
+    }
 
 
 def sidecar_text(contents: Mapping[str, Any]) -> str:

@@ -13,7 +13,6 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.covariates import Covariate, covariates
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
-from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
 from compd.report.error_part import ErrorPart
 from compd.report.small_multiples import axis_title
 from compd.units import unit_of
@@ -85,8 +84,7 @@ def _of_link(
 ) -> Iterator[Driver]:
     rows, name = aligned.rows, f"link {link + 1}"
     if any("temperature_link" in need for need in needs):
-        temperature_degC = rows.link_warming_K[:, link] + REFERENCE_TEMPERATURE_degC
-        yield Driver(f"temperature of {name}, degC", temperature_degC)
+        yield Driver(f"temperature of {name}, degC", rows.quantity(f"temperature_link_{link + 1}_degC"))
     if "force" in needs:
         yield Driver(f"axial force in {name}, N", rows.axial_force_N[:, link])
     if "direction" in needs:

@@ -26,6 +26,7 @@ from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.instruments import TRACKER
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import FULLY_MEASURED
+from compd.simulation.truth.weather import AirAtZero
 from tests.scoreboard import recording_faults as faults
 from tests.scoreboard.cases import THERMOMETERS, Case
 from tests.scoreboard.expectation import expectation
@@ -39,6 +40,8 @@ PLAY_BEFORE = 0.4
 # Part of the visits between which a change lies.
 CHANGE_WITHIN = (0.25, 0.75)
 RECORDINGS = ("train", "other")
+# Temperatures of machine and room when machine zero is taken: of a cold hall, a laboratory, two shops in summer.
+ZERO_degC = (15.0, 20.0, 23.0, 27.0)
 
 
 def directory_of(case: Case, campaigns: Path) -> Path:
@@ -61,7 +64,7 @@ def prepare(case: Case, campaigns: Path) -> Path:
     if case.family == "period":
         # only the simulated machine knows the period
         geometry = geometry.model_copy(update={"scale_signal_period_mm": _period_mm(case)})
-    sizer = CauseSizer(geometry, configuration.wiring, case.seed)
+    sizer = CauseSizer(geometry, configuration.wiring, case.seed, air_at_zero=_air_at_zero(case))
     hidden = [sizer.size(HiddenCause(*wanted)) for wanted in zip(case.causes, [None] * 9, case.floors, strict=False)]
     weak = sizer.weak_disturbances(case.causes)
     contents = {"case": case.name, "family": case.family, "seed": case.seed, **answer(hidden, weak)}
@@ -82,13 +85,14 @@ def prepare(case: Case, campaigns: Path) -> Path:
             [*causes, *disturbances],
             reference=instrument,
         )
-        columns = {key: np.array(values) for key, values in campaign.run().columns.items()}
+        logged = campaign.run()
+        columns = {key: np.array(values) for key, values in logged.columns.items()}
         frame = "instrument" if case.family == "unregistered" else "machine"
         reference = {"quantity": "tool_position", "sigma_um": instrument.sigma_um, "frame": frame}
         write_recording(
             directory / f"{name}.csv",
             _as_recorded(case, columns, case.rng(name)),
-            sidecar_contents(configuration.machine, reference),
+            sidecar_contents(configuration.machine, reference, quantities_at_zero=logged.quantities_at_zero),
             overwrite=True,
         )
     contents["expected"] = expectation(case, contents, change_s).as_json()
@@ -113,9 +117,15 @@ def _period_mm(case: Case) -> float:
 
 def _plan(case: Case, mechanism: Mechanism, number: int) -> CampaignPlan:
     """What is measured in the campaign with this number."""
-    if case.family == "short" and number == 0:
-        return draw_campaign_plan(mechanism, case.seed, number).single_visits(SHORT_ROWS)
-    return draw_campaign_plan(mechanism, case.seed, number, warm_up_s=WARM_UP_S if case.family == "warm-start" else 0.0)
+    warm_up_s = WARM_UP_S if case.family == "warm-start" else 0.0
+    plan = draw_campaign_plan(mechanism, case.seed, number, warm_up_s=warm_up_s, air_at_zero=_air_at_zero(case))
+    return plan.single_visits(SHORT_ROWS) if case.family == "short" and number == 0 else plan
+
+
+def _air_at_zero(case: Case) -> AirAtZero:
+    """The air when machine zero is taken."""
+    rng = case.rng("zero")
+    return AirAtZero(float(rng.choice(ZERO_degC)), round(float(rng.uniform(950.0, 1030.0)), 1), 40.0)
 
 
 def _change_s(case: Case, plan: CampaignPlan) -> float:

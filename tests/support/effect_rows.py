@@ -61,7 +61,8 @@ def row_at_zero(model: MachineModel = TRIPOD, values: Mapping[str, Any] | None =
 
 
 def random_inputs(model: MachineModel, rows: int = 24, seed: int = 3) -> dict[str, Any]:
-    """Arguments of `observe` in which nothing is zero: two sessions, uneven times, weather, load, moving links."""
+    """Arguments of `observe` in which nothing is zero: two sessions, uneven times, weather, load, moving links; machine
+    zero was taken in other weather."""
     rng = np.random.default_rng(seed)
     n, k = model.links, model.joint_weights.shape[1]
     around = rows_at_tips(model, tips(model, rows, seed, 60.0))
@@ -79,6 +80,9 @@ def random_inputs(model: MachineModel, rows: int = 24, seed: int = 3) -> dict[st
         "movement": Movement(
             np.sign(rng.normal(size=(rows, n))), rng.normal(0, 40, (rows, n)), rng.normal(0, 1e-3, (rows, k))
         ),
+        "quantities_at_zero": {name: 22.0 + 0.1 * place for place, name in enumerate(weather)}
+        | dict.fromkeys(load, -4.0)
+        | {"pressure_hPa": 1002.0, "humidity_pct": 44.0},
     }
 
 
@@ -92,7 +96,11 @@ def select_rows(arguments: Mapping[str, Any], which: slice) -> dict[str, Any]:
     return {
         "quantities": {name: values[which] for name, values in arguments["quantities"].items()},
         "movement": Movement(*(values[which] for values in arguments["movement"])),
-    } | {name: arguments[name][which] for name in arguments if name not in ("quantities", "movement")}
+    } | {
+        name: value if name == "quantities_at_zero" else value[which]
+        for name, value in arguments.items()
+        if name not in ("quantities", "movement")
+    }
 
 
 def constants_of(effect: Effect) -> dict[str, float]:

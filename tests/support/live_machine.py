@@ -33,7 +33,8 @@ class Machine:
         self.settings = replace(pipeline.settings, valid_for_s=0.1)
         self.state = CycleState.at_start(self.model)
         zero = dict.fromkeys(self.wires.length_channels, RAW_AT_ZERO_MM)
-        self.commands = Commands(MachineZero(configuration.zero_hash, "2026-01-01T00:00:00+00:00", zero))
+        quantities = dict.fromkeys(self.wires.quantity_names, 20.0)
+        self.commands = Commands(MachineZero(configuration.zero_hash, "2026-01-01T00:00:00+00:00", zero, quantities))
         self.now_s = 1000.0
         self.tick = 0
         self.change_mm = dict.fromkeys(self.wires.length_channels, 0.0)

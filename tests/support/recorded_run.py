@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,6 @@ from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.loop.commands import Target
 from compd.live.loop.directions import Directions
-from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker
 from compd.live.record.recorder import Recorder, RecordingLimits
 from compd.live.service.readings_message import ReadingsMessage
@@ -97,7 +97,8 @@ class Run:
 
     def take_zero(self):
         readings = {name: RAW_AT_ZERO_MM + change for name, change in self.machine.change_mm.items()}
-        self.machine.commands.zero = MachineZero(self.machine.configuration.zero_hash, "later", readings)
+        zero = self.machine.commands.zero
+        self.machine.commands.zero = replace(zero, taken_at="later", readings_mm=readings)
 
     @contextmanager
     def recorder(self, name: Path, limits=ROOMY, reports=None, **watch):

@@ -66,4 +66,6 @@ def _model_text(model: Mapping[str, Any]) -> str:
     effects = ", ".join(model["effects"]) or "no effects"
     if "not_live" in model:
         effects += f" (at the reference instrument, not live: {', '.join(model['not_live'])})"
+    if "from_20_degC" in model:
+        effects += f" (from 20 degC and not from machine zero, fitted without it: {', '.join(model['from_20_degC'])})"
     return f"{model['file']} ({model['model']}): {effects}" if "file" in model else effects

@@ -43,6 +43,8 @@ def zero(
             typer.confirm("Is the machine at its zero position, and is this to be its zero (else --yes)?", abort=True)
             answer = client.zero(replace=True)
     typer.echo(f"machine zero taken at {answer['taken_at']} from {len(answer['readings_mm'])} gauges")
+    if "without" in answer:
+        typer.echo(f"without {', '.join(answer['without'])}, which could not be read: effects of these cannot be used")
     if "changed_mm" in answer:
         typer.echo(changes_text(answer["changed_mm"]))
     typer.echo(f"kept in {answer['path']}")

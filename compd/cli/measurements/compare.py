@@ -12,6 +12,7 @@ from compd.cli.options import MachineOption, OverwriteOption
 
 if TYPE_CHECKING:
     from compd.comparison.comparison import Comparison
+    from compd.model.effect import FittedEffect
 
 # More sentences than this nobody reads in a terminal.
 MOST_SENTENCES = 6
@@ -120,5 +121,14 @@ def print_comparisons(comparisons: list[Comparison]) -> None:
             console.print(f"Rows beyond all noise, not used: {shown}")
         for why, count in comparison.left_out.items():
             console.print(f"{count} rows left out: {why}")
+        sidecar = comparison.aligned.recording.sidecar
+        if sidecar.quantities_at_zero is None and not sidecar.external and any(map(_is_measured, comparison.fitted)):
+            console.print(f"Effects count from {sidecar.counts_from}.")
         if comparison.basis:
             console.print(f"{comparison.basis}.")
+
+
+def _is_measured(fitted: FittedEffect) -> bool:
+    from compd.model.effect_needs import is_measured
+
+    return is_measured(fitted.effect)

@@ -158,6 +158,8 @@ def _summary(contents: Recording) -> list[str]:
         f"    reference: {_reference(contents)}",
         f"    {int(usable.mask.sum())} rows have all of these",
     ]
+    if contents.quantities and contents.sidecar.counts_from:
+        lines.append(f"    effects count from {contents.sidecar.counts_from}")
     lines += [f"    {count} rows left out: {why}" for why, count in {**contents.left_out, **usable.left_out}.items()]
     reasons = dict.fromkeys(contents.sidecar.excluded.values())
     lines += [f"    excluded: {reason}" for reason in reasons]

@@ -41,6 +41,9 @@ def campaign(
     plan: Annotated[
         Path | None, typer.Option(help="Measure these rows, as `compd plan --out` has written them, and nothing else.")
     ] = None,
+    zero_degC: Annotated[
+        float, typer.Option("--zero-temperature", help="Of machine and room when machine zero is taken, degC.")
+    ] = 20.0,
     overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
 ) -> None:
     """Simulate a measuring campaign: about 600 rows in four sessions, repeats, loads, passes, 1 % outliers.
@@ -61,6 +64,7 @@ def campaign(
         reference=reference.value,
         other_days=other_days,
         plan=plan,
+        zero_degC=zero_degC,
         overwrite=overwrite,
     )
     summary = f"{written.rows} rows, {written.columns} columns"

@@ -49,6 +49,9 @@ def simulate(
         Path | None,
         typer.Option(help="After machine zero go through these rows, as `compd plan --out` has written them."),
     ] = None,
+    zero_degC: Annotated[
+        float, typer.Option("--zero-temperature", help="Of machine and room when it is switched on, degC.")
+    ] = 20.0,
     broker: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="The MQTT broker to which lines of kind mqtt publish.")
     ] = None,
@@ -77,6 +80,7 @@ def simulate(
     from compd.simulation.causes.hidden_cause import write_answer
     from compd.simulation.truth.mechanism import Mechanism
     from compd.simulation.truth.strengths import FULLY_MEASURED
+    from compd.simulation.truth.weather import AirAtZero
     from compd.simulation.truth.world import World
     from compd.simulation.wires.server import Simulation
     from compd.simulation.wires.simulation_directory import SEALED_ANSWER
@@ -94,6 +98,7 @@ def simulate(
         strengths=FULLY_MEASURED if sized else None,
         causes=[cause.cause for cause in sized],
         rows=rows,
+        air_at_zero=AirAtZero(zero_degC),
     )
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

@@ -186,6 +186,7 @@ def _observations(recording: Recording, model: MachineModel, starts: BoolArray) 
         time_s=recording.time_s,
         session_start=starts,
         movement=movement,
+        quantities_at_zero=recording.sidecar.quantities_at_zero,
     )
 
 

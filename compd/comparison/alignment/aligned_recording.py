@@ -337,7 +337,11 @@ def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[d
 
     Raises CompdError with everything that the effects need and the recording has not.
     """
-    problems = [problem for effect in fitted for problem in unmet_needs(effect.effect, rows.available, rows.links)]
+    problems = [
+        problem
+        for effect in fitted
+        for problem in unmet_needs(effect.effect, rows.available, rows.links, rows.quantities_at_zero)
+    ]
     if problems:
         raise CompdError(problems)
     by_effect, _ = deltas_by_effect(fitted, rows, {})

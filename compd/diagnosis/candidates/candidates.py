@@ -152,7 +152,10 @@ def _missing_inputs(effect: Effect, aligned: AlignedRecording) -> str:
         return "fitted along in any case: nobody knows where the fixed balls or pins are"
     if effect.registration and aligned.registered:
         return "fitted along in any case: the reference has a frame of its own"
-    return "; ".join(problem.what for problem in unmet_needs(effect, aligned.rows.available, aligned.rows.links))
+    return "; ".join(
+        problem.what
+        for problem in unmet_needs(effect, aligned.rows.available, aligned.rows.links, aligned.rows.quantities_at_zero)
+    )
 
 
 def _reason_for_no_motion(variants: Sequence[Candidate], usable: BoolArray) -> str:

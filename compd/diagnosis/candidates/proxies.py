@@ -41,18 +41,25 @@ def proxy_candidates(
     thermometers = [
         name
         for name, values in rows.quantities.items()
-        if name.startswith(_PREFIX) and np.isfinite(values[usable]).all() and np.ptp(values[usable]) > 0
+        if name.startswith(_PREFIX)
+        and (rows.quantities_at_zero is None or name in rows.quantities_at_zero)
+        and np.isfinite(values[usable]).all()
+        and np.ptp(values[usable]) > 0
     ]
     candidates: list[ProxyCandidate] = []
     for effect in effects:
         missing = tuple(name for name in needed_quantities(effect, rows.links) if name not in rows.quantities)
-        lacks = unmet_needs(effect, rows.available | set(missing), rows.links)
+        at_zero = rows.quantities_at_zero
+        known_at_zero = None if at_zero is None else {*at_zero, *missing}
+        lacks = unmet_needs(effect, rows.available | set(missing), rows.links, known_at_zero)
         if effect.id in present or lacks or not missing or not all(name.startswith(_PREFIX) for name in missing):
             continue
         for thermometer in thermometers:
             measured = rows.quantities[thermometer]
             quantities = {**rows.quantities, **dict.fromkeys(missing, measured)}
-            substituted = replace(aligned, rows=replace(rows, quantities=quantities))
+            if at_zero is not None:
+                at_zero = {**at_zero, **dict.fromkeys(missing, at_zero[thermometer])}
+            substituted = replace(aligned, rows=replace(rows, quantities=quantities, quantities_at_zero=at_zero))
             grid = effect.constant_grid(rows)
             searched = searched_parameters(effect, grid) + SEARCHED_CONSTANT
             for constants in grid:

@@ -254,15 +254,18 @@ def _observe_programmes(
         time_s=np.concatenate([programme.time_s for programme in chosen]),
         session_start=starts,
         movement=Movement(direction, velocity, np.zeros((count, comparators))),
+        quantities_at_zero=aligned.rows.quantities_at_zero,
     )
 
 
 def _values_at_rest(aligned: AlignedRecording) -> dict[str, float]:
-    """Every quantity of the recording where nothing acts: reference temperature, no force, the median of the rest."""
+    """Every quantity of the recording where nothing acts: the temperatures of machine zero, where they are not known 20
+    degC; no force, the median of the rest."""
     rest = {}
+    at_zero = aligned.rows.quantities_at_zero or {}
     for name, values in aligned.recording.quantities.items():
         if name.startswith("temperature_"):
-            rest[name] = REFERENCE_TEMPERATURE_degC
+            rest[name] = at_zero.get(name, REFERENCE_TEMPERATURE_degC)
         else:
             rest[name] = 0.0 if name.startswith("force_") else float(np.nanmedian(values))
     return rest

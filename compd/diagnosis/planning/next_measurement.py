@@ -220,7 +220,7 @@ def _unvaried(aligned: AlignedRecording, effect: Effect) -> dict[str, float]:
 
 
 def _unmet(aligned: AlignedRecording, effect: Effect) -> list[Problem]:
-    return unmet_needs(effect, aligned.rows.available, aligned.rows.links)
+    return unmet_needs(effect, aligned.rows.available, aligned.rows.links, aligned.rows.quantities_at_zero)
 
 
 def _gauges_to_add(effects: Sequence[Effect], problems: Sequence[Problem]) -> NextMeasurement:

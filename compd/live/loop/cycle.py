@@ -113,8 +113,8 @@ def _compute(
     tick, snapshot, zero, target, _, _ = inputs
     applied, wires = models.applied, settings.wires
 
-    if not isinstance(zero, MachineZero):
-        return _Outcome(State.NO_ZERO, _explanation(zero)), state
+    if not isinstance(zero, MachineZero) or not applied.needed_at_zero <= zero.quantities.keys():
+        return _Outcome(State.NO_ZERO, _explanation(zero, models)), state
     zero_vectors = state.zero_vectors
     if zero is not state.zero or zero_vectors is None:
         zero_vectors = ZeroVectors(wires.scale.zero_vector(zero), wires.comparators.zero_vector(zero))
@@ -136,7 +136,9 @@ def _compute(
     last_good = state.last_good if live is None else live
 
     change_mm, joints = comparators.change_mm, wires.joints
-    values = GaugeValues(scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s)
+    values = GaugeValues(
+        scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s, zero.quantities
+    )
     machine = applied.machine if usable.weight == 1.0 else applied.machine.with_effect_weight(usable.weight)
     started = state.warm_start
     compensation, warm_start = compensate(machine, values, target, started)
@@ -226,9 +228,11 @@ def _refusal(
     return f"{what} cannot be computed: {MEANING[Reason(code)]}" + (f"; {cause}" if cause else "")
 
 
-def _explanation(error: StateError) -> str:
-    """Why there is no machine zero, and what to do."""
-    problem = error.problems[0]
+def _explanation(zero: MachineZero | StateError, models: Models) -> str:
+    """Why there is no machine zero from which the models' effects can count, and what to do."""
+    if isinstance(zero, MachineZero):
+        return models.applied.missing_at_zero(zero)
+    problem = zero.problems[0]
     return f"{problem.what}; {problem.next_step}" if problem.next_step else problem.what
 
 

@@ -1,4 +1,4 @@
-"""Machine zero: what every length gauge reads at the machine's zero position, and its file."""
+"""Machine zero: what every gauge reads at the machine's zero position, and its file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from compd.files.file_kind import FileKind
 FILE_NAME = "machine-zero.json"
 # The machine zero before the present one, as its file was.
 OLD_FILE_NAME = "machine-zero.json.old"
-# Format 1, of releases before 0.6, has no checksum; neither 1 nor 2 has ports.
+# Format 1, of releases before 0.6, has no checksum; neither 1 nor 2 has quantities and ports.
 _FORMAT = 3
 _LARGEST_FILE_BYTES = 1_000_000
 _TAKE_ONE = "bring the machine to its zero position and run `compd zero`"
@@ -36,6 +36,7 @@ class _ZeroFile(BaseModel):
     zero_hash: str
     taken_at: str
     readings_mm: dict[str, FiniteFloat]
+    quantities: dict[str, FiniteFloat] = {}
     ports: dict[str, str] = {}
     checksum: str = ""
 
@@ -51,24 +52,28 @@ ZERO_FILE = FileKind(
 
 @dataclass(frozen=True)
 class MachineZero:
-    """Raw readings of all length gauges at machine zero.
+    """Raw readings of all length gauges at machine zero, and the quantities there.
 
     Attributes
     ----------
     zero_hash : of geometry, gauges and wiring. The zero of a machine with another hash must not be used.
     taken_at : UTC, ISO 8601, for people.
     readings_mm : by "gauge.channel", as read: before any sign.
+    quantities : temperatures, forces and so on by name, in their own units, from which effects count; of a zero of
+        release 0.5 or before, and of one that was taken without the gauge, it is not there.
     ports : lasting names of the ports where they were read, by gauge; only in the file, not in recordings.
     """
 
     zero_hash: str
     taken_at: str
     readings_mm: Mapping[str, float]
+    quantities: Mapping[str, float] = field(default_factory=dict)
     ports: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data from which `MachineZero(**data)` makes the same zero again."""
-        return {"zero_hash": self.zero_hash, "taken_at": self.taken_at, "readings_mm": dict(self.readings_mm)}
+        content = {"zero_hash": self.zero_hash, "taken_at": self.taken_at, "readings_mm": dict(self.readings_mm)}
+        return content | ({"quantities": dict(self.quantities)} if self.quantities else {})
 
     @property
     def _kept(self) -> dict[str, Any]:
@@ -186,7 +191,7 @@ def _parse_zero(content: Any, path: Path) -> MachineZero:
                 for detail in error.errors(include_url=False)
             ]
         ) from error
-    zero = MachineZero(file.zero_hash, file.taken_at, file.readings_mm, file.ports)
+    zero = MachineZero(file.zero_hash, file.taken_at, file.readings_mm, file.quantities, file.ports)
     if file.format == 1:
         log.warning("machine zero has no checksum: what was changed in it cannot be seen", path=str(path))
     elif file.checksum != (checksum := checksum_of(zero._kept)):

@@ -18,6 +18,7 @@ from compd.compensation.values import GaugeValues, WarmStart
 from compd.configuration.yaml_reader import LARGEST_BYTES
 from compd.errors import Problem, StateError
 from compd.files.atomic_files import read_small_file
+from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.wiring import MachineWires, WiredValues, Wires
 from compd.live.memory.latest import Snapshot
 from compd.model.effect import FittedEffect
@@ -108,6 +109,21 @@ class LiveModel:
     ranges: FittedRanges | None = None
     warnings: tuple[Problem, ...] = ()
 
+    @cached_property
+    def needed_at_zero(self) -> frozenset[str]:
+        """Names of the quantities whose values at machine zero the effects need."""
+        return self.machine.program.needed_at_zero
+
+    def missing_at_zero(self, zero: MachineZero) -> str:
+        """What machine zero lacks of `needed_at_zero`, and what to do, in a sentence; "" where it lacks nothing."""
+        if self.needed_at_zero <= zero.quantities.keys():
+            return ""
+        missing = ", ".join(sorted(self.needed_at_zero - zero.quantities.keys()))
+        return (
+            f"machine zero of {zero.taken_at} has no {missing}, from which effects of the model count: bring the "
+            "machine to its zero position and run `compd zero`"
+        )
+
     @property
     def file(self) -> str:
         """Path of the model file; "" without effects."""
@@ -129,7 +145,8 @@ class LiveModel:
 
     @property
     def summary(self) -> Mapping[str, Any]:
-        """For MODEL and STATUS. `not_live` are effects at the reference instrument, which the machine does not need."""
+        """For MODEL and STATUS. `not_live` are effects at the reference instrument, which the machine does not need;
+        `from_20_degC` those that were fitted without the quantities at machine zero, and do not count from there."""
         summary: dict[str, Any] = {"effects": [fitted.effect.id for fitted in self.machine.live_effects]}
         if self.file:
             summary |= {"model": self.hash, "file": self.file}
@@ -139,7 +156,17 @@ class LiveModel:
             summary["warnings"] = [
                 " ".join(filter(None, (w.what, w.value))) + f": {w.next_step}" for w in self.warnings
             ]
+        if from_20_degC := [
+            fitted.effect.id for fitted in self.machine.live_effects if fitted.effect.counts_from == "20 degC"
+        ]:
+            summary["from_20_degC"] = from_20_degC
         return summary
+
+
+def warn_of_datum(model: LiveModel, log: Any) -> None:
+    """Log which effects of a model do not count from machine zero."""
+    if effects := model.summary.get("from_20_degC"):
+        log.warning("effects count from 20 degC and not from machine zero", file=model.file, effects=effects)
 
 
 class ModelNames(NamedTuple):
@@ -310,6 +337,7 @@ def try_model(machine: MachineModel, names: tuple[str, ...], where: str) -> None
         np.zeros(9),
         dict.fromkeys(names, np.array(np.nan)),
         0.0,
+        dict.fromkeys(names, np.nan),
     )
     target_mm = machine.arrangement.measured_tip_mm(machine.zero.contact)
     try:

@@ -69,6 +69,9 @@ def evaluate_shadow(
     quantities = shadow.read(snapshot)
     if quantities.lost:
         return ShadowResult(shadow.hash, str(quantities.lost)), memory
+    if not shadow.needed_at_zero <= values.quantities_at_zero.keys():
+        missing = ", ".join(sorted(shadow.needed_at_zero - values.quantities_at_zero.keys()))
+        return ShadowResult(shadow.hash, f"machine zero has no {missing}"), memory
     values = values._replace(quantities=shadow.by_name(quantities))
     compensation, after = compensate(shadow.machine, values, target, warm_start._replace(effects=memory))
     if code := int(compensation.reason):

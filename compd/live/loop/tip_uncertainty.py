@@ -82,6 +82,7 @@ def tip_uncertainty(
         joint_mm=values.joint_mm,
         frame_mm=values.frame_mm,
         quantities=values.quantities,
+        quantities_at_zero=values.quantities_at_zero,
         sigmas=noise.quantities,
         time_s=float(values.time_s),
         effects=effects,

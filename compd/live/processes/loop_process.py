@@ -22,7 +22,7 @@ from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.directions import Directions
 from compd.live.loop.loop import Loop
 from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import LiveModel, ModelLoader, Models, ModelText
+from compd.live.loop.model_loader import LiveModel, ModelLoader, Models, ModelText, warn_of_datum
 from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
@@ -104,6 +104,7 @@ class LoopProcess:
         try:
             before = self.adopted.load(self.loader)
             models = self._models_wanted(before, request)
+            self._require_zero(models)
             self.commands.models = models
             loop = self._loop()
             self._prepare(loop)
@@ -120,6 +121,7 @@ class LoopProcess:
         state = self._state_left(before, forget=False)
         self.adopted.write(models)
         self.answer(request.number, models.summary, "")
+        warn_of_datum(models.applied, _log)
         loop.run(lambda: control.keeps_turn(number), control.ending, state)
 
     def answer(self, number: int, summary: object, refusal: str) -> None:
@@ -138,6 +140,13 @@ class LoopProcess:
             # the same object that ran as a shadow: its effects keep their memory
             return Models(before.shadow)
         return Models(model or self.loader.without_effects, before.shadow)
+
+    def _require_zero(self, models: Models) -> None:
+        """Raise StateError where machine zero lacks a quantity from which an effect of the models counts."""
+        zero = self.commands.zero
+        for model in filter(None, models):
+            if isinstance(zero, MachineZero) and (missing := model.missing_at_zero(zero)):
+                raise StateError(Problem(where=model.file, what=missing))
 
     def _loop(self) -> Loop:
         packer = CyclePacker(Directions(self.settings.wires.scale.wires))

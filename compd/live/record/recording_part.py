@@ -174,5 +174,6 @@ class RecordingPart:
                     if "sign" in column
                 },
             },
+            quantities_at_zero=self.zero.get("quantities"),
             notes="Raw readings less machine zero, before any correction: raw in mm = zero_mm + sign * column.",
         )

@@ -99,6 +99,12 @@ class ZeroKeys(SentMessage):
         default=None,
         description="by how much each gauge differs from the machine zero before, mm; absent where there was none",
     )
+    quantities: dict[str, float] | None = Field(
+        default=None, description="mean of every other quantity, by name: from these effects count"
+    )
+    without: list[str] | None = Field(
+        default=None, description="quantities that could not be read; models with effects of these are refused"
+    )
 
 
 class ZeroRequest(OrderRequest):

@@ -1,13 +1,15 @@
-"""Taking machine zero: average every length gauge for a second with the machine at rest, and keep the means on disk."""
+"""Taking machine zero: average every gauge for a second with the machine at rest, and keep the means on disk."""
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import structlog
 
 from compd.clock import Clock
@@ -99,12 +101,17 @@ class ZeroCapture:
             return ProtocolError(ErrorCode.ZERO_REFUSED, reason).to_json()
         self._commands.zero = zero
         self._accept("all")
+        without = [name for name in self._wires.quantity_names if name not in zero.quantities]
+        if without:
+            _log.warning("machine zero is without quantities that could not be read", quantities=", ".join(without))
         _log.info("machine zero taken", path=str(path), changed_mm=_named(changed_mm) if changed_mm else "")
         answer = {
             "class": "ZERO",
             "taken_at": zero.taken_at,
             "path": str(path),
             "readings_mm": dict(zero.readings_mm),
+            "quantities": dict(zero.quantities) or None,
+            "without": without or None,
             "changed_mm": {channel: round(change_mm, 7) for channel, change_mm in changed_mm.items()} or None,
         }
         return line(omit_unknown(answer))
@@ -134,7 +141,7 @@ class ZeroCapture:
             self._accept("all")
             self._wait_until_believed()
         taken_at = datetime.now(UTC).isoformat(timespec="seconds")
-        zero = MachineZero(self._zero_hash, taken_at, self.sample(), self._ports)
+        zero = MachineZero(self._zero_hash, taken_at, *self.sample(), self._ports)
         if not isinstance(before, MachineZero):
             return zero, {}
         changed_mm = zero.changes_mm(before)
@@ -162,14 +169,18 @@ class ZeroCapture:
             if self._clock.wait(self._stop, _LOOK_EVERY_S):
                 return
 
-    def sample(self) -> dict[str, float]:
-        """Mean raw reading (mm) of every length gauge, by channel, over `_WINDOW_S`; each reading counts once.
+    def sample(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Mean raw reading (mm) of every length gauge, by channel, over `_WINDOW_S`; and of every other quantity, by
+        name, of which each reading in that time was good. Each reading counts once.
 
         Raises StateError when a gauge is not good at any moment of the window, or when its readings spread over more
         than REST_TOLERANCE_MM: the machine is not at rest.
         """
         # By channel and time of reading: a snapshot repeats the readings that no newer one has replaced.
         values_mm: dict[str, dict[float, float]] = defaultdict(dict)
+        quantities: dict[str, dict[float, float]] = defaultdict(dict)
+        names = self._wires.quantity_names
+        wires, not_good = self._wires.quantity_wires(names), set[str]()
         start_s = self._clock.monotonic()
         while True:
             snapshot = self._latest.snapshot(self._clock.monotonic())
@@ -184,6 +195,12 @@ class ZeroCapture:
             for wire in self._wires.length_wires:
                 reading = snapshot.readings[wire.slot]
                 values_mm[wire.channel][reading.time_s] = reading.value
+            for name, wire, value in zip(
+                names, wires.wires, wires.read(snapshot, np.zeros(len(names))).values, strict=True
+            ):
+                quantities[name][snapshot.readings[wire.slot].time_s] = value
+                if math.isnan(value):
+                    not_good.add(name)
             if snapshot.time_s - start_s >= _WINDOW_S:
                 break
             if self._clock.wait(self._stop, _LOOK_EVERY_S):
@@ -202,7 +219,12 @@ class ZeroCapture:
                         next_step="let the machine stand still, then take zero again",
                     )
                 )
-        return {channel: sum(readings.values()) / len(readings) for channel, readings in values_mm.items()}
+        return _means(values_mm), {name: mean for name, mean in _means(quantities).items() if name not in not_good}
+
+
+def _means(readings: Mapping[str, Mapping[float, float]]) -> dict[str, float]:
+    """Mean of each gauge's readings, by time."""
+    return {name: float(sum(values.values()) / len(values)) for name, values in readings.items()}
 
 
 def _named(changes_mm: Mapping[str, float]) -> str:

@@ -46,7 +46,7 @@ class FormulaBasis:
             {AXES.index(axis) if axis else 0: formula.tree for axis, formula in self.formulas.items()},
             [parameter.name for parameter in effect.parameters],
             [constant.name for constant in effect.constants],
-            column_codes(names, port, links, needed_quantities(effect, links)),
+            column_codes(names, port, links, needed_quantities(effect, links), effect.counts_from == "machine zero"),
             along,
             places,
             [parameter.per == "link" for parameter in effect.parameters],

@@ -85,10 +85,16 @@ _READINGS: Mapping[Port, int] = {
 }
 
 
-def column_codes(names: Sequence[str], port: Port, links: int, quantities: Sequence[str]) -> ColumnCodes:
+_MEASURED = frozenset({machine_code.QUANTITY, machine_code.QUANTITY_OF_PLACE, machine_code.AXIAL_FORCE})
+
+
+def column_codes(
+    names: Sequence[str], port: Port, links: int, quantities: Sequence[str], since_zero: bool
+) -> ColumnCodes:
     """What formulas' columns are to a kernel.
 
     quantities : those that the effect needs, in their order, on a machine with so many links.
+    since_zero : whether measured quantities count from machine zero.
     """
     codes: dict[str, tuple[int, int]] = {}
     own: set[str] = set()
@@ -108,7 +114,8 @@ def column_codes(names: Sequence[str], port: Port, links: int, quantities: Seque
             own.add(name)
         else:
             codes[name] = (machine_code.QUANTITY, quantities.index(name))
-    return ColumnCodes(codes, frozenset(own))
+    measured = {name for name, (kind, _) in codes.items() if since_zero and kind in _MEASURED}
+    return ColumnCodes(codes, frozenset(own), frozenset(measured))
 
 
 def column_values(rows: Observations, name: str, port: Port) -> FloatArray:

@@ -100,6 +100,7 @@ def _with_sensitivity(declaration: FormulaDeclaration, where: str) -> Effect:
         needs=(sensitivity_columns(declaration.sensitivity, declaration.port),),
         linear=[parameter],
         basis=sensitivity_basis(declaration.sensitivity, declaration.port),
+        counts_from="its own",
     )
 
 

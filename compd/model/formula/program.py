@@ -32,10 +32,12 @@ class ColumnCodes(NamedTuple):
 
     codes : (kind, argument) by name; see `compd.model.kernels.formula`.
     own : names of those that have a value for each place of the port.
+    since_zero : names of those that count from machine zero: measured quantities; empty where none does.
     """
 
     codes: Mapping[str, tuple[int, int]]
     own: frozenset[str]
+    since_zero: frozenset[str] = frozenset()
 
 
 class Program(NamedTuple):
@@ -70,7 +72,8 @@ def write_program(
     begins = np.cumsum([0, *(places if each else 1 for each in own)]).tolist()
     states = [width for width in writer.lag_widths for _ in range(3)]
     lag_begins = np.cumsum([0, *states])[::3].tolist()
-    table = [(along, places), (len(writer.lag_widths), len(columns.codes)), (len(formulas), len(linear))]
+    lanes = 2 if columns.since_zero else 1
+    table = [(along, places), (lanes, 0), (len(writer.lag_widths), len(columns.codes)), (len(formulas), len(linear))]
     table += list(zip(lag_begins, writer.lag_widths, strict=False))
     table += list(columns.codes.values())
     table += [(begin, int(each)) for begin, each in zip(begins, own, strict=False)]
@@ -135,7 +138,8 @@ class _Writer:
         for name, value in terms.items():
             assert name is not None, "`parse` refuses a term without a parameter"
             code += self._value(value)
-            code.append((machine_code.FACTOR, self.linear.index(name)))
+            factor = machine_code.FACTOR_SINCE_ZERO if self._is_since_zero(value) else machine_code.FACTOR
+            code.append((factor, self.linear.index(name)))
         return code
 
     def _write_lags(self, value: Expression, code: list[tuple[int, int]]) -> None:
@@ -145,17 +149,13 @@ class _Writer:
         elif isinstance(value, LaggedValue) and id(value) not in self._registers:
             self._write_lags(value.value, code)
             code += [*self._value(value.value), *self._value(value.tau_s)]
-            code.append((machine_code.LAG, len(self.lag_widths)))
+            lag = machine_code.LAG_SINCE_ZERO if self._is_since_zero(value.value) else machine_code.LAG
+            code.append((lag, len(self.lag_widths)))
             self._registers[id(value)] = len(self.lag_widths)
-            self.lag_widths.append(self.places if self._has_own(value.value) else 1)
+            self.lag_widths.append(self.places if _holds(value.value, self.columns.own) else 1)
 
-    def _has_own(self, value: Expression) -> bool:
-        """Whether a value differs from place to place."""
-        if isinstance(value, tuple):
-            return any(self._has_own(operand) for operand in value[1])
-        if isinstance(value, LaggedValue):
-            return self._has_own(value.value)
-        return value in self.columns.own
+    def _is_since_zero(self, value: Expression) -> bool:
+        return _holds(value, self.columns.since_zero)
 
     def _value(self, value: Expression) -> list[tuple[int, int]]:
         if isinstance(value, LaggedValue):
@@ -169,3 +169,12 @@ class _Writer:
             return [(machine_code.NUMBER, self.constants.index(value))]
         self.numbers.append(NUMBERS[value] if isinstance(value, str) else value)
         return [(machine_code.NUMBER, len(self.constants) + len(self.numbers) - 1)]
+
+
+def _holds(value: Expression, columns: frozenset[str]) -> bool:
+    """Whether one of these columns is in a value."""
+    if isinstance(value, tuple):
+        return any(_holds(operand, columns) for operand in value[1])
+    if isinstance(value, LaggedValue):
+        return _holds(value.value, columns)
+    return value in columns

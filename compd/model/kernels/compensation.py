@@ -191,7 +191,8 @@ def compensate_rows(  # noqa: PLR0912  the steps of a cycle, in their order
     passes : how often effects are computed, each time at the setpoint of the time before.  starts : the first row has
     no history.  other_mode : the motion before the first row is of the other mode.
     models, machines, works (1,).  The effects' numbers: see `compd.model.effect_program.EffectProgram`.
-    scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9), quantities (N, q), time_s (N,).
+    scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9), time_s (N,).  quantities (N, q + z) : those that the effects
+        need, and behind them those from which the effects count, in the order of the program.
     target_mm (N, 6) : the contact in {M} and in {P}, attitude_M_P (N, 3, 3) : wanted; both in machine-tool mode alone.
     effects_at_mm (N, n) : in machine-tool mode the scales at which effects are computed first; nan for the setpoint
         without effects.

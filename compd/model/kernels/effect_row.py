@@ -49,6 +49,8 @@ MACHINE = np.dtype(
         ("zero_directions_M", np.float64, (MOST_LINKS, 3)),
         ("zero_axes_M", np.float64, (MOST_LINKS, 3)),
         ("zero_axial_force_N", np.float64, MOST_LINKS),
+        ("zero_axial_per_force", np.float64, (MOST_LINKS, 3)),
+        ("zero_rotation_M_P", np.float64, (3, 3)),
         ("weight_N", np.float64),
         ("weight_at_P_mm", np.float64, 3),
         ("frame_zero_mm", np.float64, 9),

@@ -25,7 +25,8 @@ def basis_of_rows(
 
     number, code, numbers : of the effect, see `compd.model.effect.BasisProgram`.
     rows (N,), machine (1,) : structures of `compd.model.kernels.effect_row`.
-    quantities (N, q) : those that the effect needs, in the order of `compd.model.effect_needs.needed_quantities`.
+    quantities (N, 2 q) : those that the effect needs, then the same at machine zero; see
+        `compd.model.kernels.effects`.
     """
     for k in range(rows.shape[0]):
         set_basis(number, rows[k], machine[0], quantities[k], code, numbers, memory, basis[k])

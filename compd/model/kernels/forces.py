@@ -78,6 +78,14 @@ forces = kernel(
 
 
 @helper
+def axial_force_at_zero(machine: EffectMachine, force_M_N: FloatArray, i: int) -> float:
+    """Axial force in link i at machine zero, from the platform's weight and the external force (3,) there."""
+    by_force = machine.zero_axial_per_force[i]
+    of_force_N = by_force[0] * force_M_N[0] + by_force[1] * force_M_N[1] + by_force[2] * force_M_N[2]
+    return machine.zero_axial_force_N[i] + of_force_N  # type: ignore[no-any-return]
+
+
+@helper
 def set_axial_forces(row: EffectRow, machine: EffectMachine, force_M_N: FloatArray, axial_N: FloatArray) -> None:
     """Axial link forces (n,) from the external force at the tip and the platform's weight; nan where none hold it."""
     weight_N = np.full(1, machine.weight_N)

@@ -3,6 +3,7 @@
 `compd.model.formula.program` writes programs. A program is a table of integers, two in each row::
 
     along, places            numbers at each place of the port (3 for a vector), places
+    lanes, 0                 2 where measured quantities count from machine zero, else 1
     lags, columns
     axes, parameters         formulas, one for each axis that has one; fitted parameters
     begin, width             of each lag: where its memory begins, for how many places it has one
@@ -11,6 +12,8 @@
     axis, operations         of each formula; then its operations, with an argument each
 
 A formula computes each of its lags into a register, and then one factor for each parameter: what it is multiplied by.
+With two lanes everything is computed twice: as it is now, and at the same pose with the measured quantities as at
+machine zero. A factor that holds a measured quantity is the difference of the two, and so is what goes into a lag.
 """
 
 from __future__ import annotations
@@ -21,20 +24,22 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.effect_row import EffectMachine, EffectRow
-from compd.model.kernels.forces import set_axial_forces
+from compd.model.kernels.forces import axial_force_at_zero, set_axial_forces
 from compd.model.kernels.jit import INDEX_ROWS, NUMBERS, ROW_MATRICES, helper, loop
 from compd.model.kernels.memory import lag_step
 
 # Operations: each takes its operands from the stack, the last one on top, and leaves its result there. The argument of
-# the first five is the place of a number, a column, a register, a lag or a parameter.
-NUMBER, COLUMN, REGISTER, LAG, FACTOR = range(5)
+# the first seven is the place of a number, a column, a register, a lag or a parameter. Those since zero are of values
+# that hold a measured quantity.
+NUMBER, COLUMN, REGISTER, LAG, FACTOR, LAG_SINCE_ZERO, FACTOR_SINCE_ZERO = range(7)
 ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, NEGATE = range(10, 16)
 SIN, COS, TAN, ATAN2, EXP, LOG, SQRT, ABS, SIGN, MINIMUM, MAXIMUM = range(20, 31)
 
 # Columns: what an instant has once, what each place has, and quantities, once or for each place.
 TIME, TIP, SCALE, LINK, DIRECTION, VELOCITY, AXIAL_FORCE, JOINT, FRAME, QUANTITY, QUANTITY_OF_PLACE = range(11)
 
-_HEADER = 3
+_HEADER = 4
+NOW, AT_ZERO = range(2)
 # Deeper than any formula may be nested (`compd.model.formula.parser.DEEPEST`): two operands for each level, and a sum.
 STACK = 64
 
@@ -55,22 +60,29 @@ def set_formula_basis(
     memory, basis : as for the kernels of `compd.model.kernels.effects`.
     """
     along, places = code[0]
-    lags, count = code[1]
-    axes, parameters = code[2]
+    lanes = code[1, 0]
+    lags, count = code[2]
+    axes, parameters = code[3]
     column_at = _HEADER + lags
     parameter_at = column_at + count
-    columns = np.empty(count)
-    registers = np.full(lags, math.nan)
+    at_zero = quantities[quantities.shape[0] // 2 :]
+    columns = np.empty((lanes, count))
+    registers = np.full((lanes, lags), math.nan)
     factors = np.empty(parameters)
-    axial_N = np.empty(row.links)
+    axial_N = np.empty((2, row.links))
     for c in range(count):
         if code[column_at + c, 0] == AXIAL_FORCE:
             begin = code[column_at + c, 1]
-            set_axial_forces(row, machine, quantities[begin : begin + 3], axial_N)
+            set_axial_forces(row, machine, quantities[begin : begin + 3], axial_N[NOW])
+            for i in range(row.links):
+                axial_N[AT_ZERO, i] = axial_force_at_zero(machine, at_zero[begin : begin + 3], i)
     to_mm = numbers[numbers.shape[0] - 1]
     for place in range(places):
         for c in range(count):
-            columns[c] = _column(row, quantities, axial_N, code[column_at + c, 0], code[column_at + c, 1], place)
+            kind, argument = code[column_at + c]
+            columns[NOW, c] = _column(row, quantities, axial_N[NOW], kind, argument, place)
+            if lanes > 1:
+                columns[AT_ZERO, c] = _column(row, at_zero, axial_N[AT_ZERO], kind, argument, place)
         at = parameter_at + parameters
         for _ in range(axes):
             axis, operations = code[at]
@@ -119,7 +131,7 @@ def _column(row: EffectRow, quantities: FloatArray, axial_N: FloatArray, kind: i
 
 
 @helper
-def _run(
+def _run(  # noqa: PLR0912  one branch for each kind of operation
     operations: IntArray,
     lags: IntArray,
     numbers: FloatArray,
@@ -131,35 +143,48 @@ def _run(
     memory: FloatArray,
     factors: FloatArray,
 ) -> None:
-    """One formula at one place. What is not finite in the end (log of a negative, exp of a large number) is nan."""
-    stack = np.empty(STACK)
+    """One formula at one place. What is not finite in the end (log of a negative, exp of a large number) is nan.
+
+    columns (lanes, C), registers (lanes, L) : now, and at machine zero.
+    """
+    lanes = columns.shape[0]
+    stack = np.empty((lanes, STACK))
     top = -1
     for k in range(operations.shape[0]):
         operation, argument = operations[k]
-        if operation == NUMBER:
+        if operation in (NUMBER, COLUMN, REGISTER):
             top += 1
-            stack[top] = numbers[argument]
-        elif operation == COLUMN:
-            top += 1
-            stack[top] = columns[argument]
-        elif operation == REGISTER:
-            top += 1
-            stack[top] = registers[argument]
-        elif operation == FACTOR:
-            factors[argument] = stack[top] if math.isfinite(stack[top]) else math.nan
+            for lane in range(lanes):
+                if operation == NUMBER:
+                    stack[lane, top] = numbers[argument]
+                else:
+                    stack[lane, top] = columns[lane, argument] if operation == COLUMN else registers[lane, argument]
+        elif operation in (FACTOR, FACTOR_SINCE_ZERO):
+            value = stack[NOW, top]
+            if operation == FACTOR_SINCE_ZERO:
+                value -= stack[AT_ZERO, top]
+            factors[argument] = value if math.isfinite(value) else math.nan
             top -= 1
-        elif operation == LAG:
+        elif operation in (LAG, LAG_SINCE_ZERO):
             begin, width = lags[argument]
             if place < width:  # one of a value that all places share is computed once
-                registers[argument] = _lag(
-                    stack[top - 1], stack[top], time_s, session_start, memory[begin : begin + 3 * width], place, width
+                # at machine zero what is lagged had been as it was then for long
+                constant = stack[AT_ZERO, top - 1] if operation == LAG_SINCE_ZERO else 0.0
+                value = stack[NOW, top - 1] - constant
+                lagged = _lag(
+                    value, stack[NOW, top], time_s, session_start, memory[begin : begin + 3 * width], place, width
                 )
+                registers[:, argument] = lagged + constant
+                if operation == LAG_SINCE_ZERO:
+                    registers[AT_ZERO, argument] = constant
             top -= 2
         elif operation in (ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, ATAN2, MINIMUM, MAXIMUM):
             top -= 1
-            stack[top] = _of_two(operation, stack[top], stack[top + 1])
+            for lane in range(lanes):
+                stack[lane, top] = _of_two(operation, stack[lane, top], stack[lane, top + 1])
         else:
-            stack[top] = _of_one(operation, stack[top])
+            for lane in range(lanes):
+                stack[lane, top] = _of_one(operation, stack[lane, top])
 
 
 @helper
@@ -228,16 +253,16 @@ def formula_factors(
 
     session_start (N,) : not 0 where a row has no history.
     """
-    lags = code[1, 0]
-    begin = _HEADER + lags + code[1, 1] + code[2, 1]
-    registers = np.full(lags, math.nan)
+    lags = code[2, 0]
+    begin = _HEADER + lags + code[2, 1] + code[3, 1]
+    registers = np.full((1, lags), math.nan)
     for k in range(columns.shape[0]):
         for place in range(columns.shape[1]):
             _run(
                 code[begin + 1 : begin + 1 + code[begin, 1]],
                 code[_HEADER : _HEADER + lags],
                 numbers,
-                columns[k, place],
+                columns[k, place : place + 1],
                 time_s[k],
                 session_start[k] != 0.0,
                 place,

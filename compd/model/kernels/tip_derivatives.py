@@ -44,7 +44,7 @@ def _add_effect(
     needed = np.empty(places.shape[0])
     basis = np.zeros((effect.size, effect.theta_end - effect.theta_begin))
     raised_basis = np.empty_like(basis)
-    for which in range(-1, places.shape[0]):  # -1: none is raised
+    for which in range(-1, places.shape[0] // 2):  # -1: none is raised; the second half is that at machine zero
         for i in range(places.shape[0]):
             needed[i] = raised[places[i]] if i == which else quantities[places[i]]
         raised_basis[:, :] = 0.0
@@ -107,6 +107,7 @@ def set_tip_derivatives(
     """Fill in by_port (3, size), by_theta (3, P) and by_quantity (3, q); nan where there is no pose.
 
     models to targets : as in `compd.model.kernels.compensation.compensate_rows`.
+    quantities : as in `compensate_rows`, those at machine zero behind them.
     raised (q,) : each quantity with what it may be wrong by; `by_quantity` is how far the tip moves with it, mm.
     zero_ : where Newton starts, at machine zero.  motion, memory : after the snapshot.  works, results (1,) : room.
     Of effects without a kernel, by_theta and what they add to by_quantity stay 0.

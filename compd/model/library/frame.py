@@ -28,7 +28,7 @@ EFFECTS = (
         symbols={
             "a": "expansion coefficient of the rods, ppm/K",
             "L_k": "distance k (t1..t3, u1..u6) at machine zero, mm",
-            "dT_frame": "temperature of the frame above 20 degC, K",
+            "dT_frame": "temperature of the frame since machine zero, K",
         },
         source="Oiwa, section 3.4: rods of Super-Invar",
         needs=("temperature_frame_degC",),

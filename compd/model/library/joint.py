@@ -27,7 +27,7 @@ EFFECTS = (
         equation="delta_k = -c dT_platform",
         symbols={
             "c": "drift, all comparators alike, um/K",
-            "dT_platform": "temperature of the platform above 20 degC, K",
+            "dT_platform": "temperature of the platform since machine zero, K",
         },
         source="expansion of a steel holder; Slocum, Precision Machine Design (1992), chapter 6",
         needs=("temperature_platform_degC",),

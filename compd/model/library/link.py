@@ -16,7 +16,7 @@ EFFECTS = (
         symbols={
             "a": "expansion coefficient, ppm/K",
             "l_i": "length of link i, mm",
-            "dT_link_i": "temperature of link i above 20 degC, K",
+            "dT_link_i": "temperature of link i since machine zero, K",
         },
         source="Oiwa, section 2.2 and figure 5",
         needs=("kinematics", "temperature_link_{link}_degC"),
@@ -34,7 +34,7 @@ EFFECTS = (
             "a": "expansion coefficient, ppm/K",
             "l_i": "length of link i, mm",
             "y_i": "warming of the rod in link i, K; fitted along at the start of a session, dT_link_i in the daemon",
-            "dT_link_i": "temperature of link i above 20 degC, K",
+            "dT_link_i": "temperature of link i since machine zero, K",
             "tau": "time constant of warming up, s",
         },
         source="lumped heat capacity: Incropera, Fundamentals of Heat and Mass Transfer, chapter 5",
@@ -63,7 +63,7 @@ EFFECTS = (
         equation="delta_i = (F_i - F0_i) / k",
         symbols={
             "F_i": "axial force in link i from load and weight, N, tension positive",
-            "F0_i": "the same at machine zero, from the weight alone, N",
+            "F0_i": "the same at machine zero, N",
             "k": "stiffness of a link with its joints, N/um; 1/k is fitted",
         },
         source="Oiwa, section 1, factor (2); statics by virtual work",

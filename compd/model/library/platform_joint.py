@@ -27,7 +27,7 @@ EFFECTS = (
         symbols={
             "a": "expansion coefficient of the platform, ppm/K",
             "c_i": "place of platform joint i in {P}, mm",
-            "dT_platform": "temperature of the platform above 20 degC, K",
+            "dT_platform": "temperature of the platform since machine zero, K",
         },
         source="Slocum, Precision Machine Design (1992), chapter 6; ISO 1",
         needs=("temperature_platform_degC",),

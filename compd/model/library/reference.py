@@ -58,6 +58,7 @@ EFFECTS = (
         mistaken_for=("scale_gain",),
         separated_by="the same points at two pressures, or a retroreflector at a known distance",
         basis=KernelBasis(reference.air_index),
+        counts_from="its own",
     ),
     Effect(
         id="reference_registration",

@@ -40,6 +40,7 @@ EFFECTS = (
         mistaken_for=("scale_gain", "link_expansion"),
         separated_by="the same long and short links at two temperatures 3 K apart",
         basis=KernelBasis(scale.expansion),
+        counts_from="its own",
     ),
     Effect(
         id="scale_cyclic",

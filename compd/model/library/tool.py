@@ -19,7 +19,7 @@ EFFECTS = (
         symbols={
             "a": "expansion coefficient of the tool, ppm/K",
             "tool": "tool vector in {P}; of a tool that stands on the plate, in {M}; mm",
-            "dT_tool": "temperature of the tool above 20 degC, K",
+            "dT_tool": "temperature of the tool since machine zero, K",
         },
         source="ISO 1; stylus stems: carbon fibre 0, tungsten carbide 5, ceramic 7, steel 12",
         needs=("temperature_tool_degC",),

@@ -85,7 +85,7 @@ def _effect(declaration: Mapping[str, Any]) -> tuple[Effect | None, list[Problem
 
 def _reasons_not_to_try(effect: Effect, rows: Observations) -> list[Problem]:
     place = f"{_WHERE}, formula of {effect.id}"
-    unmet = unmet_needs(effect, rows.available, rows.links)
+    unmet = unmet_needs(effect, rows.available, rows.links, rows.quantities_at_zero)
     return [replace(problem, where=place) for problem in unmet] + too_large(effect, place)
 
 

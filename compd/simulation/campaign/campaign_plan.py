@@ -11,7 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.warm_up import COLUMNS, Heat
-from compd.simulation.truth.weather import WorkshopWeather
+from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero, WorkshopWeather
 from compd.simulation.truth.workspace import draw_points_mm
 
 SESSIONS = 4
@@ -97,18 +97,20 @@ def draw_campaign_plan(
     points_mm: FloatArray | None = None,
     passes: int = PASSES_PER_SESSION,
     warm_up_s: float = 0.0,
+    air_at_zero: AirAtZero = STANDARD_AIR,
 ) -> CampaignPlan:
     """Plan number `number` for the machine of `seed`.
 
     points_mm : (points, n) scale values to use instead of random points. passes : per session. warm_up_s : time for
-    which the machine is on, with its drives hard at work, before the first row of each session.
+    which the machine is on, with its drives hard at work, before the first row of each session. air_at_zero : at
+    time 0.
     """
     rng = np.random.default_rng([seed, 1, number])
     if points_mm is None:
         points_mm = draw_points_mm(mechanism, rng, POINTS)
     session_s = (VISITS_PER_SESSION + passes) * VISIT_S
     starts_s = [warm_up_s + session * (session_s + GAP_S) for session in range(SESSIONS)]
-    weather = WorkshopWeather(starts_s, session_s, rng)
+    weather = WorkshopWeather(starts_s, session_s, rng, air_at_zero)
     items = [
         item
         for session, start in enumerate(starts_s, 1)

@@ -18,7 +18,7 @@ from compd.simulation.truth.instruments import ReferenceInstrument
 from compd.simulation.truth.plan_motion import Stage, plan_stages
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.strengths import Strengths
-from compd.simulation.truth.weather import Weather
+from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero, Weather
 from compd.simulation.truth.world import World
 
 SESSION = 1
@@ -41,9 +41,10 @@ class PlannedCampaign:
         strengths: Strengths,
         causes: Sequence[Cause],
         reference: ReferenceInstrument,
+        air_at_zero: AirAtZero = STANDARD_AIR,
     ) -> None:
         """seed : of joints, weather and noise. number : of the campaign, with weather and noise of its own."""
-        weather = Weather(strengths.room_swing_K, np.random.default_rng([seed, 1, number]))
+        weather = Weather(strengths.room_swing_K, np.random.default_rng([seed, 1, number]), air_at_zero)
         self._world = World(geometry, wiring, seed, strengths=strengths, causes=causes, weather=weather)
         rng = np.random.default_rng([seed, 4, number])
         self._log = RowLog(self._world, wiring, rng, reference)

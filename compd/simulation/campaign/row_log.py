@@ -27,9 +27,13 @@ UM = 1e-3
 
 @dataclass
 class LoggedRows:
-    """Values by column of a recording. indicated_mm, reference_mm : (3,) per row, tip by the gauges and true."""
+    """Values by column of a recording. quantities_at_zero : by column, when the log began.
+
+    indicated_mm, reference_mm : (3,) per row, tip by the gauges and true.
+    """
 
     columns: dict[str, list[float]] = field(default_factory=dict)
+    quantities_at_zero: dict[str, float] = field(default_factory=dict)
     indicated_mm: list[FloatArray] = field(default_factory=list)
     reference_mm: list[FloatArray] = field(default_factory=list)
 
@@ -44,7 +48,7 @@ class LoggedRows:
 
 
 class RowLog:
-    """Reads gauges and reference of a world that the campaign moves."""
+    """Reads gauges and reference of a world that the campaign moves. It begins while the world is at machine zero."""
 
     def __init__(
         self,
@@ -62,7 +66,8 @@ class RowLog:
         self._world, self._rng = world, rng
         self._reference = reference
         self._indicated = IndicatedTip(world.mechanism, wiring) if reference.sigma_um == 0 else None
-        self.rows = LoggedRows()
+        # machine zero averages for a second, which leaves next to nothing of a thermometer's noise
+        self.rows = LoggedRows(quantities_at_zero=world.quantities())
 
     def add(self, session: int, visit: int, point: int | None, direction: FloatArray, measured: bool = True) -> None:
         """Add a row. direction : (n,) of each link's last motion. measured : whether the reference measures, too."""

@@ -17,6 +17,7 @@ from compd.simulation.campaign.simulated_recording import FIXED, simulate_record
 from compd.simulation.causes.hidden_cause import draw_hidden, parse_hidden, write_answer
 from compd.simulation.truth.instruments import Kind
 from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,7 @@ def simulate_campaign(
     reference: Kind = "tracker",
     other_days: int = 0,
     plan: str | Path | None = None,
+    zero_degC: float = STANDARD_AIR.temperature_degC,
     overwrite: bool = False,
 ) -> CampaignFiles:
     """Simulate a measuring campaign on a machine that does not exist, and write it as a recording.
@@ -87,6 +89,8 @@ def simulate_campaign(
         Number of another campaign on the same machine, with other points, weather and loads; 0 is the first one.
     plan : str or Path, optional
         Measure these rows, as `MeasurementPlan.write` writes them, and nothing else.
+    zero_degC : float
+        Temperature of machine and room when machine zero is taken.
     overwrite : bool
         Whether existing files are replaced.
 
@@ -128,7 +132,9 @@ def simulate_campaign(
     if hidden is not None:
         causes.append(draw_hidden(hidden, mechanism))
     plate = path.with_name(f"{path.stem}.plate.csv")
-    recorded = simulate_recording(configuration, seed, causes, reference, plate.name, other_days, planned)
+    recorded = simulate_recording(
+        configuration, seed, causes, reference, plate.name, other_days, planned, AirAtZero(zero_degC)
+    )
     write_recording(path, recorded.columns, recorded.sidecar, overwrite)
     if recorded.balls_M is not None:
         write_plate(plate, recorded.balls_M)

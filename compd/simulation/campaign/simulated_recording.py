@@ -29,6 +29,7 @@ from compd.simulation.truth.instruments import INSTRUMENTS, TRACKER_SIGMA_UM, Ki
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.strengths import FULLY_MEASURED
+from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
 
 OUTLIER_SHARE = 0.01
 QUANTITY: Mapping[Kind, str] = {
@@ -74,15 +75,16 @@ def simulate_recording(
     plate_file: str = "",
     other_days: int = 0,
     planned_rows: Sequence[PlannedRow] = (),
+    air_at_zero: AirAtZero = STANDARD_AIR,
 ) -> SimulatedRecording:
     """Run one campaign.
 
     seed : of machine, parts and noise. other_days : number of another campaign on the same machine.
     plate_file : name of the ball plate's file, for the sidecar. planned_rows : measure these rows instead of a drawn
-    plan; not with a ball plate, whose balls have fixed places.
+    plan; not with a ball plate, whose balls have fixed places. air_at_zero : when machine zero is taken.
     """
     geometry, wiring = configuration.geometry, configuration.wiring
-    sizer = CauseSizer(geometry, wiring, seed, max(INSTRUMENTS[reference].sigma_um, TRACKER_SIGMA_UM))
+    sizer = CauseSizer(geometry, wiring, seed, max(INSTRUMENTS[reference].sigma_um, TRACKER_SIGMA_UM), air_at_zero)
     sized = tuple(sizer.size(cause) for cause in hidden)
     weak = sizer.weak_disturbances([cause.id for cause in hidden])
     causes = [*(cause.cause for cause in sized), *weak]
@@ -90,9 +92,11 @@ def simulate_recording(
     campaign: Campaign | PlannedCampaign
     balls_M = None
     if planned_rows:
-        campaign = PlannedCampaign(geometry, wiring, planned_rows, seed, other_days, FULLY_MEASURED, causes, instrument)
+        campaign = PlannedCampaign(
+            geometry, wiring, planned_rows, seed, other_days, FULLY_MEASURED, causes, instrument, air_at_zero
+        )
     else:
-        balls_M, places, days = _days(sizer.mechanism, reference, seed, other_days)
+        balls_M, places, days = _days(sizer.mechanism, reference, seed, other_days, air_at_zero)
         campaign = Campaign(
             geometry, wiring, days, seed, FULLY_MEASURED, causes, reference=instrument, balls_M=balls_M, places=places
         )
@@ -105,12 +109,13 @@ def simulate_recording(
         reference_block |= {"radius_mm": TOUCHED_RADIUS_MM + PROBE_RADIUS_MM, "absolute": True}
     if balls_M is not None:
         reference_block["balls"] = plate_file
-    sidecar = sidecar_contents(configuration.machine, reference_block)
-    return SimulatedRecording(campaign.run().columns, sidecar, balls_M, sized, tuple(weak))
+    logged = campaign.run()
+    sidecar = sidecar_contents(configuration.machine, reference_block, quantities_at_zero=logged.quantities_at_zero)
+    return SimulatedRecording(logged.columns, sidecar, balls_M, sized, tuple(weak))
 
 
 def _days(
-    mechanism: Mechanism, reference: Kind, seed: int, number: int
+    mechanism: Mechanism, reference: Kind, seed: int, number: int, air: AirAtZero
 ) -> tuple[FloatArray | None, FixedPlaces | None, CampaignPlan]:
     """Balls of a plate (17, 3) or None, fixed balls or pins or None, and the plan.
 
@@ -118,11 +123,15 @@ def _days(
     """
     if reference in FIXED:
         places = FIXED[reference](mechanism, np.random.default_rng([seed, 5, number]))
-        return None, places, draw_campaign_plan(mechanism, seed, number, points_mm=places.scale_mm, passes=0)
+        return (
+            None,
+            places,
+            draw_campaign_plan(mechanism, seed, number, points_mm=places.scale_mm, passes=0, air_at_zero=air),
+        )
     if reference != "ball_plate":
-        return None, None, draw_campaign_plan(mechanism, seed, number)
+        return None, None, draw_campaign_plan(mechanism, seed, number, air_at_zero=air)
     balls_M = ball_plate_mm(mechanism.tip0_M)
     turn_rad = np.zeros(3)
     postures = [mechanism.posture_at(ball_M, turn_rad) for ball_M in balls_M]
     points_mm = np.array([mechanism.lengths(posture) - mechanism.lengths0_mm for posture in postures])
-    return balls_M, None, draw_campaign_plan(mechanism, seed, number, points_mm=points_mm, passes=0)
+    return balls_M, None, draw_campaign_plan(mechanism, seed, number, points_mm=points_mm, passes=0, air_at_zero=air)

@@ -14,6 +14,7 @@ from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
+from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
 
 # One of so many visits and passes is run to measure the size of the error.
 KEEP_ONE_IN = 6
@@ -28,10 +29,17 @@ WEAK_CAUSES = 2
 class CauseSizer:
     """Sizes causes on the machine of `seed`."""
 
-    def __init__(self, geometry: Geometry, wiring: Wiring, seed: int, floor_um: float = TRACKER_SIGMA_UM) -> None:
+    def __init__(
+        self,
+        geometry: Geometry,
+        wiring: Wiring,
+        seed: int,
+        floor_um: float = TRACKER_SIGMA_UM,
+        air_at_zero: AirAtZero = STANDARD_AIR,
+    ) -> None:
         self._geometry, self._wiring, self._seed, self._floor_um = geometry, wiring, seed, floor_um
         self.mechanism = Mechanism(geometry)
-        self.plan: CampaignPlan = draw_campaign_plan(self.mechanism, seed)
+        self.plan: CampaignPlan = draw_campaign_plan(self.mechanism, seed, air_at_zero=air_at_zero)
         self._short = self.plan.thinned(KEEP_ONE_IN)
 
     def error_in_floors(self, cause: Cause) -> float:

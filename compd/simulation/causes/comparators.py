@@ -34,7 +34,7 @@ class JointComparatorGain(Cause):
 
 
 class JointComparatorDrift(Cause):
-    """Thermal growth of the comparators' holders: reading = true + d (T_holder - 20 degC).
+    """Thermal growth of the comparators' holders: reading = true + d (T_holder - its value at machine zero).
 
     T_holder follows the platform's temperature with a time constant of 120 s. Strength: d.
     """
@@ -49,7 +49,7 @@ class JointComparatorDrift(Cause):
         self._holder_K = 0.0
 
     def pass_time(self, interval: Interval, warm: WarmUp) -> None:
-        platform_K = warm.over_reference_K("platform")
+        platform_K = warm.since_zero_K("platform")
         self._holder_K = platform_K + (self._holder_K - platform_K) * float(np.exp(-interval.weather_s / HOLDER_TAU_S))
 
     def joint_reading_mm(self, joint_mm: FloatArray) -> FloatArray:
@@ -69,7 +69,7 @@ class FrameComparatorGain(Cause):
 
 
 class FrameRodExpansion(Cause):
-    """Thermal expansion of the frame comparators' rods: reading = true - alpha L (T_rod - 20 degC).
+    """Thermal expansion of the frame comparators' rods: reading = true - alpha L (T_rod - its value at machine zero).
 
     T_rod is the frame's mean temperature plus a quarter of what the columns at the rod's ends depart from it.
     Strength: alpha (Super-Invar 0.5, Invar 1.5, steel 11 ppm/K).

@@ -78,9 +78,9 @@ class JointRunout(Cause):
 
 
 class PlatformExpansion(Cause):
-    """Thermal expansion of the platform: joint centre c_i moves by alpha c_i (T_arm,i - 20 degC), in {P}.
+    """Thermal expansion of the platform: joint centre c_i moves by alpha c_i dT_arm,i, in {P}, dT since machine zero.
 
-    T_arm,i is the platform's temperature plus 7.5 % of what the end of link i departs from it. Strength: alpha.
+    dT_arm,i is the platform's plus 7.5 % of what the end of link i departs from it. Strength: alpha.
     """
 
     id = "platform_expansion"
@@ -88,7 +88,7 @@ class PlatformExpansion(Cause):
     max_strength = 25.0
 
     def platform_shift_P(self, inputs: CauseInputs) -> FloatArray:
-        hub_K = inputs.warm.over_reference_K("platform")
+        hub_K = inputs.warm.since_zero_K("platform")
         arms_K = hub_K + FROM_LINK_SHARE / 2 * (inputs.warm.link_pieces_K[:, -1] - hub_K)
         return np.asarray(self.strength * PPM * self.mechanism.joints_P * arms_K[:, None])
 

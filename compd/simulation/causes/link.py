@@ -21,7 +21,8 @@ BISECTIONS = 60
 
 
 class LinkExpansion(Cause):
-    """Thermal expansion of rods and scale carrier: extension_i = alpha L_i mean over the link's pieces (T - 20 degC).
+    """Thermal expansion of rods and scale carrier: extension_i = alpha L_i mean over the link's pieces (dT),
+    dT since machine zero.
 
     Strength: alpha (steel 11, aluminium 23 ppm/K).
     """
@@ -37,7 +38,8 @@ class LinkExpansion(Cause):
 class LinkExpansionLag(Cause):
     """Thermal expansion of rods that hang free in the tube and follow its temperature late, by radiation and air.
 
-    tau dT_rod/dt = T_tube - T_rod for each piece; extension_i = alpha L_i mean(0.9 T_rod + 0.1 T_tube), over 20 degC.
+    tau dT_rod/dt = T_tube - T_rod for each piece; extension_i = alpha L_i mean(0.9 T_rod + 0.1 T_tube), both
+    since machine zero.
     Strength: alpha. The lag tau is drawn between 240 and 1500 s.
     """
 

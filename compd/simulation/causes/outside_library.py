@@ -7,7 +7,6 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.simulation.truth.cause import UM, Cause, CauseInputs, unit_rms_scatter
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.weather import MIDDLE_HUMIDITY_pct, STANDARD_PRESSURE_hPa
 
 # A cable comes taut at this distance from machine zero; its drag is stated this much farther out.
 TAUT_AT_MM = 10.0
@@ -15,7 +14,7 @@ STATED_AFTER_MM = 100.0
 
 
 class HumiditySwelling(Cause):
-    """Swelling of carbon fibre links in humid air: extension_i = s (h - 50 %) L_i / L0_i. Strength: s."""
+    """Swelling of carbon fibre links in humid air: extension_i = s (h - h0) L_i / L0_i. Strength: s."""
 
     id = "humidity_swelling"
     unit = "um/pct"
@@ -24,14 +23,14 @@ class HumiditySwelling(Cause):
     covariates = ("humidity_pct",)
 
     def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
-        over_middle_pct = inputs.humidity_pct - MIDDLE_HUMIDITY_pct
-        return np.asarray(self.strength * UM * over_middle_pct * inputs.link_mm / self.mechanism.lengths0_mm)
+        since_zero_pct = inputs.humidity_pct - inputs.air0.humidity_pct
+        return np.asarray(self.strength * UM * since_zero_pct * inputs.link_mm / self.mechanism.lengths0_mm)
 
 
 class PlateSwelling(Cause):
     """Swelling of the granite's top face in humid air bows the plate upwards: the tip stands lower over its middle.
 
-    shift_z = -s (h - 50 %) (1 - r^2 / R^2), r the tip's and R the plate points' distance from the middle.
+    shift_z = -s (h - h0) (1 - r^2 / R^2), r the tip's and R the plate points' distance from the middle.
     Strength: s, the rise of the middle.
     """
 
@@ -44,11 +43,11 @@ class PlateSwelling(Cause):
     def reference_shift(self, inputs: CauseInputs) -> FloatArray:
         plate = self.mechanism.plate0_M - self.mechanism.plate0_M.mean(axis=0)
         share = 1 - (inputs.tip_M[:2] ** 2).sum() / (plate[:, :2] ** 2).sum(axis=1).mean()
-        return np.array([0.0, 0.0, -self.strength * UM * (inputs.humidity_pct - MIDDLE_HUMIDITY_pct) * share])
+        return np.array([0.0, 0.0, -self.strength * UM * (inputs.humidity_pct - inputs.air0.humidity_pct) * share])
 
 
 class AirPressure(Cause):
-    """Sealed bellows around the links act as pistons: extension_i = -s (p - 1013.25 hPa). Strength: s."""
+    """Sealed bellows around the links act as pistons: extension_i = -s (p - p0). Strength: s."""
 
     id = "air_pressure"
     unit = "um/hPa"
@@ -57,7 +56,7 @@ class AirPressure(Cause):
     covariates = ("pressure_hPa",)
 
     def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
-        extension_mm = -self.strength * UM * (inputs.pressure_hPa - STANDARD_PRESSURE_hPa)
+        extension_mm = -self.strength * UM * (inputs.pressure_hPa - inputs.air0.pressure_hPa)
         return np.full(self.mechanism.links, extension_mm)
 
 

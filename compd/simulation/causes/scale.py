@@ -10,6 +10,7 @@ from compd.arrays import FloatArray
 from compd.simulation.truth.cause import PPM, UM, Cause, CauseInputs, Interval, uniform_scatter, unit_rms_scatter
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.warm_up import LINK_PIECES, WarmUp
+from compd.simulation.truth.weather import REFERENCE_degC
 
 MS = 1e-3
 # Signal period of the usual exposed scale, where the drawing states none.
@@ -40,6 +41,8 @@ class ScaleGain(Cause):
 class ScaleExpansion(Cause):
     """Thermal expansion of the scale tape, which follows the tube that it is glued to; pinned in the tube's middle.
 
+    The graduation was ruled at 20 degC.
+
     extension_i = alpha s_i (T_i - 20 degC), T_i the mean of the tube's temperatures at its middle and at the reading
     head. Strength: alpha (steel 11, glass 8, aluminium 23 ppm/K).
     """
@@ -49,7 +52,7 @@ class ScaleExpansion(Cause):
     max_strength = 23.0
 
     def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
-        pieces_K = inputs.warm.link_pieces_K
+        pieces_K = inputs.warm.link_pieces_K + (inputs.warm.zero_degC - REFERENCE_degC)
         middle = LINK_PIECES // 2
         head = middle + np.clip(inputs.scale_mm / inputs.link_mm * LINK_PIECES, -middle, middle)
         places = np.arange(LINK_PIECES)

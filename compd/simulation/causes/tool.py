@@ -15,7 +15,7 @@ AXIAL_SHARE = 0.9
 
 
 class ToolExpansion(Cause):
-    """Thermal expansion of the tool: the tip's place r grows by alpha r (T - 20 degC).
+    """Thermal expansion of the tool: the tip's place r grows by alpha r (T - its value at machine zero).
 
     T is the tool's temperature with 15 % of the platform's. Strength: alpha (tungsten carbide 5, steel 11 ppm/K).
     """
@@ -25,7 +25,7 @@ class ToolExpansion(Cause):
     max_strength = 25.0
 
     def tool_shift(self, inputs: CauseInputs) -> FloatArray:
-        tool_K, clamp_K = (inputs.warm.over_reference_K(body) for body in ("tool", "platform"))
+        tool_K, clamp_K = (inputs.warm.since_zero_K(body) for body in ("tool", "platform"))
         mean_K = tool_K + FROM_PLATFORM_SHARE * (clamp_K - tool_K)
         tip = self.mechanism.tip0_P if self.mechanism.tip_frame == "M" else self.mechanism.tip0_M
         return np.asarray(self.strength * PPM * tip * mean_K)

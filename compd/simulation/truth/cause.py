@@ -15,6 +15,7 @@ from compd.arrays import FloatArray
 from compd.simulation.truth.closure import Posture
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.warm_up import WarmUp
+from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
 
 PPM = 1e-6
 UM = 1e-3
@@ -32,7 +33,7 @@ class CauseInputs:
     axial_N, axial0_N : (n,) link forces including the platform's weight, now and at machine zero; tension positive.
     force_M_N : (3,) external load on the tip. tip_M : (3,) tip, mm. posture : (4, 3) of the platform.
     warm : temperatures of all bodies. time_s : seconds since switch-on, in weather time.
-    pressure_hPa, humidity_pct : of the air.
+    pressure_hPa, humidity_pct : of the air. air0 : the air at machine zero.
     """
 
     scale_mm: FloatArray
@@ -47,6 +48,7 @@ class CauseInputs:
     time_s: float
     pressure_hPa: float
     humidity_pct: float
+    air0: AirAtZero = STANDARD_AIR
 
 
 @dataclass(frozen=True)

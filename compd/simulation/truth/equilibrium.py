@@ -77,8 +77,8 @@ class Equilibrium:
         Raises KinematicsError where the links cannot meet.
         """
         strengths, warm, machine, causes = self._strengths, self._warm, self._mechanism, self._causes
-        stretch = strengths.support_expansion_ppm_per_K * PPM * warm.over_reference_K("base")
-        platform = strengths.platform_expansion_ppm_per_K * PPM * warm.over_reference_K("platform")
+        stretch = strengths.support_expansion_ppm_per_K * PPM * warm.since_zero_K("base")
+        platform = strengths.platform_expansion_ppm_per_K * PPM * warm.since_zero_K("platform")
         joints_P = machine.joints_P * (1 + platform)
         # rods between the balls and the scale (paper, figure 5) are part of the link
         rods_mm = strengths.scale_rod_expansion_ppm_per_K * PPM * warm.links_K * machine.lengths0_mm
@@ -109,6 +109,7 @@ class Equilibrium:
             warm.time_s,
             self._weather.pressure_hPa(warm.time_s),
             self._weather.humidity_pct(warm.time_s),
+            self._weather.at_zero,
         )
         link_mm = (
             lengths_mm
@@ -145,7 +146,7 @@ class Equilibrium:
     def _tip(self, posture: Posture, displaced: FloatArray | float = 0.0) -> tuple[FloatArray, FloatArray]:
         """The tip in {M} and in {P}, (3,) each; `displaced`: of the tip against what carries the tool."""
         machine = self._mechanism
-        tool = 1 + self._strengths.tool_expansion_ppm_per_K * PPM * self._warm.over_reference_K("tool")
+        tool = 1 + self._strengths.tool_expansion_ppm_per_K * PPM * self._warm.since_zero_K("tool")
         if machine.tip_frame == "M":
             tip_P = machine.tip0_P * tool + displaced
             return homogeneous(tip_P) @ posture, tip_P

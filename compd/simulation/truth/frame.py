@@ -56,12 +56,12 @@ class Frame:
 
     def comparators_mm(self, supports_M: FloatArray, plate_M: FloatArray, warm: WarmUp) -> FloatArray:
         """(9,) change of each distance since machine zero, less the rod's own expansion."""
-        rods = self._strengths.frame_rod_expansion_ppm_per_K * PPM * warm.over_reference_K("rods")
+        rods = self._strengths.frame_rod_expansion_ppm_per_K * PPM * warm.since_zero_K("rods")
         return np.asarray(distances_mm(supports_M, plate_M) - self._distances0_mm * (1 + rods))
 
     def _growth(self, warm: WarmUp) -> FloatArray:
         """(3, 3) mm: expansion of the ring about its middle and of the columns upwards."""
-        ring = self._strengths.ring_expansion_ppm_per_K * PPM * warm.over_reference_K("base")
+        ring = self._strengths.ring_expansion_ppm_per_K * PPM * warm.since_zero_K("base")
         column = self._strengths.column_expansion_ppm_per_K * PPM * warm.columns_K.mean(axis=(1, 2))
         growth_M: FloatArray = ring * self._arms_M
         growth_M[:, 2] += column * self._heights_mm

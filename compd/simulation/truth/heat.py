@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from compd.simulation.truth.weather import REFERENCE_degC
-
 Floats = NDArray[np.float64]
 
 # Time constant of a body that heaters or a water jacket hold at a temperature.
@@ -26,8 +24,9 @@ class HeatNetwork:
         capacity_J_per_K: Mapping[str, float],
         to_room_W_per_K: Mapping[str, float],
         between_W_per_K: Sequence[tuple[str, str, float]],
+        start_degC: float,
     ) -> None:
-        """capacity, to_room : by body. between : pairs of bodies with their conductance."""
+        """capacity, to_room : by body. between : pairs of bodies with their conductance. start : of all bodies."""
         self.index = {name: i for i, name in enumerate(capacity_J_per_K)}
         self._capacity = np.array(list(capacity_J_per_K.values()))
         self._to_room = np.array([to_room_W_per_K.get(name, 0.0) for name in capacity_J_per_K])
@@ -37,7 +36,7 @@ class HeatNetwork:
             conductance[[i, j], [i, j]] += watts
             conductance[[i, j], [j, i]] -= watts
         self._conductance = conductance
-        self.temperature_degC: Floats = np.full(len(self._capacity), REFERENCE_degC)
+        self.temperature_degC: Floats = np.full(len(self._capacity), start_degC)
         self.hold({})
 
     def hold(self, temperature_degC: Mapping[str, float]) -> None:

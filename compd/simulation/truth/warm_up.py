@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.simulation.truth.heat import HeatNetwork
-from compd.simulation.truth.weather import REFERENCE_degC, Weather
+from compd.simulation.truth.weather import Weather
 
 Floats = NDArray[np.float64]
 
@@ -68,10 +68,11 @@ LONGEST_STEP_S = 20.0
 
 
 class WarmUp:
-    """Temperatures of every body after switch-on; 20 degC everywhere at time 0."""
+    """Temperatures of every body after switch-on; at time 0, when machine zero is taken, all are as the room is."""
 
     def __init__(self, links: int, weather: Weather, heat_share: float) -> None:
         self._weather = weather
+        self.zero_degC = weather.at_zero.temperature_degC
         self.time_s = 0.0
         self._links = [[f"link_{i + 1}_{k}" for k in range(LINK_PIECES)] for i in range(links)]
         self._columns = [
@@ -112,29 +113,29 @@ class WarmUp:
     def room_degC(self) -> float:
         return self._weather.room_degC(self.time_s)
 
-    def over_reference_K(self, body: str) -> float:
-        """Mean temperature of base, platform, tool or rods over 20 degC."""
-        return float(self._network.temperature_degC[self._network.index[body]]) - REFERENCE_degC
+    def since_zero_K(self, body: str) -> float:
+        """Mean temperature of base, platform, tool or rods since machine zero."""
+        return float(self._network.temperature_degC[self._network.index[body]]) - self.zero_degC
 
     @property
     def links_K(self) -> Floats:
-        """(n,) mean of each link over 20 degC."""
-        return np.asarray(self._network.temperature_degC[self._at_link].mean(axis=1) - REFERENCE_degC)
+        """(n,) mean of each link since machine zero."""
+        return np.asarray(self._network.temperature_degC[self._at_link].mean(axis=1) - self.zero_degC)
 
     @property
     def link_pieces_K(self) -> Floats:
-        """(n, pieces) over 20 degC, from the base end on."""
-        return np.asarray(self._network.temperature_degC[self._at_link] - REFERENCE_degC)
+        """(n, pieces) since machine zero, from the base end on."""
+        return np.asarray(self._network.temperature_degC[self._at_link] - self.zero_degC)
 
     @property
     def columns_K(self) -> Floats:
-        """(3, 2, storeys) over 20 degC: column, inner and outer face, from the foot up."""
-        return np.asarray(self._network.temperature_degC[self._at_column] - REFERENCE_degC)
+        """(3, 2, storeys) since machine zero: column, inner and outer face, from the foot up."""
+        return np.asarray(self._network.temperature_degC[self._at_column] - self.zero_degC)
 
     @property
     def plate_K(self) -> Floats:
-        """(layers,) over 20 degC, from the top down."""
-        return np.asarray(self._network.temperature_degC[self._at_plate] - REFERENCE_degC)
+        """(layers,) since machine zero, from the top down."""
+        return np.asarray(self._network.temperature_degC[self._at_plate] - self.zero_degC)
 
     def thermometers_degC(self) -> dict[str, float]:
         """Reading of a thermometer at each place, without noise, as `temperature_<place>_degC`.
@@ -145,7 +146,7 @@ class WarmUp:
             "room": self.room_degC,
             **{f"link_{i + 1}": self._at(pieces[LINK_PIECES // 2]) for i, pieces in enumerate(self._links)},
             **{body: self._at(body) for body in ("base", "platform", "tool")},
-            "frame": REFERENCE_degC + float(self.columns_K.mean()),
+            "frame": self.zero_degC + float(self.columns_K.mean()),
             "plate_top": self._at(self._plate[0]),
             "plate_bottom": self._at(self._plate[-1]),
         }
@@ -192,4 +193,4 @@ class WarmUp:
         capacity |= dict.fromkeys(self._plate, 297000.0 / PLATE_LAYERS)
         to_room |= {self._plate[0]: 5.0, self._plate[-1]: 2.0}
         between += [(a, b, 45.0) for a, b in itertools.pairwise(self._plate)]
-        return HeatNetwork(capacity, to_room, between)
+        return HeatNetwork(capacity, to_room, between, self.zero_degC)

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
-REFERENCE_degC = 20.0  # ISO 1
+# ISO 1: a graduation, and the tables of an interferometer, are true at this temperature.
+REFERENCE_degC = 20.0
 STANDARD_PRESSURE_hPa = 1013.25  # ISO 2533, sea level
 MIDDLE_HUMIDITY_pct = 50.0
+
+
+class AirAtZero(NamedTuple):
+    """The air when machine zero is taken, at time 0; machine and parts have its temperature then."""
+
+    temperature_degC: float = 20.0
+    pressure_hPa: float = STANDARD_PRESSURE_hPa
+    humidity_pct: float = MIDDLE_HUMIDITY_pct
+
+
+STANDARD_AIR = AirAtZero()
 
 # Period in s and share of the daily swing: the day, a shift, the air conditioning's own cycle.
 _TEMPERATURE_WAVES = ((86400.0, 1.0), (9000.0, 0.35), (1300.0, 0.12))
@@ -24,36 +37,38 @@ KNOTS_PER_SESSION = 4
 
 
 class Weather:
-    """An air-conditioned laboratory: sums of slow waves with seeded phases; reference conditions at time 0.
+    """An air-conditioned laboratory: sums of slow waves with seeded phases.
 
+    at_zero : at time 0.
     held : quantities that a climate chamber holds, by name with unit; they replace the waves.
     """
 
-    def __init__(self, swing_K: float, rng: np.random.Generator) -> None:
+    def __init__(self, swing_K: float, rng: np.random.Generator, at_zero: AirAtZero = STANDARD_AIR) -> None:
         """swing_K : amplitude of the daily wave of the room's temperature."""
+        self.at_zero = at_zero
         self.held: Mapping[str, float] = {}
         self._temperature = _phased([(period, share * swing_K) for period, share in _TEMPERATURE_WAVES], rng)
         self._pressure = _phased(_PRESSURE_WAVES_hPa, rng)
         self._humidity = _phased(_HUMIDITY_WAVES_pct, rng)
 
     def room_degC(self, time_s: float) -> float:
-        return self.held.get("temperature_room_degC", REFERENCE_degC + self._room_K(time_s))
+        return self.held.get("temperature_room_degC", self.at_zero.temperature_degC + self._room_K(time_s))
 
     def pressure_hPa(self, time_s: float) -> float:
-        return self.held.get("pressure_hPa", STANDARD_PRESSURE_hPa + self._over_standard_hPa(time_s))
+        return self.held.get("pressure_hPa", self.at_zero.pressure_hPa + self._over_zero_hPa(time_s))
 
     def humidity_pct(self, time_s: float) -> float:
-        return self.held.get("humidity_pct", MIDDLE_HUMIDITY_pct + self._over_middle_pct(time_s))
+        return self.held.get("humidity_pct", self.at_zero.humidity_pct + self._over_zero_pct(time_s))
 
-    # --- departures from reference conditions ---------------------------------------------------------
+    # --- departures from time 0 -----------------------------------------------------------------------
 
     def _room_K(self, time_s: float) -> float:
         return _waves(self._temperature, time_s)
 
-    def _over_standard_hPa(self, time_s: float) -> float:
+    def _over_zero_hPa(self, time_s: float) -> float:
         return _waves(self._pressure, time_s)
 
-    def _over_middle_pct(self, time_s: float) -> float:
+    def _over_zero_pct(self, time_s: float) -> float:
         return _waves(self._humidity, time_s)
 
 
@@ -71,12 +86,14 @@ def _waves(waves: _Waves, time_s: float) -> float:
 class WorkshopWeather(Weather):
     """A workshop over days: room, pressure and humidity interpolated linearly between random values.
 
-    Each session has a level of its own with random departures around it. Reference conditions at time 0.
+    Each session has a level of its own with random departures around it.
     """
 
-    def __init__(self, starts_s: list[float], session_s: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self, starts_s: list[float], session_s: float, rng: np.random.Generator, at_zero: AirAtZero = STANDARD_AIR
+    ) -> None:
         """starts_s : start of each session; between sessions the room changes to the next one's level."""
-        super().__init__(0.0, rng)
+        super().__init__(0.0, rng, at_zero)
         knots: list[tuple[float, float, float, float]] = [(0.0, 0.0, 0.0, 0.0)]
         for number, start_s in enumerate(starts_s):
             level = rng.uniform(-1.0, 1.0, 3) * ROOM_LEVEL if number else np.zeros(3)
@@ -90,10 +107,10 @@ class WorkshopWeather(Weather):
     def _room_K(self, time_s: float) -> float:
         return self._at(1, time_s)
 
-    def _over_standard_hPa(self, time_s: float) -> float:
+    def _over_zero_hPa(self, time_s: float) -> float:
         return self._at(2, time_s)
 
-    def _over_middle_pct(self, time_s: float) -> float:
+    def _over_zero_pct(self, time_s: float) -> float:
         return self._at(3, time_s)
 
     def _at(self, row: int, time_s: float) -> float:

@@ -25,7 +25,7 @@ from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.sensors import Sensors
 from compd.simulation.truth.strengths import Strengths
 from compd.simulation.truth.warm_up import Heat, WarmUp
-from compd.simulation.truth.weather import Weather
+from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero, Weather
 from compd.simulation.truth.workspace import STROKE_SHARE, draw_points_mm
 
 # What a real part's thermometer shows at most, K/s: 94 W in each kilogram of steel. One that a water jacket holds 20 K
@@ -54,13 +54,14 @@ class World:
         causes: Sequence[Cause] = (),
         weather: Weather | None = None,
         rows: Sequence[PlannedRow] = (),
+        air_at_zero: AirAtZero = STANDARD_AIR,
     ) -> None:
         """seed : of joints, weather, tour and gauge noise. speedup : factor by which weather and warm-up run faster
         than the machine moves.
 
         zero_hold_s : time at machine zero before switch-on; a command, `start_tour` or `start_plan` ends it as well.
         causes : in addition to those in `strengths`. weather : default an air-conditioned laboratory.
-        rows : measured instead of the tour.
+        rows : measured instead of the tour. air_at_zero : of the default weather.
         """
         self._strengths = strengths or Strengths()
         weather_rng, joint_rng, self._tour_rng, sensor_rng = (
@@ -70,7 +71,7 @@ class World:
         self.zero_hold_s = zero_hold_s
         self._mechanism = Mechanism(geometry)
         self._causes = tuple(causes)
-        self._weather = weather or Weather(self._strengths.room_swing_K, weather_rng)
+        self._weather = weather or Weather(self._strengths.room_swing_K, weather_rng, air_at_zero)
         self._warm = WarmUp(self._mechanism.links, self._weather, self._strengths.heat_share)
         self._frame = Frame(self._mechanism, self._strengths)
         self._joints = Joints(self._mechanism, self._strengths, joint_rng)
@@ -302,6 +303,10 @@ class World:
         except KinematicsError:
             return self._state
 
+    def quantities(self) -> dict[str, float]:
+        """What thermometers, barometer, hygrometer and load cell show without noise, by name."""
+        return {**self._warm.thermometers_degC(), **self._air_and_load()}
+
     @property
     def names(self) -> list[str]:
         """Names of everything that can be sensed."""
@@ -339,8 +344,13 @@ class World:
             frame_mm = cause.frame_reading_mm(frame_mm, warm)
         return {
             **self._sensors.read(scale_mm, joint_mm, frame_mm, warm.thermometers_degC()),
-            "pressure_hPa": self._weather.pressure_hPa(warm.time_s),
-            "humidity_pct": self._weather.humidity_pct(warm.time_s),
+            **self._air_and_load(),
+        }
+
+    def _air_and_load(self) -> dict[str, float]:
+        return {
+            "pressure_hPa": self._weather.pressure_hPa(self._warm.time_s),
+            "humidity_pct": self._weather.humidity_pct(self._warm.time_s),
             **{f"force_{axis}_N": float(force) for axis, force in zip("xyz", self.force_M_N, strict=True)},
         }
 

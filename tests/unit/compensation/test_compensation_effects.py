@@ -44,8 +44,7 @@ def possible(model: MachineModel) -> list[Effect]:
 
 
 def values_of(arguments: dict[str, Any]) -> GaugeValues:
-    parts = {name: arguments[name] for name in ("scale_mm", "joint_mm", "frame_mm", "quantities", "time_s")}
-    return GaugeValues(**parts)
+    return GaugeValues(**{name: arguments[name] for name in GaugeValues._fields})
 
 
 def row(values: GaugeValues, i: int) -> GaugeValues:
@@ -56,6 +55,7 @@ def row(values: GaugeValues, i: int) -> GaugeValues:
         values.frame_mm[i],
         {name: value[i] for name, value in values.quantities.items()},
         np.asarray(values.time_s)[i],
+        values.quantities_at_zero,
     )
 
 

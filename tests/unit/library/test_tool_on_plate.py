@@ -85,7 +85,12 @@ def readings(scale_mm: Floats) -> GaugeValues:
     loaded = {f"force_{axis}_N": force for axis, force in zip("xyz", LOAD_N, strict=True)}
     quantities = all_quantities(3, 1, {**loaded, "temperature_tool_degC": 20.0 + WARM_K})
     return GaugeValues(
-        scale_mm, np.zeros(9), np.zeros(9), {name: values[0] for name, values in quantities.items()}, time_s=0.0
+        scale_mm,
+        np.zeros(9),
+        np.zeros(9),
+        {name: values[0] for name, values in quantities.items()},
+        time_s=0.0,
+        quantities_at_zero={name: float(values[0]) for name, values in all_quantities(3, 1, {}).items()},
     )
 
 

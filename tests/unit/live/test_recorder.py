@@ -66,7 +66,8 @@ def test_zero_plus_column_is_the_raw_reading_whatever_the_sign(tmp_path):
             change_mm = float(row[column]) / (1000 if column.endswith("_um") else 1)
             raw_mm = zero["zero_mm"] + zero["sign"] * change_mm
             assert raw_mm == pytest.approx(message["readings"][zero["channel"]]["value"], abs=A_PICOMETRE_MM)
-        assert row["temperature_room_degC"] == "20.0", "a quantity has no zero"
+        assert row["temperature_room_degC"] == "20.0", "a quantity is recorded as it is read"
+    assert sidecar["quantities_at_zero"]["temperature_link_1_degC"] == 20.0, "and effects count from these"
 
 
 def test_it_is_the_raw_reading_not_the_corrected_one(tmp_path):

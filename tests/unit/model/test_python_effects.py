@@ -52,6 +52,7 @@ def snapshots(model: MachineModel) -> list[GaugeValues]:
             arguments["frame_mm"][i],
             {name: values[i] for name, values in arguments["quantities"].items()},
             arguments["time_s"][i],
+            arguments["quantities_at_zero"],
         )
         for i in range(ROWS)
     ]

@@ -49,19 +49,21 @@ def after_moving(model: MachineModel) -> tuple[GaugeValues, EffectMemory]:
     scale_mm, joint_mm, frame_mm = rng.normal(0, 1, model.links), rng.normal(0, 0.01, joints), rng.normal(0, 0.01, 9)
     warm = WarmStart.at_zero(model)
     for step in range(3):
-        values = GaugeValues(scale_mm + 0.01 * step, joint_mm, frame_mm, quantities, 5.0 + 0.01 * step)
+        at_zero = dict.fromkeys(quantities, 22.0)
+        values = GaugeValues(scale_mm + 0.01 * step, joint_mm, frame_mm, quantities, 5.0 + 0.01 * step, at_zero)
         _, warm = compensate_cmm(model, values, warm)
     return values, warm.effects
 
 
 def derivatives(model: MachineModel, values: GaugeValues, effects: EffectMemory) -> TipDerivatives:
-    scale_mm, joint_mm, frame_mm, quantities, time_s = values
+    scale_mm, joint_mm, frame_mm, quantities, time_s, at_zero = values
     return tip_derivatives(
         model,
         scale_mm=scale_mm,
         joint_mm=joint_mm,
         frame_mm=frame_mm,
         quantities=quantities,
+        quantities_at_zero=at_zero,
         sigmas=dict.fromkeys(quantities, SIGMA),
         time_s=float(time_s),
         effects=effects,
@@ -81,6 +83,7 @@ def as_row(model: MachineModel, values: GaugeValues, effects: EffectMemory) -> O
         time_s=np.array([values.time_s]),
         session_start=np.array([False]),
         movement=Movement.unknown(scale_mm, joint_mm) if motion is None else Movement.from_motions([motion]),
+        quantities_at_zero=values.quantities_at_zero,
     )
 
 

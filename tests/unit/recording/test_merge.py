@@ -80,3 +80,16 @@ def test_of_csv_and_parquet_a_parquet_file_is_made(tmp_path: Path) -> None:
     convert_recording(first.path, tmp_path / "second.parquet")
     merge_recordings([first, read_recording(tmp_path / "second.parquet")], tmp_path / "both.parquet")
     assert read_recording(tmp_path / "both.parquet").rows == 40
+
+
+def test_recordings_from_other_quantities_at_machine_zero_do_not_go_together(tmp_path: Path) -> None:
+    cold, warm = (f"quantities_at_zero: {{temperature_room_degC: {degC}}}\n" for degC in (15, 23))
+    first = recording(tmp_path / "first", csv_text(), SIDECAR + cold)
+    again = recording(tmp_path / "again", csv_text(6), SIDECAR + cold)
+    merge_recordings([first, again], tmp_path / "both.csv")
+    assert read_recording(tmp_path / "both.csv").sidecar.quantities_at_zero == {"temperature_room_degC": 15.0}
+    for sidecar, value in ((SIDECAR + warm, "temperature_room_degC 23.0"), (SIDECAR, "no `quantities_at_zero:`")):
+        other = recording(tmp_path / value[:2], csv_text(6), sidecar)
+        with pytest.raises(RecordingError, match="has other quantities at machine zero") as caught:
+            merge_recordings([first, other], tmp_path / "not.csv")
+        assert value in str(caught.value)

@@ -350,9 +350,29 @@ def test_failed_second_file_leaves_what_was_there(tmp_path: Path) -> None:
     assert [file.name for file in sorted(tmp_path.iterdir())] == ["run.csv"]
 
 
-def test_a_sidecar_without_a_format_is_format_1_and_what_is_written_is_format_2(tmp_path: Path) -> None:
+def test_a_sidecar_without_a_format_is_format_1_and_what_is_written_is_format_3(tmp_path: Path) -> None:
     first = read_recording(write_recording_files(tmp_path, csv_text()))
     assert first.sidecar.format == 1
     write_recording(tmp_path / "again.csv", first.columns, sidecar_contents("tripod-cmm", {"quantity": "link_length"}))
     text = (tmp_path / "again.yaml").read_text()
-    assert text == "format: 2\nmachine: tripod-cmm\nreference:\n  quantity: link_length\n"
+    assert text == "format: 3\nmachine: tripod-cmm\nreference:\n  quantity: link_length\n"
+
+
+def test_the_sidecar_says_from_which_quantities_effects_count(tmp_path: Path) -> None:
+    plain = read_recording(write_recording_files(tmp_path, csv_text()))
+    assert plain.sidecar.quantities_at_zero is None
+    assert plain.sidecar.counts_from.startswith("20 degC")
+    at_zero = "quantities_at_zero: {temperature_room_degC: 23, pressure_hPa: 987.5}\n"
+    known = read_recording(write_recording_files(tmp_path, csv_text(), SIDECAR + at_zero))
+    assert known.sidecar.quantities_at_zero == {"temperature_room_degC": 23.0, "pressure_hPa": 987.5}
+    assert known.sidecar.counts_from == "machine zero"
+    contents = sidecar_contents("tripod-cmm", {"quantity": "tool_position"}, quantities_at_zero={})
+    write_recording(tmp_path / "again.csv", plain.columns, contents)
+    assert read_recording(tmp_path / "again.csv").sidecar.quantities_at_zero == {}, "which is not the same as no key"
+
+
+@pytest.mark.parametrize("wrong", ["{temperature_room_degC: warm}", "{a_degC: .nan}", "[1, 2]", "{a_degC: true}", "5"])
+def test_quantities_at_zero_are_numbers_by_name(tmp_path: Path, wrong: str) -> None:
+    path = write_recording_files(tmp_path, csv_text(), SIDECAR + f"quantities_at_zero: {wrong}\n")
+    with pytest.raises(RecordingError, match="is no mapping of quantities to numbers"):
+        read_recording(path)

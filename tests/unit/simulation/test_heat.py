@@ -18,20 +18,20 @@ def warm_up(swing_K: float = 0.0, heat_share: float = 1.0) -> WarmUp:
 
 
 def test_one_body_follows_the_textbook_exponential() -> None:
-    network = HeatNetwork({"block": 1000.0}, {"block": 0.5}, [])
+    network = HeatNetwork({"block": 1000.0}, {"block": 0.5}, [], 20.0)
     network.advance(2000.0, 25.0, np.zeros(1))  # one time constant
     assert network.temperature_degC[0] == pytest.approx(25.0 - 5.0 * np.exp(-1.0), abs=1e-9)
 
 
 def test_two_bodies_share_their_heat_and_keep_it_all() -> None:
-    network = HeatNetwork({"warm": 300.0, "cold": 100.0}, {"cold": 1e-9}, [("warm", "cold", 2.0)])
+    network = HeatNetwork({"warm": 300.0, "cold": 100.0}, {"cold": 1e-9}, [("warm", "cold", 2.0)], 20.0)
     network.temperature_degC = np.array([24.0, 20.0])
     network.advance(1e4, 20.0, np.zeros(2))
     assert network.temperature_degC == pytest.approx([23.0, 23.0], abs=1e-4)
 
 
 def test_steady_state_lets_out_what_the_drives_put_in() -> None:
-    network = HeatNetwork({"a": 500.0, "b": 700.0}, {"a": 0.2, "b": 0.6}, [("a", "b", 0.3)])
+    network = HeatNetwork({"a": 500.0, "b": 700.0}, {"a": 0.2, "b": 0.6}, [("a", "b", 0.3)], 20.0)
     heat_W = np.array([3.0, 0.0])
     network.advance(1e6, 20.0, heat_W)
     assert network.temperature_degC == pytest.approx(network.steady_degC(20.0, heat_W), abs=1e-9)

@@ -48,6 +48,9 @@ class ZeroFileKeys(Keys):
     zero_hash: str = Field(description="hash of the geometry, gauges and wiring that it belongs to")
     taken_at: str = Field(description="when, UTC, ISO 8601")
     readings_mm: dict[str, float] = Field(description="mean raw reading of every length gauge, by channel, mm")
+    quantities: dict[str, float] | None = Field(
+        default=None, description="mean of every other quantity that could be read, by name: from these effects count"
+    )
 
 
 class NoZeroKeys(Keys):

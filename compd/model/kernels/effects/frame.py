@@ -5,7 +5,6 @@ from __future__ import annotations
 from compd.arrays import FloatArray
 from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.model.kernels.jit import helper
-from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
 
 PPM = 1e-6
 
@@ -33,4 +32,4 @@ def rod_expansion(
     basis: FloatArray,
 ) -> None:
     for k in range(9):
-        basis[k, 0] = PPM * machine.frame_zero_mm[k] * (quantities[0] - REFERENCE_TEMPERATURE_degC)
+        basis[k, 0] = PPM * machine.frame_zero_mm[k] * (quantities[0] - quantities[1])

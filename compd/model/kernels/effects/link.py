@@ -8,10 +8,9 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.model.kernels.effect_row import EffectMachine, EffectRow
-from compd.model.kernels.forces import set_axial_forces
+from compd.model.kernels.forces import axial_force_at_zero, set_axial_forces
 from compd.model.kernels.jit import helper
 from compd.model.kernels.memory import lag_step
-from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
 
 PPM = 1e-6
 UM = 1e-3  # mm
@@ -28,7 +27,7 @@ def expansion(
     basis: FloatArray,
 ) -> None:
     for i in range(row.links):
-        basis[i, 0] = PPM * row.link_mm[i] * (quantities[i] - REFERENCE_TEMPERATURE_degC)
+        basis[i, 0] = PPM * row.link_mm[i] * (quantities[i] - quantities[row.links + i])
 
 
 @helper
@@ -43,7 +42,7 @@ def lagged_expansion(
     """Memory: the time of each link's last row, its warming then, and the rod's."""
     n = row.links
     for i in range(n):
-        warming_K = quantities[i] - REFERENCE_TEMPERATURE_degC
+        warming_K = quantities[i] - quantities[n + i]
         if math.isnan(warming_K):
             basis[i, 0] = math.nan  # and is left out of the memory: the next one follows on the last that was known
             continue
@@ -67,7 +66,7 @@ def elasticity(
     axial_N = np.empty(row.links)
     set_axial_forces(row, machine, quantities, axial_N)
     for i in range(row.links):
-        basis[i, 0] = UM * (axial_N[i] - machine.zero_axial_force_N[i])
+        basis[i, 0] = UM * (axial_N[i] - axial_force_at_zero(machine, quantities[3:6], i))
 
 
 @helper
@@ -87,7 +86,7 @@ def contact(
     axial_N = np.empty(row.links)
     set_axial_forces(row, machine, quantities, axial_N)
     for i in range(row.links):
-        basis[i, 0] = UM * (_hertz(axial_N[i]) - _hertz(machine.zero_axial_force_N[i]))
+        basis[i, 0] = UM * (_hertz(axial_N[i]) - _hertz(axial_force_at_zero(machine, quantities[3:6], i)))
 
 
 @helper

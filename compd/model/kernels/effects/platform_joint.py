@@ -6,7 +6,6 @@ from __future__ import annotations
 from compd.arrays import FloatArray
 from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.model.kernels.jit import helper
-from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
 
 PPM = 1e-6
 UM = 1e-3  # mm
@@ -35,7 +34,7 @@ def expansion(
     memory: FloatArray,
     basis: FloatArray,
 ) -> None:
-    warming_K = quantities[0] - REFERENCE_TEMPERATURE_degC
+    warming_K = quantities[0] - quantities[1]
     for i in range(row.links):
         for j in range(3):
             basis[3 * i + j, 0] = PPM * machine.platform_joints_P_mm[i, j] * warming_K

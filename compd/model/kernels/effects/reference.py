@@ -34,7 +34,7 @@ def plate_bending(
     for k in range(3):
         radius_mm2 += ((points[k, 0] - middle_x_mm) ** 2 + (points[k, 1] - middle_y_mm) ** 2) / 3
     bow_mm2 = radius_mm2 - (row.tip_M_mm[0] - middle_x_mm) ** 2 - (row.tip_M_mm[1] - middle_y_mm) ** 2
-    difference_K = quantities[0] - quantities[1]
+    difference_K = (quantities[0] - quantities[1]) - (quantities[2] - quantities[3])
     basis[2, 0] = -PPM * difference_K / (2 * machine.plate_thickness_mm) * bow_mm2
 
 
@@ -60,6 +60,7 @@ def air_index(
     memory: FloatArray,
     basis: FloatArray,
 ) -> None:
+    """The instrument's own reference: its tables, or the values typed into it, know nothing of machine zero."""
     warming_K = quantities[0] - REFERENCE_TEMPERATURE_degC
     index = PPM * (INDEX_PPM_PER_K * warming_K + INDEX_PPM_PER_hPa * (quantities[1] - REFERENCE_PRESSURE_hPa))
     for j in range(3):

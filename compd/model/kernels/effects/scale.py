@@ -38,6 +38,7 @@ def expansion(
     memory: FloatArray,
     basis: FloatArray,
 ) -> None:
+    """A graduation has its own reference: it is true at 20 degC (ISO 1), wherever machine zero was taken."""
     for i in range(row.links):
         basis[i, 0] = PPM * row.scale_mm[i] * (quantities[i] - REFERENCE_TEMPERATURE_degC)
 
