@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import multiprocessing
 import os
 import random
@@ -10,10 +11,10 @@ import signal
 import socket
 import struct
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tests.injection.rig import InjectedMachine
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
 CONNECTED_WITHIN_S = 10.0
 # Between one attack and the next: the attack is meant to last, and not to take a processor.
 PAUSE_S = 0.01
+# Of a controller.
+TARGETS_PER_S = 2000
+TARGETS_AT_ONCE = 4
+BURST_S = 0.25
 RESET = struct.pack("ii", 1, 0)
 Address = tuple[str, int]
 
@@ -113,6 +118,52 @@ def models(unix: str, tcp: Address) -> None:
         time.sleep(PAUSE_S)
 
 
+def _aim(tcp: Address) -> dict[str, Any]:
+    """A target where the tip is."""
+    with _connected(tcp) as connection:
+        connection.sendall(b'{"class":"WATCH"}\n')
+        for line in connection.makefile("rb"):
+            message = json.loads(line)
+            if message.get("valid"):
+                return {"class": "TARGET", "tip_B0_mm": message["tip_B0_mm"]}
+    raise OSError("no valid setpoint")
+
+
+def _send_targets(connection: socket.socket, target: Mapping[str, Any], times_s: Iterable[float]) -> None:
+    """All at once. The id of each is when it was made, us, so that a setpoint tells how old its target is."""
+    lines = (json.dumps({**target, "id": round(time_s * 1e6)}).encode() + b"\n" for time_s in times_s)
+    connection.sendall(b"".join(lines))
+
+
+def targets(unix: str, tcp: Address) -> None:
+    target = _aim(tcp)
+    with _connected(tcp) as connection:
+        while True:
+            _send_targets(connection, target, [time.monotonic()] * TARGETS_AT_ONCE)
+            time.sleep(TARGETS_AT_ONCE / TARGETS_PER_S)
+
+
+def target_bursts(unix: str, tcp: Address) -> None:
+    target = _aim(tcp)
+    with _connected(tcp) as connection:
+        while True:
+            time.sleep(BURST_S)
+            _send_targets(connection, target, _times_of_a_burst(BURST_S))
+
+
+def target_burst_closed(unix: str, tcp: Address) -> None:
+    target = _aim(tcp)
+    with _connected(tcp) as connection:
+        _send_targets(connection, target, _times_of_a_burst(10 * BURST_S))
+    signal.pause()
+
+
+def _times_of_a_burst(stalled_s: float) -> Iterable[float]:
+    """When the targets of a network that has stalled for so long were made."""
+    now_s = time.monotonic()
+    return (now_s - stalled_s + k / TARGETS_PER_S for k in range(1, round(stalled_s * TARGETS_PER_S) + 1))
+
+
 # What is done, in a user's words and exactly, by the name of the function.
 ATTACKS: dict[str, tuple[str, str]] = {
     "status": ("a client asks STATUS without end", "as fast as it is taken, over TCP"),
@@ -123,9 +174,16 @@ ATTACKS: dict[str, tuple[str, str]] = {
     "noise": ("a client that sends noise", "random bytes over TCP"),
     "churn": ("clients that come and are cut off", "half a message and a reset, over TCP"),
     "models": ("models that are no model files", "a FIFO, /dev/zero, 4000 brackets, a directory"),
+    "targets": ("a controller that sends targets faster than the daemon computes", "2000 targets a second"),
+    "target_bursts": ("a controller behind a network that stalls", "500 targets at once, four times a second"),
+    "target_burst_closed": ("a controller that goes while its targets wait", "5000 targets at once, then closed"),
 }
 _ATTACKS: dict[str, Callable[[str, Address], None]] = {
-    function.__name__: function for function in (status, version, deaf, idle, endless, noise, churn, models)
+    function.__name__: function
+    for function in (
+        *(status, version, deaf, idle, endless, noise, churn, models),
+        *(targets, target_bursts, target_burst_closed),
+    )
 }
 
 

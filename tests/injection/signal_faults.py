@@ -26,7 +26,7 @@ class Scaled(NumbersFault):
 
 @dataclass
 class Steps(NumbersFault):
-    """Channels that jump by `by` again and again, `count` times, `every_s` apart: signal periods that are not counted."""
+    """Channels that jump by `by`, `count` times, `every_s` apart: signal periods that are not counted."""
 
     channels: tuple[str, ...]
     by: float
@@ -50,7 +50,9 @@ class Noisy(NumbersFault):
         self._random = random.Random(self.seed)
 
     def numbers(self, values: Values, exchange: Exchange) -> Mapping[str, float]:
-        return {name: values[name] + self._random.gauss(0.0, self.deviation) for name in self.channels if name in values}
+        return {
+            name: values[name] + self._random.gauss(0.0, self.deviation) for name in self.channels if name in values
+        }
 
 
 @dataclass

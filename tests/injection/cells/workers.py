@@ -1,0 +1,89 @@
+"""Cells on machines of their own, side by side: each result as soon as its cell has ended."""
+
+from __future__ import annotations
+
+import multiprocessing
+import queue
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from multiprocessing.context import SpawnContext
+from multiprocessing.queues import Queue
+from typing import Any, NamedTuple
+
+from tests.injection.cells.cell import Cell
+from tests.injection.cells.trial import try_cell
+from tests.injection.rig import InjectedMachine
+from tests.injection.truth import MOTION_EVERY_S
+from tests.support.simulated import run_directory
+
+# The longest cell, and the start of a machine before it, on a slow computer.
+ANSWER_WITHIN_S = 600.0
+
+
+class Tried(NamedTuple):
+    """A cell that has ended. result : None where the trial itself has failed. why : of that failure."""
+
+    cell: str
+    result: dict[str, Any] | None
+    why: str = ""
+
+
+def side_by_side(cells: Sequence[Cell], jobs: int) -> Iterator[Tried]:
+    """Each on one of `jobs` machines, which go from cell to cell; those that need the computer alone come last."""
+    for alone in (False, True):
+        # a machine that expands is another machine: together
+        todo = sorted((cell for cell in cells if cell.alone is alone), key=lambda cell: cell.expands)
+        if todo:
+            yield from _tried(todo, 1 if alone else min(jobs, len(todo)))
+
+
+def _tried(cells: Sequence[Cell], jobs: int) -> Iterator[Tried]:
+    context = multiprocessing.get_context("spawn")
+    todo, done = _queue(context), _queue(context)
+    for cell in [*cells, *[None] * jobs]:
+        todo.put(None if cell is None else cell.name)
+    workers = [context.Process(target=_work, args=(todo, done)) for _ in range(jobs)]
+    for worker in workers:
+        worker.start()
+    try:
+        for _ in cells:
+            yield done.get(timeout=ANSWER_WITHIN_S)
+    finally:
+        for _ in cells:  # nothing more of what is left
+            try:
+                todo.get_nowait()
+            except queue.Empty:
+                break
+        for _ in workers:
+            todo.put(None)
+        for worker in workers:
+            worker.join()
+
+
+def _queue(context: SpawnContext) -> Queue[Any]:
+    return context.Queue()
+
+
+def _work(todo: Queue[str | None], done: Queue[Tried]) -> None:
+    """One machine at a time; anew where another is needed, or something went wrong with it."""
+    from tests.injection.cells.cell import all_cells
+
+    by_name = {cell.name: cell for cell in all_cells()}
+    with ExitStack() as running:
+        machine: InjectedMachine | None = None
+        while (name := todo.get()) is not None:
+            cell = by_name[name]
+            try:
+                if machine is None or machine.expands is not cell.expands:
+                    running.close()
+                    machine = running.enter_context(_machine(cell.expands, running))
+                done.put(Tried(name, try_cell(machine, cell).as_data()))
+            except Exception:  # noqa: BLE001 (whatever it is, the other cells go on)
+                machine = None
+                done.put(Tried(name, None, traceback.format_exc()))
+
+
+def _machine(expands: bool, running: ExitStack) -> InjectedMachine:
+    directory = running.enter_context(run_directory())
+    return InjectedMachine(directory, truth_every_s=MOTION_EVERY_S, expands=expands)
