@@ -320,6 +320,14 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         _power_cut,
     ),
     BlindSpot(
+        "display_parameters",
+        "a display loses its counting direction, its unit or its gain where it shows 0",
+        "anywhere else: it comes back with another number, or jumps",
+        "",
+        "at machine zero, where it shows 0 whatever its parameters are; every later reading is then wrong",
+        lambda figures: f"counting backwards, 1 mm of a scale is {2 * figures.leverage('scale'):.2f} mm at the tip",
+    ),
+    BlindSpot(
         "wrong_from_the_start",
         "a sign, a link or a channel is wired wrongly, or machine zero was taken at another place",
         "`compd compare` with a reference instrument; `compd zero` says by how much it differs from the one before",

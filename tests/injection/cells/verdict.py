@@ -98,7 +98,7 @@ def _hold(verdict: Verdict, valid: Sequence[Message], true_mm: Any) -> None:
     verdict.beyond = int(np.sum(errors_um > bounds_um))
     worst = int(np.argmax(errors_um))
     verdict.worst_um, verdict.worst_bound_um = float(errors_um[worst]), float(bounds_um[worst])
-    verdict.error_95_um = float(np.quantile(errors_um, 0.95))
+    verdict.error_95_um = float(np.quantile(errors_um, 0.95, method="higher"))
     if bounded.any():
         verdict.most = float(np.max(errors_um[bounded] / bounds_um[bounded]))
         verdict.bound_um = float(np.median(bounds_um[bounded]))
