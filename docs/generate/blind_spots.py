@@ -8,7 +8,7 @@ from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, BlindSpot, Fi
 from compd.configuration.shipped import load_machine
 from docs.generate import fault_cells
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target
-from tests.injection.matrix import MATRIX
+from tests.injection.matrix import FAULTS
 
 INTRODUCTION = """\
 A gauge that is lost says so; one that is wrong does not. compd compares what it can: a reading with the ones before it,
@@ -56,7 +56,7 @@ def _tried(spot: BlindSpot, document: fault_cells.Document) -> str:
     """What was injected for it, and how wrong a valid setpoint was; "" where that has not been measured."""
     tried = [
         f"{case.injected}: " + ", ".join(map(fault_cells.figures, found))
-        for case in MATRIX
+        for case in FAULTS
         if case.unseen == spot.name and (found := fault_cells.results_of(document, case))
     ]
     return "; ".join(tried) + " (the tip's error, of the bound that the setpoint states)" if tried else ""

@@ -10,7 +10,7 @@ import yaml
 from docs.generate.fault_cells import Document, figures, introduction, measured, number, overview, results, results_of
 from docs.generate.markdown import codes, escape, fence, heading, join, link, table, target
 from tests.injection.case import Case, Way
-from tests.injection.matrix import MATRIX
+from tests.injection.matrix import FAULTS
 from tests.injection.rig import NOISE_UM, VOTES
 
 HEADER = ["what fails", "what must happen, and the way out", "largest error, valid", "shown, `ok` again after"]
@@ -23,7 +23,7 @@ def page() -> str:
 
 def page_of(document: Document) -> str:
     """Markdown, from the matrix and this file of results."""
-    groups = list(dict.fromkeys(case.group for case in MATRIX))
+    groups = list(dict.fromkeys(case.group for case in FAULTS))
     return join(
         "# What happens when ...",
         _introduction(document),
@@ -61,7 +61,7 @@ def _unseen(document: Document) -> str:
     """What no gauge shows, first: it is what a person has to know."""
     rows = [
         [escape(case.fault), escape(case.injected), number(_worst_um(case, document), "um", 1), _spot(case)]
-        for case in MATRIX
+        for case in FAULTS
         if case.unseen
     ]
     return join(
@@ -86,7 +86,7 @@ def _worst_um(case: Case, document: Document) -> float | None:
 
 def _table(group: str, document: Document) -> str:
     header = [HEADER[0], HEADER[1], "error of bound" if results(document) else HEADER[2], HEADER[3]]
-    return table(header, [_row(case, document) for case in MATRIX if case.group == group])
+    return table(header, [_row(case, document) for case in FAULTS if case.group == group])
 
 
 def _row(case: Case, document: Document) -> list[str]:

@@ -24,7 +24,7 @@ READINGS: tuple[Case, ...] = (
         "scale-digit",
         ONE_READING,
         "one digit of one reply of a scale is another one",
-        "2.0000 read as 2.7000, once",
+        "2.0034 read as 2.7034, once",
         on("scale_1", lambda: faults.OneDigit("position", -1)),
         Way.UNDISTURBED,
         sample=True,

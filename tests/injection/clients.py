@@ -13,6 +13,7 @@ import struct
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from tests.injection.rig import InjectedMachine
 
 CONNECTED_WITHIN_S = 10.0
+BEGINS_WITHIN_S = 30.0
 # Between one attack and the next: the attack is meant to last, and not to take a processor.
 PAUSE_S = 0.01
 # Of a controller.
@@ -187,11 +189,12 @@ _ATTACKS: dict[str, Callable[[str, Address], None]] = {
 }
 
 
-def run(name: str, unix: str, tcp: Address) -> None:
+def run(name: str, unix: str, tcp: Address, begins: Event) -> None:
     """Until it is killed; the daemon's end is its end too.
 
     It takes no processor time from the simulated machine: the daemon is attacked, not the computer.
     """
+    begins.set()
     os.nice(19)
     with contextlib.suppress(OSError):
         _ATTACKS[name](unix, tcp)
@@ -205,9 +208,12 @@ def attack(name: str) -> Callable[[InjectedMachine], None]:
 @contextmanager
 def attacking(name: str, unix: Path, tcp: Address) -> Iterator[None]:
     """The client runs during the block."""
-    process = multiprocessing.get_context("spawn").Process(target=run, args=(name, str(unix), tcp), daemon=True)
+    context = multiprocessing.get_context("spawn")
+    begins = context.Event()
+    process = context.Process(target=run, args=(name, str(unix), tcp, begins), daemon=True)
     process.start()
     try:
+        assert begins.wait(BEGINS_WITHIN_S), f"{name} does not begin"
         yield
     finally:
         process.kill()

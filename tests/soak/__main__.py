@@ -14,10 +14,9 @@ import structlog
 import yaml
 
 from compd.configuration.document import read_document
-from tests.injection.matrix import MATRIX
 from tests.injection.rig import TRIPOD, InjectedMachine, add_votes
 from tests.injection.truth import MOTION_EVERY_S
-from tests.soak.soak import TOGETHER_SHARE, soak
+from tests.soak.soak import DRAWN, TOGETHER_SHARE, soak
 from tests.soak.summary import unseen_ids
 from tests.soak.undisturbed import TimeLapse
 from tests.support.paths import CONFIG
@@ -39,7 +38,7 @@ def main() -> int:
         return _without_faults(arguments.hours, arguments.seed)
     with run_directory() as directory, _machine(directory, arguments.seed) as machine:
         summary = soak(machine, arguments.minutes, arguments.seed, _say, arguments.together)
-    print(summary.text(unseen_ids(MATRIX)))
+    print(summary.text(unseen_ids(DRAWN)))
     problems = summary.problems()
     for problem in problems:
         print("\n" + problem[:1000])

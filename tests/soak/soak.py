@@ -9,6 +9,7 @@ from typing import Any
 
 from compd.errors import DaemonError
 from tests.injection.case import Case, Way
+from tests.injection.cases_of_signals import SIGNALS
 from tests.injection.cells.verdict import judge
 from tests.injection.matrix import MATRIX
 from tests.injection.rig import InjectedMachine
@@ -21,8 +22,6 @@ from tests.support.watching import Watcher
 # How often two faults come together, and how often none does.
 TOGETHER_SHARE = 0.2
 QUIET_SHARE = 0.1
-# Blind spots of any size.
-LARGE_UNSEEN = ("display_parameters",)
 # Stroke in which the machine visits places, mm.
 STROKE_MM = 12.0
 # A fault lasts between these times, s.
@@ -61,9 +60,8 @@ def soak(
     return summary
 
 
-# Without those that nothing shows and that cost millimetres, since what happens beside them could not be judged; and
-# without those that need another machine.
-DRAWN = [case for case in MATRIX if case.at_least_um < 1000.0 and case.unseen not in LARGE_UNSEEN and not case.expands]
+# Without the one that nothing shows and that costs millimetres: what happens beside it could not be judged.
+DRAWN = [case for case in (*MATRIX, *SIGNALS) if case.at_least_um < 1000.0]
 
 
 def _drawn(chance: random.Random, together_share: float) -> list[Case]:

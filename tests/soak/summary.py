@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from tests.injection.case import Case, Way
+from tests.injection.case import Case
 from tests.injection.rig import Verdict
 from tests.soak.resources import Resources
 
@@ -122,7 +122,7 @@ class Summary:
 
 
 def unseen_ids(cases: Sequence[Case]) -> list[str]:
-    return [case.id for case in cases if case.way is Way.UNSEEN and case.at_least_um]
+    return [case.id for case in cases if case.unseen]
 
 
 def _or_zero(number: float) -> float:

@@ -19,6 +19,8 @@ from tests.support.watching import Seen, Watcher
 # How long a fault's end is given before a person accepts all gauges, and then before the daemon is started anew.
 FAULT_SHOWS_S, BY_ITSELF_S = 1.0, 4.0
 AFTER_ACCEPTANCE_S = 8.0
+# Cases in which targets are sent.
+CONTROLLERS = ("client-targets", "client-target_bursts")
 # The bound of a machine at rest without a fault, over the 95 % error.
 FITS = (1.0, 2.0)
 
@@ -44,9 +46,11 @@ class CellResult:
         problems = [f"a broken rule: {self.broken[0][:200]}"] if self.broken else []
         if self.way_out == "restarted":
             problems.append("ok again only after a restart that forgets")
+        verdict = self.verdict
+        if any(fault in CONTROLLERS for fault in self.faults) and math.isnan(verdict.target_late_s):
+            problems.append("no setpoint answers a target: the controller has done nothing")
         if self.unseen:
             return problems
-        verdict = self.verdict
         # at rest without a fault
         if not self.faults and self.situation == Situation.REST.name.lower():
             fit = verdict.bound_um / verdict.error_95_um
@@ -92,7 +96,7 @@ def _during(machine: InjectedMachine, cell: Cell) -> tuple[list[Seen], list[str]
     # one that drives itself needs the machine at rest
     situation = Situation.REST if cell.drives_itself else cell.situation
     with situation.lasting(machine):
-        if restarts:
+        if restarts:  # the fault comes while the daemon is away
             machine.daemon.stop()
             _begin(machine, cell)
             machine.daemon.__enter__()

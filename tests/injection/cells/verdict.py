@@ -64,8 +64,10 @@ class Verdict:
             problems.append(
                 f"a valid setpoint is wrong by {self.most:.1f} times its bound; worst {self.worst_um:.1f} um"
             )
-        if math.isnan(self.most) and self.unbounded and self.worst_um > 0:
-            problems.append(f"wrong by {self.worst_um:.1f} um at most, without a bound")
+        if self.unbounded:
+            problems.append(
+                f"{self.unbounded} of {self.held} valid setpoints have no bound; worst {self.worst_um:.1f} um"
+            )
         if self.target_late_s > TARGET_LATE_S:
             problems.append(f"a valid setpoint answers a target that is {self.target_late_s:.2f} s old")
         return problems

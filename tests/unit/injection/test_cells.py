@@ -20,7 +20,7 @@ from tests.injection.cells.situation import Situation
 from tests.injection.cells.trial import CellResult
 from tests.injection.cells.verdict import Verdict, judge, tip_bound_um
 from tests.injection.cells.workers import Tried
-from tests.injection.matrix import MATRIX
+from tests.injection.matrix import FAULTS
 from tests.injection.truth import Asked, Truth
 from tests.support.watching import Seen
 
@@ -61,7 +61,7 @@ def test_every_cell_has_a_name_of_its_own() -> None:
 
 
 def test_every_fault_is_in_every_situation_that_fits_it() -> None:
-    by_fault = {case.id: {c.situation for c in CELLS if c.cases == (case,)} for case in MATRIX}
+    by_fault = {case.id: {c.situation for c in CELLS if c.cases == (case,)} for case in FAULTS}
     assert by_fault["scale-jumps"] == by_fault["thermometer-open"] == set(Situation)
     assert by_fault["scale-inch-at-zero"] == {Situation.MOTION}
     assert by_fault["loop-sigkill"] == set(Situation) - {Situation.RESTART}
@@ -80,13 +80,13 @@ def test_the_pairs_follow_from_the_seed_and_can_be_seen() -> None:
 def test_the_sample_has_something_of_every_kind() -> None:
     part = sample(CELLS)
     assert {cell.situation for cell in part} == set(Situation)
-    assert {case.group for cell in part for case in cell.cases} == {case.group for case in MATRIX}
+    assert {case.group for cell in part for case in cell.cases} == {case.group for case in FAULTS}
     assert {len(cell.cases) for cell in part} == {0, 1, 2}
 
 
 def test_what_nothing_shows_is_a_blind_spot() -> None:
-    assert {case.unseen for case in MATRIX if case.unseen} <= {spot.name for spot in BLIND_SPOTS}
-    assert all(case.unseen for case in MATRIX if case.way is Way.UNSEEN)
+    assert {case.unseen for case in FAULTS if case.unseen} <= {spot.name for spot in BLIND_SPOTS}
+    assert all(case.unseen for case in FAULTS if case.way is Way.UNSEEN)
 
 
 # --- verdicts
@@ -129,7 +129,8 @@ def test_a_larger_bound_allows_a_larger_error() -> None:
 
 
 def test_a_valid_setpoint_without_a_bound_or_a_number_is_wrong() -> None:
-    assert "without a bound" in judge(KnownTruth(), [setpoint(9.1, 1e-4, bound_um=None)]).problems[0]
+    (problem,) = judge(KnownTruth(), [setpoint(9.1, 1e-4, bound_um=None), setpoint(9.1, 1e-4)]).problems
+    assert problem == "1 of 2 valid setpoints have no bound; worst 0.1 um"
     assert judge(KnownTruth(), [setpoint(9.1, math.nan)]).worst_um == math.inf
 
 
