@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import json
-import multiprocessing
 import os
 import random
 import signal
 import socket
 import struct
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from tests.support.paths import ROOT
 
 if TYPE_CHECKING:
     from tests.injection.rig import InjectedMachine
 
 CONNECTED_WITHIN_S = 10.0
-BEGINS_WITHIN_S = 30.0
 # Between one attack and the next: the attack is meant to last, and not to take a processor.
 PAUSE_S = 0.01
 # Of a controller.
@@ -30,6 +31,7 @@ TARGETS_AT_ONCE = 4
 BURST_S = 0.25
 RESET = struct.pack("ii", 1, 0)
 Address = tuple[str, int]
+BEGINS = "begins"
 
 
 def _connected(tcp: Address) -> socket.socket:
@@ -189,15 +191,15 @@ _ATTACKS: dict[str, Callable[[str, Address], None]] = {
 }
 
 
-def run(name: str, unix: str, tcp: Address, begins: Event) -> None:
+def main(name: str, unix: str, host: str, port: str) -> None:
     """Until it is killed; the daemon's end is its end too.
 
     It takes no processor time from the simulated machine: the daemon is attacked, not the computer.
     """
-    begins.set()
+    print(BEGINS, flush=True)
     os.nice(19)
     with contextlib.suppress(OSError):
-        _ATTACKS[name](unix, tcp)
+        _ATTACKS[name](unix, (host, int(port)))
 
 
 def attack(name: str) -> Callable[[InjectedMachine], None]:
@@ -208,13 +210,15 @@ def attack(name: str) -> Callable[[InjectedMachine], None]:
 @contextmanager
 def attacking(name: str, unix: Path, tcp: Address) -> Iterator[None]:
     """The client runs during the block."""
-    context = multiprocessing.get_context("spawn")
-    begins = context.Event()
-    process = context.Process(target=run, args=(name, str(unix), tcp, begins), daemon=True)
-    process.start()
-    try:
-        assert begins.wait(BEGINS_WITHIN_S), f"{name} does not begin"
-        yield
-    finally:
-        process.kill()
-        process.join()
+    command = [sys.executable, "-m", "tests.injection.clients", name, str(unix), tcp[0], str(tcp[1])]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline().strip() == BEGINS, f"{name} does not begin"
+            yield
+        finally:
+            process.kill()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
