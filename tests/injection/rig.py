@@ -20,8 +20,7 @@ from typing import Any, Self
 import numpy as np
 import yaml
 
-from compd.demo.processes import Command, run_commands
-from compd.demo.session import wait_for_gauges
+from compd.demo.processes import START_TIMEOUT_S, Command, run_commands
 from compd.errors import DaemonError
 from compd.live.loop.states import State
 from tests.injection.clients import attacking
@@ -141,9 +140,8 @@ class InjectedMachine:
         self.daemon = Daemon(self._write_configuration())
         running.callback(self.daemon.stop)
         self.daemon.__enter__()
-        with self.daemon.connected() as client, self.daemon.connected() as observer:
-            wait_for_gauges(observer, client.watch(10))
-            until("machine zero is taken", lambda: _takes_zero(observer))
+        with self.daemon.connected() as client:
+            until("machine zero is taken", lambda: _takes_zero(client), START_TIMEOUT_S)
 
     def _write_configuration(self, exchanged: tuple[str, str] | None = None) -> Path:
         """exchanged : two lines that have each other's port."""

@@ -83,7 +83,7 @@ def _work(todo: Queue[str | None], done: Queue[Tried]) -> None:
     pauses = Pauses()
     with pauses.watched(), ExitStack() as running:
         machine: InjectedMachine | None = None
-        while (name := todo.get()) is not None:
+        while (name := _next(todo)) is not None:
             cell = by_name[name]
             try:
                 if machine is None or machine.expands is not cell.expands:
@@ -93,6 +93,15 @@ def _work(todo: Queue[str | None], done: Queue[Tried]) -> None:
             except Exception:  # noqa: BLE001 (whatever it is, the other cells go on)
                 machine = None
                 done.put(Tried(name, None, traceback.format_exc()))
+
+
+def _next(todo: Queue[str | None]) -> str | None:
+    """The next cell; None where there is none, or nobody waits for it any more."""
+    parent = multiprocessing.parent_process()
+    while parent is None or parent.is_alive():
+        with suppress(queue.Empty):
+            return todo.get(timeout=LOOK_EVERY_S)
+    return None
 
 
 def _result(machine: InjectedMachine, cell: Cell, pauses: Pauses) -> dict[str, Any]:
