@@ -18,7 +18,7 @@ from tests.support.watching import Message, Seen
 BEYOND_SHARE, BEYOND_MOST = 0.05, 2.0
 # Of a normal distribution, 95 % on both sides.
 COVERAGE = 1.96
-# A setpoint may answer a target that was the newest so long before: the daemon's own time, and that between bursts.
+# A target that was made so long before is old: longer than the time between the bursts of `clients`.
 TARGET_LATE_S = 0.5
 
 
@@ -36,8 +36,8 @@ class Verdict:
 
     held : valid setpoints whose true tip is known. beyond : of them, in error by more than their bound. unbounded :
     of them, without a bound. worst_um, worst_bound_um : the largest error, and the bound of that setpoint. most :
-    largest error over its bound. bound_um : median. error_95_um : of the errors. target_late_s : age of the oldest
-    target of a valid setpoint, by its id.
+    largest error over its bound. bound_um : median. error_95_um : of the errors. late : valid setpoints whose target
+    is older than `TARGET_LATE_S`. target_late_s : age of the oldest target of a valid setpoint, by its id.
     """
 
     setpoints: int = 0
@@ -50,6 +50,7 @@ class Verdict:
     most: float = math.nan
     bound_um: float = math.nan
     error_95_um: float = math.nan
+    late: int = 0
     target_late_s: float = math.nan
     states: dict[str, int] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
@@ -68,8 +69,9 @@ class Verdict:
             problems.append(
                 f"{self.unbounded} of {self.held} valid setpoints have no bound; worst {self.worst_um:.1f} um"
             )
-        if self.target_late_s > TARGET_LATE_S:
-            problems.append(f"a valid setpoint answers a target that is {self.target_late_s:.2f} s old")
+        if self.late > BEYOND_SHARE * self.setpoints:
+            oldest = f"{self.target_late_s:.2f} s"
+            problems.append(f"{self.late} of {self.setpoints} setpoints answer an old target, up to {oldest}")
         return problems
 
 
@@ -80,7 +82,9 @@ def judge(truth: Truth, seen: Sequence[Seen]) -> Verdict:
     states = Counter(str(one["state"]) for one in seen)
     reasons = Counter(str(one["reason"]) for one in seen if one["reason"])
     verdict = Verdict(len(seen), len(valid), states=dict(states), reasons=[r[:200] for r, _ in reasons.most_common(3)])
-    verdict.target_late_s = max(_target_ages_s(valid), default=math.nan)
+    ages_s = list(_target_ages_s(valid))
+    verdict.target_late_s = max(ages_s, default=math.nan)
+    verdict.late = sum(age_s > TARGET_LATE_S for age_s in ages_s)
     if valid:
         _hold(verdict, valid, truth.tips_mm([setpoint["time_s"] for setpoint in valid]))
     return verdict

@@ -6,6 +6,8 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from queue import Queue
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ import pytest
 from compd.commissioning.blind_spots import BLIND_SPOTS
 from tests.injection.case import Way
 from tests.injection.cells import __main__ as run
+from tests.injection.cells import workers
 from tests.injection.cells.cell import Cell, all_cells, sample
 from tests.injection.cells.report import report
 from tests.injection.cells.situation import Situation
@@ -141,11 +144,13 @@ def test_what_is_invalid_is_not_held() -> None:
     assert not verdict.problems
 
 
-def test_an_old_target_is_wrong() -> None:
+def test_old_targets_are_wrong_where_there_are_many_of_them() -> None:
     fresh = setpoint(9.2, 0.0, mode="machine_tool", target_id=9_100_000)
     old = setpoint(9.9, 0.0, mode="machine_tool", target_id=9_100_000)
     assert not judge(KnownTruth(), [fresh]).problems
-    assert judge(KnownTruth(), [fresh, old]).problems == ["a valid setpoint answers a target that is 0.80 s old"]
+    assert not judge(KnownTruth(), [*[fresh] * 19, old]).problems
+    (problem,) = judge(KnownTruth(), [*[fresh] * 18, old, old]).problems
+    assert problem == "2 of 20 setpoints answer an old target, up to 0.80 s"
 
 
 # --- results
@@ -209,6 +214,15 @@ def test_a_run_goes_on_where_it_stopped(
     monkeypatch.setattr("sys.argv", [*asked, "--fresh"])
     run.main()
     assert len(tried) == 9
+
+
+def test_a_process_that_ends_leaves_its_cell_untried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "LOOK_EVERY_S", 0.0)
+    done: Queue[Tried] = Queue()
+    done.put(Tried("a@rest", {}))
+    ended: Any = SimpleNamespace(is_alive=lambda: False)
+    tried = list(workers._as_they_end(done, [ended], {"a@rest", "b@rest"}))  # type: ignore[arg-type]
+    assert [(one.cell, one.result) for one in tried] == [("a@rest", {}), ("b@rest", None)]
 
 
 def test_the_report_names_what_is_wrong_and_what_nothing_shows() -> None:
