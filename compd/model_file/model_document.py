@@ -2,7 +2,7 @@
 
 Each step keeps what it replaced, so that it can be undone. `compd.model_file.model_file` makes effects of the data.
 
-    format: 3               # 1 and 2, of releases before 0.6, have no `counts_from`, `fitted_range` and `checksum`
+    format: 3               # 1 and 2, of releases up to 0.2, have no `counts_from`, `fitted_range` and `checksum`
     machine: tripod-cmm     # name of the configuration, or "external"
     geometry: 9f3a...       # hash of the geometry that it was fitted on; left out where that is not known
     release: 0.2.0          # of compd, that wrote it
@@ -136,7 +136,7 @@ class EffectEntry(FilePart):
     counts_from: Literal["machine zero", "20 degC"] = Field(
         default="20 degC",
         description="the quantities from which it counts: `machine zero`; or `20 degC`, 1013.25 hPa and 0 of anything "
-        "else, as in files of releases before 0.6",
+        "else, as in files of releases up to 0.2",
     )
     shape: Annotated[dict[str, float], _EmptyMapping] = Field(
         default={}, description="values of its nonlinear constants, by name"
@@ -153,7 +153,7 @@ class ModelDocument(FilePart):
     """The keys of the file."""
 
     format: Annotated[int, Field(ge=1)] = Field(
-        default=1, description=f"number of the format: {FORMAT}; 1 and 2, of releases before 0.6, lack some keys"
+        default=1, description=f"number of the format: {FORMAT}; 1 and 2, of releases up to 0.2, lack some keys"
     )
     machine: str = Field(description='name of the machine\'s configuration, or "external"')
     geometry: str = Field(

@@ -292,7 +292,7 @@ def read_model_file(
 
 
 def _warnings(document: ModelDocument, fitted: Sequence[FittedEffect], links: int, path: Path) -> Iterator[Problem]:
-    """What the file does not say of itself, as those of releases up to 0.9 do not."""
+    """What the file does not say of itself, as those of releases up to 0.2 do not."""
     if not document.checksum:
         yield Problem(
             where=str(path),

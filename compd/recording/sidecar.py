@@ -174,7 +174,7 @@ SECTIONS: Mapping[str, Any] = {
         BeforeValidator(_checked_quantities),
         Field(
             description="temperatures, forces and so on when machine zero was taken, by the names of their columns: "
-            "from them effects count. Without the key, as in recordings of releases before 0.6, they count from "
+            "from them effects count. Without the key, as in recordings of releases up to 0.2, they count from "
             "20 degC, 1013.25 hPa and 0 of anything else"
         ),
     ],

@@ -37,7 +37,7 @@ _PLOTLY_CONFIG = {
     "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
 }
 
-# In the head of every page: its generator; in those of releases before 0.6 the style of their text.
+# In the head of every page: its generator; in those of releases up to 0.2 the style of their text.
 _PAGE_MARKS = (b'<meta name="generator" content="compd">', b'body { font: 16px/1.5 system-ui, "Segoe UI"')
 
 # Name of plotly's script where pages share it.

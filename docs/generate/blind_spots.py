@@ -6,7 +6,9 @@ from functools import cache
 
 from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, BlindSpot, Figures, figures_of, shown_by
 from compd.configuration.shipped import load_machine
+from docs.generate import fault_cells
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target
+from tests.injection.matrix import FAULTS
 
 INTRODUCTION = """\
 A gauge that is lost says so; one that is wrong does not. compd compares what it can: a reading with the ones before it,
@@ -33,24 +35,40 @@ def figures() -> Figures:
 
 
 def page() -> str:
-    """Markdown, from the list of blind spots and the kinematics."""
+    """Markdown, from the list of blind spots, the kinematics and what was measured."""
+    return page_of(fault_cells.measured())
+
+
+def page_of(document: fault_cells.Document) -> str:
+    """Markdown, with this file of results."""
     drifts = [[d.length, code(d.gauge), f"{d.cmm_um:.1f}", f"{d.machine_tool_um:.1f}"] for d in figures().drifts]
     return join(
         "# What compd cannot see",
         INTRODUCTION,
-        *(_part(spot) for spot in BLIND_SPOTS),
+        *(_part(spot, document) for spot in BLIND_SPOTS),
         heading(2, f"What a drift of {DRIFT_UM:g} um costs", "blind-spots-drift"),
         DRIFT,
         table(["length", "gauge", "CMM mode, um", "machine-tool mode, um"], drifts),
     )
 
 
-def _part(spot: BlindSpot) -> str:
+def _tried(spot: BlindSpot, document: fault_cells.Document) -> str:
+    """What was injected for it, and how wrong a valid setpoint was; "" where that has not been measured."""
+    tried = [
+        f"{case.injected}: " + ", ".join(map(fault_cells.figures, found))
+        for case in FAULTS
+        if case.unseen == spot.name and (found := fault_cells.results_of(document, case))
+    ]
+    return "; ".join(tried) + " (the tip's error, of the bound that the setpoint states)" if tried else ""
+
+
+def _part(spot: BlindSpot, document: fault_cells.Document) -> str:
     """One blind spot: a heading and a list."""
     points = [
         ("Shown by", escape(sentence(shown_by(spot)))),
         ("Unseen", escape(sentence(spot.unseen))),
         ("On this tripod", escape(sentence(spot.cost(figures())) if spot.cost(figures()) else "")),
+        ("Measured", escape(_tried(spot, document))),
     ]
     title = spot.fault[0].upper() + spot.fault[1:]
     items = "".join(f"- *{name}:* {text}\n" for name, text in points if text)

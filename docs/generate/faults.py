@@ -2,44 +2,39 @@
 
 from __future__ import annotations
 
-import json
 import math
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import yaml
 
-from docs.generate.markdown import codes, escape, fence, heading, join, table, target
+from docs.generate.fault_cells import Document, figures, introduction, measured, number, overview, results, results_of
+from docs.generate.markdown import codes, escape, fence, heading, join, link, table, target
 from tests.injection.case import Case, Way
-from tests.injection.matrix import MATRIX
+from tests.injection.matrix import FAULTS
 from tests.injection.rig import NOISE_UM, VOTES
-
-# Written by `python -m tests.injection --write docs/faults.json`.
-MEASURED = Path(__file__).parent.parent / "faults.json"
 
 HEADER = ["what fails", "what must happen, and the way out", "largest error, valid", "shown, `ok` again after"]
 
 
-@cache
-def measured() -> dict[str, Any]:
-    """What a run of all cases has seen."""
-    read: dict[str, Any] = json.loads(MEASURED.read_text(encoding="utf-8"))
-    return read
-
-
 def page() -> str:
     """Markdown, from the matrix and from what was measured."""
-    groups = list(dict.fromkeys(case.group for case in MATRIX))
+    return page_of(measured())
+
+
+def page_of(document: Document) -> str:
+    """Markdown, from the matrix and this file of results."""
+    groups = list(dict.fromkeys(case.group for case in FAULTS))
     return join(
         "# What happens when ...",
-        _introduction(),
-        _unseen(),
-        *(join(heading(2, group, target("faults", group)), _table(group)) for group in groups),
+        _introduction(document),
+        introduction(document),
+        _unseen(document),
+        overview(document),
+        *(join(heading(2, group, target("faults", group)), _table(group, document)) for group in groups),
     )
 
 
-def _introduction() -> str:
+def _introduction(document: Document) -> str:
     return f"""\
 ... a gauge, a line, a process or a client fails. Each row of these tables is a test: an injector between the simulated
 tripod of `config/tripod-cmm.yaml` and the daemon does it to whole replies on real ports, and every setpoint that says
@@ -48,7 +43,7 @@ drives. Its owner has added to the configuration:
 
 {fence(yaml.safe_dump({"gauges": {name: {"noise_um": um} for name, um in NOISE_UM.items()}, "votes": VOTES}), "yaml")}
 The columns on the right are from one run of
-`{measured()["command"]}` on {measured()["date"]}:
+`{document["command"]}` on {document["date"]}:
 
 - *largest error* of any setpoint that was valid, from the beginning of the fault until the state was `ok` again.
   Without any fault it is 0.3 um, the noise of the gauges;
@@ -62,39 +57,55 @@ rows, and `make soak` lets them happen at random.
 """
 
 
-def _unseen() -> str:
+def _unseen(document: Document) -> str:
     """What no gauge shows, first: it is what a person has to know."""
     rows = [
-        [escape(case.fault), escape(case.injected), _number(_outcome(case).get("worst_um"), "um", 1)]
-        for case in MATRIX
-        if case.way is Way.UNSEEN and case.at_least_um
+        [escape(case.fault), escape(case.injected), number(_worst_um(case, document), "um", 1), _spot(case)]
+        for case in FAULTS
+        if case.unseen
     ]
     return join(
         heading(2, "What nothing shows", target("faults", "unseen")),
-        "Each of these gauges is the only one that measures what it measures, and its part may move so. The state "
-        "stays `ok`, and the tip is wrong by as much as the last column says. `compd check --what-cannot-be-seen` "
-        "lists them for your machine.",
-        table(["what fails", "what was injected", "tip wrong by"], rows),
+        "Each of these gauges is the only one that measures what it measures, and its part may move so; or it is shown "
+        "only after a while. Until then the setpoints are valid, and the tip is wrong by as much as the third column "
+        "says. `compd check --what-cannot-be-seen` lists them for your machine.",
+        table(["what fails", "what was injected", "tip wrong by", "why"], rows),
     )
 
 
-def _table(group: str) -> str:
-    return table(HEADER, [_row(case) for case in MATRIX if case.group == group])
+def _spot(case: Case) -> str:
+    """A link to the blind spot that a fault is in."""
+    return link(case.unseen.replace("_", " "), target("blind-spots", case.unseen))
 
 
-def _row(case: Case) -> list[str]:
-    outcome = _outcome(case)
+def _worst_um(case: Case, document: Document) -> float | None:
+    """In any situation."""
+    found = [result["worst_um"] for result in [_outcome(case, document), *results_of(document, case)]]
+    return max((um for um in found if um is not None), default=None)
+
+
+def _table(group: str, document: Document) -> str:
+    header = [HEADER[0], HEADER[1], "error of bound" if results(document) else HEADER[2], HEADER[3]]
+    return table(header, [_row(case, document) for case in FAULTS if case.group == group])
+
+
+def _row(case: Case, document: Document) -> list[str]:
+    outcome = _outcome(case, document)
+    cells = [figures(result) for result in results_of(document, case)]
+    at_once = f"{number(outcome.get('worst_um'), 'um', 2)}, {_share(outcome.get('valid_share'))}"
+    seen = f"not seen: {_spot(case)}" if case.unseen else "seen"
     return [
         f"{escape(case.fault)}<br>*{escape(case.injected)}*",
         f"{_must(case)}<br>Way out: {'the service manager starts it again' if case.lost else case.way.value}",
-        f"{_number(outcome.get('worst_um'), 'um', 2)}, {_share(outcome.get('valid_share'))}",
-        f"{_number(outcome.get('shown_s'), 's', 2)}, {_number(outcome.get('back_s'), 's', 2)}",
+        "<br>".join([seen, *cells]) if cells else at_once,
+        f"{number(outcome.get('shown_s'), 's', 2)}, {number(outcome.get('back_s'), 's', 2)}",
     ]
 
 
 def _must(case: Case) -> str:
     """In words, what the test asserts."""
-    bound = f"no valid setpoint is wrong by more than {case.bound_um:g} um"
+    allowed = "its bound" if math.isinf(case.bound_um) else f"{case.bound_um:g} um"
+    bound = f"no valid setpoint is wrong by more than {allowed}"
     if case.lost:
         return f"connections close; {bound}"
     if case.states:
@@ -107,14 +118,10 @@ def _must(case: Case) -> str:
     return bound
 
 
-def _outcome(case: Case) -> dict[str, Any]:
-    outcome: dict[str, Any] = measured()["outcomes"].get(case.id, {})
+def _outcome(case: Case, document: Document) -> dict[str, Any]:
+    outcome: dict[str, Any] = document["outcomes"].get(case.id, {"worst_um": None})
     return outcome
 
 
 def _share(value: float | None) -> str:
-    return _number(None if value is None else 100 * value, "%", 0)
-
-
-def _number(value: float | None, unit: str, decimals: int) -> str:
-    return "-" if value is None or math.isnan(value) else f"{value:.{decimals}f} {unit}"
+    return number(None if value is None else 100 * value, "%", 0)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 
 from tests.injection.matrix import MATRIX
+from tests.injection.measured import write_outcomes
 from tests.injection.rig import InjectedMachine
-from tests.injection.trial import Outcome, settle, try_case
+from tests.injection.trial import settle, try_case
 from tests.support.simulated import run_directory
 
 
@@ -38,20 +36,8 @@ def main() -> int:
     wrong = sum(bool(outcome.problems) for outcome in outcomes)
     print(f"{len(outcomes)} cases, {wrong} not as they must be")
     if arguments.write:
-        _write(arguments.write, outcomes)
+        write_outcomes(arguments.write, outcomes)
     return 1 if wrong else 0
-
-
-def _write(path: Path, outcomes: Sequence[Outcome]) -> None:
-    """Into a file, beside what it has of other cases that are still in the matrix."""
-    known = json.loads(path.read_text())["outcomes"] if path.exists() else {}
-    known |= {outcome.case: outcome.as_data() for outcome in outcomes}
-    document = {
-        "command": f"python -m tests.injection --write {path}",
-        "date": datetime.now(UTC).date().isoformat(),
-        "outcomes": {case.id: known[case.id] for case in MATRIX if case.id in known},
-    }
-    path.write_text(json.dumps(document, indent=1) + "\n")
 
 
 if __name__ == "__main__":

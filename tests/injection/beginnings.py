@@ -9,10 +9,13 @@ from tests.injection import faults
 from tests.injection.case import Begin
 from tests.injection.rig import InjectedMachine
 
-# Where the scales stand when a fault begins: different for each, so that exchanged ones differ.
-REST_MM = (2.0, 4.0, 7.0)
+# Where the scales stand when a fault begins: different for each, so that exchanged ones differ, and with more digits
+# than a display that has been set to fewer.
+REST_MM = (2.0034, 4.0047, 7.0061)
 # Where a case drives them.
 AWAY_MM = (9.0, 11.0, 14.0)
+# How long a gauge that was without power is watched then, s: its line is opened again within this time.
+REOPENED_S = 3.0
 
 
 def on(line: str, make: Callable[[], faults.Fault]) -> Begin:
@@ -129,3 +132,42 @@ def sent(process: str, number: signal.Signals) -> Begin:
 def stopped(machine: InjectedMachine) -> None:
     """The whole daemon is stopped for a second."""
     machine.stop_for(1.0)
+
+
+def stalled(process: str, s: float) -> Begin:
+    """One process is stopped for so long."""
+
+    def begin(machine: InjectedMachine) -> None:
+        machine.signal(process, signal.SIGSTOP)
+        machine.truth.rest_for(s)
+        machine.signal(process, signal.SIGCONT)
+
+    return begin
+
+
+def at_zero(begin: Begin) -> Begin:
+    """At machine zero, where a display shows 0 whatever its parameters; then the machine drives."""
+
+    def both(machine: InjectedMachine) -> None:
+        machine.truth.drive((0.0, 0.0, 0.0))
+        begin(machine)
+        machine.truth.drive(AWAY_MM)
+
+    return both
+
+
+def without_power(line: str, make: Callable[[], faults.Fault], s: float = 1.0) -> Begin:
+    """Without power for so long, and back with this fault, for long enough to be read again."""
+
+    def begin(machine: InjectedMachine) -> None:
+        machine.injector.unplug(line)
+        machine.truth.rest_for(s)
+        machine.injector.fault(line, make())
+        machine.injector.plug(line)
+        machine.truth.rest_for(REOPENED_S)
+
+    return begin
+
+
+def ports_exchanged(one: str, other: str) -> Begin:
+    return lambda machine: machine.exchange_ports(one, other)

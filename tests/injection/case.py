@@ -37,7 +37,9 @@ class Case:
     given, or may be where nothing must show. bound_um : of the error of any valid setpoint, from the beginning
     until the state is ok again. way : out of it. at_least_um : of what nothing shows, the error that it makes.
     watched_s : how long the fault lasts. lost : whether the daemon itself ends and the service manager starts it
-    again. sample : `.ci/run` runs it too.
+    again. sample : `.ci/run` runs it too. unseen : the blind spot (`compd check --what-cannot-be-seen`) of what
+    nothing shows, or not at once. drives : it drives the machine itself. expands : it needs a machine that expands,
+    `InjectedMachine.expands`.
     """
 
     id: str
@@ -53,3 +55,6 @@ class Case:
     watched_s: float = 1.5
     lost: bool = False
     sample: bool = False
+    unseen: str = ""
+    drives: bool = False
+    expands: bool = False

@@ -107,6 +107,8 @@ LINES: tuple[Case, ...] = (
         while_driving(on("scale_1", faults.OneReplyLate)),
         Way.EITHER,
         bound_um=3.0,
+        unseen="one_poll_late",
+        drives=True,
     ),
     Case(
         "frame-reply-behind",

@@ -75,6 +75,7 @@ NUMBERS: tuple[Case, ...] = (
         "scale 1",
         bound_um=3.0,
         sample=True,
+        drives=True,
     ),
     Case(
         "frame-stuck",
@@ -98,6 +99,7 @@ NUMBERS: tuple[Case, ...] = (
         "u1",
         bound_um=2.0,
         watched_s=12.0,
+        unseen="stuck_comparator",
     ),
     Case(
         "cabinet-stuck",
@@ -120,6 +122,8 @@ NUMBERS: tuple[Case, ...] = (
         names="scale 1",
         bound_um=12_000.0,
         at_least_um=5_000.0,
+        unseen="stuck_scale",
+        drives=True,
     ),
     Case(
         "joints-stuck-driving",
@@ -130,6 +134,8 @@ NUMBERS: tuple[Case, ...] = (
         Way.UNSEEN,
         names="joint",
         bound_um=10.0,
+        unseen="stuck_comparator",
+        drives=True,
     ),
     Case(
         "cabinet-reply-behind-reframed",
@@ -139,6 +145,7 @@ NUMBERS: tuple[Case, ...] = (
         on("cabinet", lambda: faults.OneReplyLate(reframed=True)),
         Way.UNSEEN,
         names="frame",
+        unseen="one_poll_late",
     ),
     # --- exchanged
     Case(
@@ -171,6 +178,7 @@ NUMBERS: tuple[Case, ...] = (
         Way.UNSEEN,
         names="joint",
         bound_um=5.0,
+        unseen="exchanged_gauges",
     ),
     # --- drift
     Case(
@@ -184,6 +192,7 @@ NUMBERS: tuple[Case, ...] = (
         bound_um=60.0,
         at_least_um=20.0,
         watched_s=3.0,
+        unseen="drift_of_a_scale",
     ),
     Case(
         "joint-drifts",
@@ -196,6 +205,7 @@ NUMBERS: tuple[Case, ...] = (
         bound_um=60.0,
         at_least_um=20.0,
         watched_s=3.0,
+        unseen="drift_of_a_joint_comparator",
     ),
     Case(
         "ra-drifts",
@@ -208,6 +218,7 @@ NUMBERS: tuple[Case, ...] = (
         "joints",
         bound_um=40.0,
         watched_s=8.0,
+        unseen="drift_of_a_joint_comparator",
     ),
     Case(
         "frame-drifts",
@@ -220,5 +231,6 @@ NUMBERS: tuple[Case, ...] = (
         "u1",
         bound_um=40.0,
         watched_s=8.0,
+        unseen="drift_of_a_frame_comparator",
     ),
 )

@@ -7,6 +7,7 @@ import signal
 from tests.injection import clients
 from tests.injection.beginnings import (
     sent,
+    stalled,
     stopped,
 )
 from tests.injection.case import Case, Way
@@ -43,6 +44,15 @@ PROCESSES_AND_CLIENTS: tuple[Case, ...] = (
         "the whole daemon is stopped and goes on",
         "SIGSTOP, 1 s later SIGCONT",
         stopped,
+        Way.ITSELF,
+        watched_s=1.0,
+    ),
+    Case(
+        "acquisition-stalls",
+        PROCESSES,
+        "the process `acquisition` stalls for less than its guard's patience",
+        "SIGSTOP, 0.4 s later SIGCONT",
+        stalled("acquisition", 0.4),
         Way.ITSELF,
         watched_s=1.0,
     ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tests.injection import faults
 from tests.injection.beginnings import (
+    REOPENED_S,
     always,
     away,
     back_with,
@@ -16,8 +17,6 @@ from tests.injection.case import INVALID, SUBSTITUTED, Case, Way
 ONE_READING = "One reading"
 FROM_NOW_ON = "From now on"
 COMES_BACK = "A gauge that comes back"
-# How long a gauge that was without power for 2 s is watched then, s: its line is opened again 3.5 s after it was lost.
-REOPENED_S = 3.0
 
 READINGS: tuple[Case, ...] = (
     # --- one reading
@@ -25,7 +24,7 @@ READINGS: tuple[Case, ...] = (
         "scale-digit",
         ONE_READING,
         "one digit of one reply of a scale is another one",
-        "2.0000 read as 2.7000, once",
+        "2.0034 read as 2.7034, once",
         on("scale_1", lambda: faults.OneDigit("position", -1)),
         Way.UNDISTURBED,
         sample=True,
@@ -113,6 +112,7 @@ READINGS: tuple[Case, ...] = (
         names="scale 1",
         bound_um=50.0,
         at_least_um=35.0,
+        unseen="small_jump",
     ),
     Case(
         "frame-jumps",
@@ -144,6 +144,7 @@ READINGS: tuple[Case, ...] = (
         names="joint",
         bound_um=20.0,
         at_least_um=10.0,
+        unseen="small_jump",
     ),
     # --- comes back
     Case(
@@ -201,6 +202,7 @@ READINGS: tuple[Case, ...] = (
         INVALID,
         "scale 1",
         bound_um=3.0,
+        drives=True,
     ),
     Case(
         "joints-unplugged",

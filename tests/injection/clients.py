@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
+import json
 import os
 import random
 import signal
 import socket
 import struct
+import subprocess
+import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from tests.support.paths import ROOT
 
 if TYPE_CHECKING:
     from tests.injection.rig import InjectedMachine
@@ -21,8 +25,13 @@ if TYPE_CHECKING:
 CONNECTED_WITHIN_S = 10.0
 # Between one attack and the next: the attack is meant to last, and not to take a processor.
 PAUSE_S = 0.01
+# Of a controller.
+TARGETS_PER_S = 2000
+TARGETS_AT_ONCE = 4
+BURST_S = 0.25
 RESET = struct.pack("ii", 1, 0)
 Address = tuple[str, int]
+BEGINS = "begins"
 
 
 def _connected(tcp: Address) -> socket.socket:
@@ -113,6 +122,52 @@ def models(unix: str, tcp: Address) -> None:
         time.sleep(PAUSE_S)
 
 
+def _aim(tcp: Address) -> dict[str, Any]:
+    """A target where the tip is."""
+    with _connected(tcp) as connection:
+        connection.sendall(b'{"class":"WATCH"}\n')
+        for line in connection.makefile("rb"):
+            message = json.loads(line)
+            if message.get("valid"):
+                return {"class": "TARGET", "tip_B0_mm": message["tip_B0_mm"]}
+    raise OSError("no valid setpoint")
+
+
+def _send_targets(connection: socket.socket, target: Mapping[str, Any], times_s: Iterable[float]) -> None:
+    """All at once. The id of each is when it was made, us, so that a setpoint tells how old its target is."""
+    lines = (json.dumps({**target, "id": round(time_s * 1e6)}).encode() + b"\n" for time_s in times_s)
+    connection.sendall(b"".join(lines))
+
+
+def targets(unix: str, tcp: Address) -> None:
+    target = _aim(tcp)
+    with _connected(tcp) as connection:
+        while True:
+            _send_targets(connection, target, [time.monotonic()] * TARGETS_AT_ONCE)
+            time.sleep(TARGETS_AT_ONCE / TARGETS_PER_S)
+
+
+def target_bursts(unix: str, tcp: Address) -> None:
+    target = _aim(tcp)
+    with _connected(tcp) as connection:
+        while True:
+            time.sleep(BURST_S)
+            _send_targets(connection, target, _times_of_a_burst(BURST_S))
+
+
+def target_burst_closed(unix: str, tcp: Address) -> None:
+    target = _aim(tcp)
+    with _connected(tcp) as connection:
+        _send_targets(connection, target, _times_of_a_burst(10 * BURST_S))
+    signal.pause()
+
+
+def _times_of_a_burst(stalled_s: float) -> Iterable[float]:
+    """When the targets of a network that has stalled for so long were made."""
+    now_s = time.monotonic()
+    return (now_s - stalled_s + k / TARGETS_PER_S for k in range(1, round(stalled_s * TARGETS_PER_S) + 1))
+
+
 # What is done, in a user's words and exactly, by the name of the function.
 ATTACKS: dict[str, tuple[str, str]] = {
     "status": ("a client asks STATUS without end", "as fast as it is taken, over TCP"),
@@ -123,20 +178,28 @@ ATTACKS: dict[str, tuple[str, str]] = {
     "noise": ("a client that sends noise", "random bytes over TCP"),
     "churn": ("clients that come and are cut off", "half a message and a reset, over TCP"),
     "models": ("models that are no model files", "a FIFO, /dev/zero, 4000 brackets, a directory"),
+    "targets": ("a controller that sends targets faster than the daemon computes", "2000 targets a second"),
+    "target_bursts": ("a controller behind a network that stalls", "500 targets at once, four times a second"),
+    "target_burst_closed": ("a controller that goes while its targets wait", "5000 targets at once, then closed"),
 }
 _ATTACKS: dict[str, Callable[[str, Address], None]] = {
-    function.__name__: function for function in (status, version, deaf, idle, endless, noise, churn, models)
+    function.__name__: function
+    for function in (
+        *(status, version, deaf, idle, endless, noise, churn, models),
+        *(targets, target_bursts, target_burst_closed),
+    )
 }
 
 
-def run(name: str, unix: str, tcp: Address) -> None:
+def main(name: str, unix: str, host: str, port: str) -> None:
     """Until it is killed; the daemon's end is its end too.
 
     It takes no processor time from the simulated machine: the daemon is attacked, not the computer.
     """
+    print(BEGINS, flush=True)
     os.nice(19)
     with contextlib.suppress(OSError):
-        _ATTACKS[name](unix, tcp)
+        _ATTACKS[name](unix, (host, int(port)))
 
 
 def attack(name: str) -> Callable[[InjectedMachine], None]:
@@ -147,10 +210,15 @@ def attack(name: str) -> Callable[[InjectedMachine], None]:
 @contextmanager
 def attacking(name: str, unix: Path, tcp: Address) -> Iterator[None]:
     """The client runs during the block."""
-    process = multiprocessing.get_context("spawn").Process(target=run, args=(name, str(unix), tcp), daemon=True)
-    process.start()
-    try:
-        yield
-    finally:
-        process.kill()
-        process.join()
+    command = [sys.executable, "-m", "tests.injection.clients", name, str(unix), tcp[0], str(tcp[1])]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline().strip() == BEGINS, f"{name} does not begin"
+            yield
+        finally:
+            process.kill()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from tests.injection.replies import Protocol, Values
 
@@ -24,8 +24,8 @@ class Exchange:
     protocol: Protocol
     request: bytes
     reply: bytes
-    number: int
-    elapsed_s: float
+    number: int = 0
+    elapsed_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,12 @@ class Sent:
 
 
 class Fault(ABC):
-    """What happens to the replies of a line."""
+    """What happens to the replies of a line.
+
+    needs_whole : it reads the numbers of a reply, so that nothing may have damaged it before.
+    """
+
+    needs_whole = False
 
     @abstractmethod
     def send(self, exchange: Exchange) -> list[Sent]:
@@ -47,6 +52,8 @@ class Fault(ABC):
 
 class NumbersFault(Fault):
     """A fault of the numbers alone: the reply is whole, and its checksum fits."""
+
+    needs_whole = True
 
     @abstractmethod
     def numbers(self, values: Values, exchange: Exchange) -> Mapping[str, float]:
@@ -100,6 +107,9 @@ class OneReplyLate(Fault):
 
     reframed: bool = False
     _before: Exchange | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        self.needs_whole = self.reframed
 
     def send(self, exchange: Exchange) -> list[Sent]:
         before, self._before = self._before, exchange
@@ -262,17 +272,3 @@ class Exchanged(NumbersFault):
         if not {self.one, self.other} <= values.keys():
             return {}
         return {self.one: values[self.other], self.other: values[self.one]}
-
-
-@dataclass
-class Together(Fault):
-    """Several faults, one after the other, of which all but the last change numbers alone."""
-
-    faults: tuple[Fault, ...]
-
-    def send(self, exchange: Exchange) -> list[Sent]:
-        *before, last = self.faults
-        for fault in before:
-            (sent,) = fault.send(exchange)
-            exchange = replace(exchange, reply=sent.data)
-        return last.send(exchange)

@@ -19,9 +19,10 @@ import yaml
 
 from tests.injection.ends import LOOPBACK, DeviceConnection, DevicePort, End, ListeningEnd, PtyEnd
 from tests.injection.faults import Exchange, Fault
+from tests.injection.line_faults import FaultOfLine, sent_through
 from tests.injection.replies import Protocol, protocol_of
 
-ANSWER_WITHIN_S = 30.0
+ANSWER_WITHIN_S = 90.0
 
 
 @dataclass
@@ -43,9 +44,7 @@ class _Line:
     requests: bytes = b""
     replies: bytes = b""
     pending: deque[_Pending] = field(default_factory=deque)
-    fault: Fault | None = None
-    since_s: float = 0.0
-    number: int = 0
+    faults: list[FaultOfLine] = field(default_factory=list)
     # (time, data), in order of time
     due: deque[tuple[float, bytes]] = field(default_factory=deque)
 
@@ -101,8 +100,11 @@ class _Wires:
         self.plug(name)
 
     def fault(self, name: str, fault: Fault | None) -> None:
-        line = self._lines[name]
-        line.fault, line.since_s, line.number = fault, time.monotonic(), 0
+        faults = self._lines[name].faults
+        if fault is None:
+            faults.clear()
+        else:
+            faults.append(FaultOfLine(fault, time.monotonic()))
 
     def connect(self, device_of: Mapping[str, str]) -> None:
         """From now on the daemon's line asks this line's device."""
@@ -111,7 +113,7 @@ class _Wires:
     def repair(self) -> None:
         """Everything as it was at first."""
         for name, line in self._lines.items():
-            line.fault = None
+            line.faults.clear()
             self._device_of[name] = name
             self.plug(name)
 
@@ -154,12 +156,8 @@ class _Wires:
                 self._reply(self._lines[pending.asker], pending.request, reply, now_s)
 
     def _reply(self, line: _Line, request: bytes, reply: bytes, now_s: float) -> None:
-        if line.fault is None:
-            self._send(line, now_s, reply)
-            return
-        exchange = Exchange(line.protocol, request, reply, line.number, now_s - line.since_s)
-        line.number += 1
-        for sent in line.fault.send(exchange):
+        exchange = Exchange(line.protocol, request, reply)
+        for sent in sent_through(line.faults, exchange, now_s):
             pieces = [sent.data] if sent.gap_s == 0.0 else [bytes([byte]) for byte in sent.data]
             for index, piece in enumerate(pieces):
                 self._send(line, now_s + sent.delay_s + index * sent.gap_s, piece)
@@ -232,7 +230,7 @@ class Injector:
         return data
 
     def fault(self, line: str, fault: Fault | None) -> None:
-        """From the next reply on; None ends it."""
+        """From the next reply on, beside those that the line has; None ends all of them."""
         self._order("fault", line, fault)
 
     def unplug(self, *lines: str) -> None:

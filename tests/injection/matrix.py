@@ -8,9 +8,14 @@ tripod, at rest with its scales at `REST_MM`, unless a case says that it drives.
 from __future__ import annotations
 
 from tests.injection.case import Case
+from tests.injection.cases_of_displays import DISPLAYS
 from tests.injection.cases_of_lines import LINES
 from tests.injection.cases_of_numbers import NUMBERS
 from tests.injection.cases_of_processes import PROCESSES_AND_CLIENTS
 from tests.injection.cases_of_readings import READINGS
+from tests.injection.cases_of_signals import SIGNALS
+from tests.injection.cases_of_thermometers import THERMOMETERS
 
 MATRIX: tuple[Case, ...] = (*READINGS, *LINES, *NUMBERS, *PROCESSES_AND_CLIENTS)
+# With those of which nothing is demanded but that the setpoints keep their bound: `make faults`.
+FAULTS: tuple[Case, ...] = (*MATRIX, *SIGNALS, *DISPLAYS, *THERMOMETERS)

@@ -7,36 +7,33 @@ import math
 import os
 import signal
 import socket
-import threading
+import subprocess
+import sys
 import time
-from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 import yaml
 
-from compd.demo.processes import Command, run_commands
-from compd.demo.session import wait_for_gauges
+from compd.demo.processes import START_TIMEOUT_S, Command, run_commands
 from compd.errors import DaemonError
 from compd.live.loop.states import State
-from compd.simulation.wires.control_client import ControlClient
 from tests.injection.clients import attacking
 from tests.injection.ends import LOOPBACK
 from tests.injection.injector import Injector
+from tests.injection.truth import PREFERRED, REST_EVERY_S, SETTLED_S, Truth
 from tests.support.daemon_process import Daemon
+from tests.support.live_models import file_with
 from tests.support.paths import CONFIG
 from tests.support.watching import PATIENCE_S, Rules, Seen, Watcher, until
 
 TRIPOD = "tripod-cmm.yaml"
 RATE_HZ = 100.0
-# For so long after a motion a setpoint may rest on readings from the motion: two polls of the slowest gauge.
-SETTLED_S = 0.3
-TRUTH_EVERY_S = 0.05
 # What an owner adds to the shipped configuration, so that the gauges are compared with each other. Of the frame's
 # comparators the noise is larger than the last digit.
 NOISE_UM = {"frame_u": 0.02, "cabinet": 0.02}
@@ -46,6 +43,8 @@ VOTES = {
     "frame": {"temperature": "temperature_frame_degC", "expansion_ppm_per_K": 10.5, "tolerance_um": 15.0},
 }
 MACHINE_ZERO = "machine-zero.json"
+# Steel.
+EXPANSION, EXPANSION_PPM_PER_K = "link_expansion", 11.5
 
 
 @dataclass
@@ -89,83 +88,27 @@ class Verdict:
             self.worst_um, self.worst = error_um, seen.setpoint
 
 
-class Asked(NamedTuple):
-    """The truth as of a time between asking and the answer."""
-
-    from_s: float
-    to_s: float
-    tip_mm: np.ndarray
-    moving: bool
-
-
-class Truth:
-    """Asks the simulated machine for its true tip, twenty times a second, and remembers the times of rest."""
-
-    def __init__(self, control: Path) -> None:
-        self._client = ControlClient(control)
-        self._lock = threading.Lock()
-        self._end = threading.Event()
-        self._seen: list[Asked] = []
-        self._ask()
-        self._thread = threading.Thread(target=self._run, name="truth", daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        self._end.set()
-        self._thread.join(PATIENCE_S)
-        self._client.__exit__()
-
-    def forget(self) -> None:
-        """All but the last second."""
-        del self._seen[: -round(1 / TRUTH_EVERY_S)]
-
-    def drive(self, scale_mm: Sequence[float], patience_s: float = PATIENCE_S) -> None:
-        """Drive there, and return when the machine has come to rest and every gauge has been read again."""
-        with self._lock:
-            self._client.ask("DRIVE", scale_mm=list(scale_mm))
-        until("the machine rests", lambda: not self._ask()["moving"], patience_s)
-        self.rest_for(SETTLED_S)
-
-    def rest_for(self, duration_s: float) -> None:
-        """Let the machine stand for so long."""
-        end_s = time.monotonic() + duration_s
-        until("a rest", lambda: self._seen[-1].from_s > end_s)
-
-    def at(self, from_s: float, to_s: float) -> np.ndarray | None:
-        """(3,) the true tip, if the machine stood still from `from_s` to `to_s` and it is known; else None.
-
-        The answers before and after count as well, so that no motion between two answers is missed.
-        """
-        seen = self._seen[:]
-        first = bisect_right(seen, from_s, key=lambda asked: asked.to_s) - 1
-        last = bisect_left(seen, to_s, key=lambda asked: asked.from_s)
-        if first < 0 or last == len(seen) or any(asked.moving for asked in seen[first : last + 1]):
-            return None
-        return seen[last].tip_mm
-
-    def _ask(self) -> dict[str, Any]:
-        with self._lock:
-            from_s = time.monotonic()
-            truth = self._client.ask("TRUTH")
-            self._seen.append(Asked(from_s, time.monotonic(), np.array(truth["tip_mm"]), truth["moving"]))
-        return truth
-
-    def _run(self) -> None:
-        with contextlib.suppress(OSError, ValueError, DaemonError):  # the machine has been stopped
-            while not self._end.wait(TRUTH_EVERY_S):
-                self._ask()
-
-
 class InjectedMachine:
     """The shipped tripod, simulated, with the injector on every line and a daemon beyond it. A context manager.
 
-    changes : of the daemon's configuration, by section: {"loop": {"on_stale": "fade"}}.
+    changes : of the daemon's configuration, by section: {"loop": {"on_stale": "fade"}}. truth_every_s : how often the
+    true tip is asked for. expands : its links expand as steel does, and the daemon corrects it by its thermometers.
     """
 
-    def __init__(self, directory: Path, seed: int = 3, changes: dict[str, dict[str, Any]] | None = None) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        seed: int = 3,
+        changes: dict[str, dict[str, Any]] | None = None,
+        truth_every_s: float = REST_EVERY_S,
+        expands: bool = False,
+    ) -> None:
         self.directory = directory
+        self.expands = expands
         self._seed = seed
         self._changes = changes or {}
+        self._truth_every_s = truth_every_s
+        self._reloaded = False
         self._running = ExitStack()
 
     def __enter__(self) -> Self:
@@ -180,24 +123,32 @@ class InjectedMachine:
     def _start(self, running: ExitStack) -> None:
         wires, ports = self.directory / "wires", self.directory / "ports"
         options = ["--directory", str(wires), "--seed", str(self._seed), "--zero-hold", "1e9"]
+        if self.expands:
+            options += ["--effect", f"{EXPANSION}={EXPANSION_PPM_PER_K}"]
+            self._changes = {**self._changes, "state": {"model_file": str(self.directory / "expands.yaml")}}
+            file_with(self.directory / "expands.yaml", EXPANSION, **{EXPANSION: EXPANSION_PPM_PER_K})
         commands = [Command(["simulate", str(CONFIG / TRIPOD), *options], ready=wires / "control.sock")]
-        running.enter_context(run_commands(commands, log=self.directory / "simulate.log"))
         ports.mkdir()
-        configuration = yaml.safe_load((wires / TRIPOD).read_text())
-        self.injector = running.enter_context(Injector(configuration, ports))
-        self.truth = Truth(wires / "control.sock")
+        with _preferred():
+            running.enter_context(run_commands(commands, log=self.directory / "simulate.log"))
+            configuration = yaml.safe_load((wires / TRIPOD).read_text())
+            self.injector = running.enter_context(Injector(configuration, ports))
+        self.truth = Truth(wires / "control.sock", self._truth_every_s)
         running.callback(self.truth.close)
         self._attacks = running.enter_context(ExitStack())
         self._tcp = (LOOPBACK, _free_port())
         self.daemon = Daemon(self._write_configuration())
         running.callback(self.daemon.stop)
         self.daemon.__enter__()
-        with self.daemon.connected() as client, self.daemon.connected() as observer:
-            wait_for_gauges(observer, client.watch(10))
-            until("machine zero is taken", lambda: _takes_zero(observer))
+        with self.daemon.connected() as client:
+            until("machine zero is taken", lambda: _takes_zero(client), START_TIMEOUT_S)
 
-    def _write_configuration(self) -> Path:
+    def _write_configuration(self, exchanged: tuple[str, str] | None = None) -> Path:
+        """exchanged : two lines that have each other's port."""
         data = self.injector.daemon_configuration()
+        if exchanged:
+            one, other = (data["lines"][name] for name in exchanged)
+            one["port"], other["port"] = other["port"], one["port"]
         data["loop"]["rate_hz"] = RATE_HZ
         host, port = self._tcp
         data["sockets"] = {
@@ -258,11 +209,31 @@ class InjectedMachine:
         finally:
             os.killpg(self.daemon.process.pid, signal.SIGCONT)
 
+    def exchange_ports(self, one: str, other: str) -> None:
+        """In the configuration, by mistake; then the daemon is told to read it anew."""
+        self._write_configuration((one, other))
+        self._reloaded = True
+        if self.daemon.alive:
+            self.daemon.process.send_signal(signal.SIGHUP)
+
+    @contextmanager
+    def busy(self, processes: int) -> Iterator[None]:
+        """So many other programs compute without end during the block, at the daemon's own priority."""
+        with ExitStack() as running:
+            for _ in range(processes):
+                program = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+                running.callback(program.wait)
+                running.callback(program.kill)
+            yield
+
     def repair(self) -> None:
-        """No fault on any line, no hostile client, and a daemon that runs."""
+        """No fault on any line, no hostile client, and a daemon that runs with its own configuration."""
         self._attacks.close()
         self.injector.repair()
-        if not self.daemon.alive:
+        if self._reloaded:
+            self._write_configuration()
+        if self._reloaded or not self.daemon.alive:
+            self._reloaded = False
             self.restart()
 
     def restart(self, forget: bool = False) -> None:
@@ -292,6 +263,18 @@ def add_votes(configuration: dict[str, Any]) -> None:
     for gauge, noise_um in NOISE_UM.items():
         configuration["gauges"][gauge]["noise_um"] = noise_um
     configuration["votes"] = VOTES
+
+
+@contextmanager
+def _preferred() -> Iterator[None]:
+    """What is started in the block stands for devices, which no program slows down, where that is permitted."""
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    with contextlib.suppress(PermissionError):
+        os.setpriority(os.PRIO_PROCESS, 0, PREFERRED)
+    try:
+        yield
+    finally:
+        os.setpriority(os.PRIO_PROCESS, 0, before)
 
 
 def _takes_zero(client: Any) -> bool:

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import argparse
 import logging
+from pathlib import Path
 
 import structlog
 import yaml
 
 from compd.configuration.document import read_document
-from tests.injection.matrix import MATRIX
 from tests.injection.rig import TRIPOD, InjectedMachine, add_votes
-from tests.soak.soak import soak
+from tests.injection.truth import MOTION_EVERY_S
+from tests.soak.soak import DRAWN, TOGETHER_SHARE, soak
 from tests.soak.summary import unseen_ids
 from tests.soak.undisturbed import TimeLapse
 from tests.support.paths import CONFIG
@@ -27,6 +28,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.soak", description="Random faults, or none in time-lapse.")
     parser.add_argument("--minutes", type=float, default=4.0)
     parser.add_argument("--seed", type=int, default=1, help="faults, their order and places follow from it")
+    parser.add_argument("--together", type=float, default=TOGETHER_SHARE, help="share of faults that come in pairs")
     parser.add_argument(
         "--without-faults", action="store_true", help="count false alarms, in time-lapse, without wires"
     )
@@ -34,13 +36,17 @@ def main() -> int:
     arguments = parser.parse_args()
     if arguments.without_faults:
         return _without_faults(arguments.hours, arguments.seed)
-    with run_directory() as directory, InjectedMachine(directory, seed=arguments.seed) as machine:
-        summary = soak(machine, arguments.minutes, arguments.seed, _say)
-    print(summary.text(unseen_ids(MATRIX)))
+    with run_directory() as directory, _machine(directory, arguments.seed) as machine:
+        summary = soak(machine, arguments.minutes, arguments.seed, _say, arguments.together)
+    print(summary.text(unseen_ids(DRAWN)))
     problems = summary.problems()
     for problem in problems:
         print("\n" + problem[:1000])
     return 1 if problems else 0
+
+
+def _machine(directory: Path, seed: int) -> InjectedMachine:
+    return InjectedMachine(directory, seed=seed, truth_every_s=MOTION_EVERY_S)
 
 
 def _without_faults(hours: float, seed: int) -> int:

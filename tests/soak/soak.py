@@ -9,6 +9,8 @@ from typing import Any
 
 from compd.errors import DaemonError
 from tests.injection.case import Case, Way
+from tests.injection.cases_of_signals import SIGNALS
+from tests.injection.cells.verdict import judge
 from tests.injection.matrix import MATRIX
 from tests.injection.rig import InjectedMachine
 from tests.injection.trial import accept
@@ -33,7 +35,9 @@ WARM_EPISODES = 5
 Say = Callable[[str], None]
 
 
-def soak(machine: InjectedMachine, minutes: float, seed: int, say: Say) -> Summary:
+def soak(
+    machine: InjectedMachine, minutes: float, seed: int, say: Say, together_share: float = TOGETHER_SHARE
+) -> Summary:
     """Run it. The faults, their order and places follow from the seed; their times are those of the computer."""
     chance = random.Random(seed)
     summary = Summary(seed)
@@ -44,7 +48,7 @@ def soak(machine: InjectedMachine, minutes: float, seed: int, say: Say) -> Summa
         while time.monotonic() < start_s + 60 * minutes:
             if episode == WARM_EPISODES:
                 summary.before = resources_by_process(machine.daemon.pids())
-            _episode(machine, _drawn(chance), chance, summary, pauses)
+            _episode(machine, _drawn(chance, together_share), chance, summary, pauses)
             episode += 1
             if time.monotonic() > told_s + 60:
                 told_s = time.monotonic()
@@ -57,15 +61,15 @@ def soak(machine: InjectedMachine, minutes: float, seed: int, say: Say) -> Summa
 
 
 # Without the one that nothing shows and that costs millimetres: what happens beside it could not be judged.
-DRAWN = [case for case in MATRIX if case.at_least_um < 1000.0]
+DRAWN = [case for case in (*MATRIX, *SIGNALS) if case.at_least_um < 1000.0]
 
 
-def _drawn(chance: random.Random) -> list[Case]:
+def _drawn(chance: random.Random, together_share: float) -> list[Case]:
     """No fault, one, or two that leave the daemon alive."""
     if chance.random() < QUIET_SHARE:
         return []
     one = chance.choice(DRAWN)
-    if one.lost or chance.random() > TOGETHER_SHARE:
+    if one.lost or chance.random() > together_share:
         return [one]
     return [one, chance.choice([case for case in DRAWN if not case.lost and case.id != one.id])]
 
@@ -92,9 +96,12 @@ def _episode(
             accepted = accept(machine)
             restarted = not _settles(machine, watcher, AFTER_ACCEPTANCE_S)
         verdict = machine.judge(watcher.seen)
+        bounds = judge(machine.truth, watcher.seen)
         ended = bool(watcher.ended)
         summary.broken += [f"{[case.id for case in cases]}: {broken}" for broken in watcher.broken[:1]]
     fault = summary.add(cases, verdict)
+    if not any(case.unseen for case in cases):
+        summary.beyond += [f"{[case.id for case in cases]}: {problem}" for problem in bounds.problems]
     fault.accepted += accepted
     if doubts and not any(_explains(case, doubts) for case in cases):
         paused_s = pauses.lost_s - paused_before_s

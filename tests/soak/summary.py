@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from tests.injection.case import Case, Way
+from tests.injection.case import Case
 from tests.injection.rig import Verdict
 from tests.soak.resources import Resources
 
@@ -29,7 +29,8 @@ class FaultCount:
 class Summary:
     """All episodes of a soak.
 
-    broken : rules of setpoints. false_alarms : reasons for which a person had to accept a gauge that had no fault.
+    broken : rules of setpoints. beyond : setpoints that are wrong by more than their bound.
+    false_alarms : reasons for which a person had to accept a gauge that had no fault.
     alarms_in_pauses : such reasons where the computer itself paused: the simulated gauges did not answer meanwhile.
     """
 
@@ -42,6 +43,7 @@ class Summary:
     cycles: int = 0
     missed: int = 0
     broken: list[str] = field(default_factory=list)
+    beyond: list[str] = field(default_factory=list)
     false_alarms: list[str] = field(default_factory=list)
     alarms_in_pauses: list[str] = field(default_factory=list)
     before: dict[str, Resources] = field(default_factory=dict)
@@ -77,7 +79,14 @@ class Summary:
             for name, resources in self.after.items()
             if name in self.before and (growth := resources.growth_since(self.before[name]))
         ]
-        return [*wrong, *stuck, *grown, *self.broken, *(f"false alarm: {alarm}" for alarm in self.false_alarms)]
+        return [
+            *wrong,
+            *stuck,
+            *grown,
+            *self.broken,
+            *self.beyond,
+            *(f"false alarm: {alarm}" for alarm in self.false_alarms),
+        ]
 
     def text(self, unseen: Sequence[str]) -> str:
         """For people. unseen : ids of the faults that nothing shows; their errors are told apart."""
@@ -113,7 +122,7 @@ class Summary:
 
 
 def unseen_ids(cases: Sequence[Case]) -> list[str]:
-    return [case.id for case in cases if case.way is Way.UNSEEN and case.at_least_um]
+    return [case.id for case in cases if case.unseen]
 
 
 def _or_zero(number: float) -> float:

@@ -19,7 +19,7 @@ from compd.files.file_kind import FileKind
 FILE_NAME = "machine-zero.json"
 # The machine zero before the present one, as its file was.
 OLD_FILE_NAME = "machine-zero.json.old"
-# Format 1, of releases before 0.6, has no checksum; neither 1 nor 2 has quantities and ports.
+# Format 1, of releases up to 0.2, has no checksum; neither 1 nor 2 has quantities and ports.
 _FORMAT = 3
 _LARGEST_FILE_BYTES = 1_000_000
 _TAKE_ONE = "bring the machine to its zero position and run `compd zero`"
@@ -60,7 +60,7 @@ class MachineZero:
     taken_at : UTC, ISO 8601, for people.
     readings_mm : by "gauge.channel", as read: before any sign.
     quantities : temperatures, forces and so on by name, in their own units, from which effects count; of a zero of
-        release 0.5 or before, and of one that was taken without the gauge, it is not there.
+        a release up to 0.2, and of one that was taken without the gauge, it is not there.
     ports : lasting names of the ports where they were read, by gauge; only in the file, not in recordings.
     """
 

@@ -140,13 +140,15 @@ class Simulation:
     # --- requests on the control socket ---------------------------------------------------------------
 
     def truth(self) -> Answer:
-        """True tip and state of motion: the TRUTH message."""
+        """True tip and state of motion: the TRUTH message. monotonic_s : as in MEASURED, of all the others."""
         with self._live.now() as world:
+            monotonic_s = self._clock.monotonic()
             state = world.look()
             tip_mm = state.tip_M if world.tip_frame == "M" else state.tip_P
             return {
                 "class": "TRUTH",
                 "time_s": round(world.time_s, 6),
+                "monotonic_s": monotonic_s,
                 "weather_time_s": round(world.weather_time_s, 6),
                 "mode": world.mode,
                 "phase": world.phase,

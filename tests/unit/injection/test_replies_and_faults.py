@@ -8,9 +8,23 @@ import struct
 import numpy as np
 import pytest
 
-from tests.injection.faults import Exchange, Fault, Lost, Off, OneDigit, OneReplyLate, Shows, Stuck, Together
+from tests.injection.faults import (
+    Exchange,
+    Fault,
+    Late,
+    Lost,
+    Off,
+    OneDigit,
+    OneReplyLate,
+    Sent,
+    Shorter,
+    Shows,
+    Stuck,
+)
+from tests.injection.line_faults import FaultOfLine, sent_through
 from tests.injection.replies import Display, HeadsUnit, Protocol, Registers, crc16
 from tests.injection.rig import Verdict
+from tests.injection.signal_faults import Coarse, Hum, Noisy, Scaled, Steps
 from tests.support.watching import Seen
 
 FLOATS = [
@@ -80,13 +94,54 @@ def test_what_is_stuck_shows_its_first_number_and_what_is_behind_the_one_before(
     assert [sent(behind, line) for line in (DISPLAY, other)] == [[], [DISPLAY[2]]]
 
 
-def test_a_register_may_hold_nan_and_faults_come_together() -> None:
-    fault = Together((Shows(("u1",), math.nan), Off(("room",), by=1.0)))
-    (changed,) = sent(fault, TCP)
+def test_a_register_may_hold_nan() -> None:
+    (changed,) = sent(Shows(("u1",), math.nan), TCP)
     values = TCP[0].values(TCP[1], changed)
     assert math.isnan(values["u1"])
-    assert values["room"] == pytest.approx(21.15)
+    assert values["room"] == pytest.approx(20.15)
     assert sent(Lost(count=1), TCP) == []
+
+
+def through(faults: list[Fault], line: tuple[Protocol, bytes, bytes]) -> list[Sent]:
+    protocol, request, reply = line
+    return sent_through([FaultOfLine(fault, 10.0) for fault in faults], Exchange(protocol, request, reply), 12.0)
+
+
+def test_faults_of_one_line_come_together_and_numbers_are_changed_before_bytes() -> None:
+    drift, jump = Off(("position",), drift_per_s=0.01), Off(("position",), by=1.0)
+    short, late, later = Shorter(), Late(0.2), Late(0.1)
+    (sent,) = through([short, late, drift, later, jump], DISPLAY)
+    assert sent == Sent(b"-    0.2145    \r", delay_s=pytest.approx(0.3))
+    assert through([jump, Lost(count=1), drift], DISPLAY) == []
+    assert through([], DISPLAY) == [Sent(DISPLAY[2])]
+
+
+@pytest.mark.parametrize(
+    ("fault", "shown_mm"),
+    [
+        (Scaled(("position",), -1.0), 1.2345),
+        (Scaled(("position",), 1 / 25.4), -0.0486),
+        (Scaled(("position",), per_s=0.05), -1.3580),
+        (Steps(("position",), 0.02, every_s=0.75, count=10), -1.1745),
+        (Steps(("position",), 0.02, every_s=0.75, count=2), -1.1945),
+        (Hum(("position",), 0.02, hz=0.125), -1.2145),
+        (Coarse(("position",), 0.01), -1.23),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_what_becomes_of_a_signal_after_two_seconds(fault: Fault, shown_mm: float) -> None:
+    (reply,) = through([fault], DISPLAY)
+    assert DISPLAY[0].values(DISPLAY[1], reply.data) == {"position": pytest.approx(shown_mm, abs=1e-4)}
+
+
+def test_noise_has_its_deviation_and_follows_from_the_seed() -> None:
+    def shown(seed: int) -> list[float]:
+        fault = Noisy(("position",), 0.005, seed)
+        return [DISPLAY[0].values(b"", sent(fault, DISPLAY)[0])["position"] for _ in range(400)]
+
+    assert shown(1) == shown(1) != shown(2)
+    assert np.std(shown(1)) == pytest.approx(0.005, rel=0.1)
+    assert np.mean(shown(1)) == pytest.approx(-1.2345, abs=0.001)
 
 
 @pytest.mark.parametrize("wrong", [[1.0, 2.0, 3.5], [1.0, 2.0, math.nan]])

@@ -112,6 +112,7 @@ def test_every_gauge_shows_the_world_through_its_own_protocol(start: Callable[[P
     truth = ask(running.control, {"class": "TRUTH"})
     assert truth["scale_mm"] == [7.0] * links
     assert not truth["moving"]
+    assert truth["monotonic_s"] == running.clock.monotonic()
     world, wiring = running.simulation.world, running.configuration.wiring
     read = {gauge: running.read(gauge) for gauge in running.configuration.gauges}
     assert all(reading.ok for channels in read.values() for reading in channels.values())

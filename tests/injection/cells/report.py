@@ -1,0 +1,50 @@
+"""The results for people: how many cells of each situation are right, and each that is not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from tests.injection.cells.situation import Situation
+
+Result = dict[str, Any]
+
+
+def report(results: Sequence[Result]) -> str:
+    """Tables of these results."""
+    return "\n".join([*_by_situation(results), "", *_unseen(results), "", *_wrong(results)])
+
+
+def _by_situation(results: Sequence[Result]) -> Iterator[str]:
+    yield f"{'':14} {'cells':>6} {'right':>6} {'wrong':>6} {'unseen':>7} {'s a cell':>9}"
+    kinds = {situation.value: [r for r in results if _single(r, situation)] for situation in Situation}
+    kinds["pairs"] = [result for result in results if len(result["faults"]) > 1]
+    for kind, found in kinds.items():
+        if found:
+            wrong = sum(bool(result["problems"]) for result in found)
+            unseen = sum(result["unseen"] for result in found)
+            seconds = sum(result["seconds"] for result in found) / len(found)
+            yield f"{kind:14} {len(found):6} {len(found) - wrong:6} {wrong:6} {unseen:7} {seconds:9.1f}"
+
+
+def _single(result: Result, situation: Situation) -> bool:
+    return len(result["faults"]) < 2 and result["situation"] == situation.name.lower()
+
+
+def _unseen(results: Sequence[Result]) -> Iterator[str]:
+    yield f"{'what nothing shows, or not at once':52} {'worst error':>14} {'its bound':>14}"
+    for result in results:
+        if result["unseen"]:
+            yield f"{result['cell']:52} {_um(result['worst_um'])} {_um(result['worst_bound_um'])}"
+
+
+def _wrong(results: Sequence[Result]) -> Iterator[str]:
+    yield f"{'what is wrong':52} {'worst error':>14} {'its bound':>14}"
+    for result in sorted(results, key=lambda result: -(result["worst_um"] or 0.0)):
+        if result["problems"]:
+            yield f"{result['cell']:52} {_um(result['worst_um'])} {_um(result['worst_bound_um'])}"
+            yield from (f"    {problem}" for problem in result["problems"])
+
+
+def _um(value: float | None) -> str:
+    return f"{'-':>14}" if value is None else f"{value:11.2f} um"
