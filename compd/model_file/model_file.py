@@ -17,8 +17,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect, FittedEffect
-from compd.model.effect_needs import needed_quantities
-from compd.model.effect_needs import is_measured
+from compd.model.effect_needs import is_measured, needed_quantities
 from compd.model.library import find_effect
 from compd.model_file.model_document import (
     Declaration,

@@ -28,6 +28,7 @@ from compd.live.loop.reasons import shortened
 from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
+from compd.live.loop.stale_policy import UsableComparators
 from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_bound import refused_bound, tip_bound, with_place
 from compd.live.loop.tip_uncertainty import TipUncertainty, tip_uncertainty

@@ -62,7 +62,7 @@ class TrustMemory:
     value, time_s : the last reading that was believed, and its monotonic time, s; nan before the first.
     shown, shown_s : the last value that the gauge gave, believed or not, and its time, s; nan before the first.
     tolerance_mm : by which a reading may differ from another one of the same value; of a quantity in its unit.
-    witness : (lengths, lengths), row i: the values of all lengths at the last reading of length i that was believed, mm.
+    witness : (lengths, lengths), row i: the values of all lengths at the last believed reading of length i, mm.
     lost_s : monotonic time at which the channel was lost, s.
     power_lost : 1 where the gauge itself may have been without power since its last reading.
     doubt : a `Doubt`. amount : what it says of it.
