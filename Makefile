@@ -2,11 +2,13 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-STAMP  := $(VENV)/.installed
+INSTALLED := $(VENV)/.installed
+# with the kernels compiled
+STAMP  := $(VENV)/.compiled
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
+.PHONY: help gallery docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -31,13 +33,16 @@ help:
 	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench, faults, three hours of soak, the scoreboard"
 	@echo "tests/README.md says what each takes and what .ci/run runs"
 
-$(STAMP): pyproject.toml
+$(INSTALLED): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "compd needs Python >= 3.11; this is $$($(PYTHON) --version). Try: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || \
 	  { echo "Python cannot make a virtual environment; on Debian and Ubuntu: apt-get install python3-venv"; exit 1; }
 	@echo "Installing compd and what it needs into $(VENV) (a minute or two, once) ..."
 	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+$(STAMP): $(INSTALLED)
 	@echo "Compiling the kernels for this processor (a minute, once) ..."
 	@$(BIN)/python -c 'import compd.live.run'
 	@touch $@
@@ -124,14 +129,14 @@ hidden: $(STAMP)
 hidden-sample: $(STAMP)
 	$(PYTEST) -m sample -n 2 --dist worksteal $(HIDDEN)
 
-lint: $(STAMP)
+lint: $(INSTALLED)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
 # As git runs it before a commit, on all files.
-pre-commit: $(STAMP)
+pre-commit: $(INSTALLED)
 	$(BIN)/pre-commit run --all-files --show-diff-on-failure
 
 wheel: $(STAMP) docs
@@ -193,8 +198,10 @@ $(EXAMPLE): $(shell find compd config docs/worked_example -name '*.py' -o -name 
 	$(BIN)/python -m docs.worked_example
 	@touch $@
 
+gallery: $(GALLERY) $(EXAMPLE)
+
 # Begun afresh, so that the wheel has no page of yesterday.
-docs: $(STAMP) $(GALLERY) $(EXAMPLE)
+docs: gallery
 	rm -rf docs/_build/html
 	$(BIN)/python -m docs.generate
 	$(BIN)/sphinx-build --builder html --fail-on-warning --keep-going --quiet \

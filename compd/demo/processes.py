@@ -35,7 +35,7 @@ def run_commands(commands: Sequence[Command], log: Path) -> Iterator[None]:
         with log.open("wb") as output:
             for command in commands:
                 process = subprocess.Popen(
-                    [sys.executable, "-m", "compd", *command.arguments],
+                    [sys.executable, "-P", "-m", "compd", *command.arguments],
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=output,

@@ -6,13 +6,17 @@ import errno
 import fcntl
 import os
 import secrets
+import socket
 import stat
+import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import BinaryIO, TypeAlias
 
 # What a file is to hold: text (as UTF-8), bytes, or, where it is long, a function that writes it.
 Content: TypeAlias = str | bytes | Callable[[BinaryIO], None]
+# struct linger of socket(7): off.
+_NO_LINGER = struct.pack("2i", 0, 0)
 
 
 def write_files(contents: Mapping[Path, Content], mode: int | None = None) -> None:
@@ -108,8 +112,17 @@ def read_descriptor(descriptor: int, limit_bytes: int) -> bytes:
         while piece := os.pread(descriptor, status.st_size - len(content), len(content)):
             content += piece
     finally:
-        os.close(descriptor)
+        close_descriptor(descriptor)
     return bytes(content)
+
+
+def close_descriptor(descriptor: int) -> None:
+    """Close what somebody else has opened; a socket does not linger until what was sent has arrived. Raises OSError."""
+    if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
+        with socket.socket(fileno=descriptor) as other:
+            other.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
+    else:
+        os.close(descriptor)
 
 
 def _require_regular(mode: int) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -55,37 +57,37 @@ def read_workbook(path: Path, options: ReadOptions) -> RawTable:
 
 def sheet_names(path: Path, limits: ReadLimits) -> tuple[str, ...]:
     """The names of a workbook's sheets, in their order. Raises RecordingError for what is no .xlsx."""
-    from openpyxl import load_workbook
-
     check_workbook_file(path, limits)
     try:
-        book = load_workbook(path, read_only=True)
+        with _opened(path) as book:
+            return tuple(sheet.title for sheet in book.worksheets)
     except BROKEN as error:
         raise RecordingError(unreadable(path, why_broken(error))) from error
-    try:
-        return tuple(sheet.title for sheet in book.worksheets)
-    finally:
-        book.close()
+
+
+@contextmanager
+def _opened(path: Path, values: bool = True) -> Iterator[Workbook]:
+    """The workbook, whatever its file is named. values : of the formulas, in place of their text."""
+    from openpyxl import load_workbook
+
+    with path.open("rb") as file:  # of a path the library judges the ending
+        book = load_workbook(file, read_only=True, data_only=values)
+        try:
+            yield book
+        finally:
+            book.close()
 
 
 def _read(path: Path, options: ReadOptions) -> RawTable:
-    from openpyxl import load_workbook
-
-    book = load_workbook(path, read_only=True, data_only=True)
-    try:
+    with _opened(path) as book:
         sheet = _choose_sheet(path, book, options.sheet)
         part = read_sheet_part(path, cast(Any, sheet)._worksheet_path)
         reader = SheetReader(path, sheet.title)
         rows = reader.read(sheet)
         count = len(book.worksheets)
-    finally:
-        book.close()
     if part.has_formulas:
-        book = load_workbook(path, read_only=True, data_only=False)
-        try:
+        with _opened(path, values=False) as book:
             reader.mark_formulas_without_value(book[sheet.title], rows)
-        finally:
-            book.close()
     table = find_table(reader.place, rows)
     problems = [*_merged(reader.place, part, table), *reader.wrong_cells(table.rows, options.decimal)]
     if problems:

@@ -87,6 +87,7 @@ class Recordings:
         words = self.command(name, burst_s)
         process = await asyncio.create_subprocess_exec(
             sys.executable,
+            "-P",  # nothing is imported from the working directory
             "-m",
             *words,
             stdin=asyncio.subprocess.DEVNULL,

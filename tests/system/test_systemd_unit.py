@@ -107,8 +107,8 @@ def test_the_page_comes_after_the_daemon_in_everything():
     page = settings_of(PAGE)
     assert int(page["Nice"]) > 0
     assert int(page["CPUWeight"]) < 100, "systemd's default, the daemon's"
-    assert page["MemoryMax"] != "infinity"
-    assert int(page["TasksMax"]) > 0
+    assert (page["MemoryMax"], page["TasksMax"]) == ("4G", "256"), "see docs/explanation/security.md"
+    assert page["OOMPolicy"] == "continue", "a worker that takes more memory ends alone"
     assert "compd.service" in page["After"]
     assert "Requires" not in page, "the page starts and stops alone"
     assert "compd-page" not in UNIT.read_text(), "and so does the daemon"

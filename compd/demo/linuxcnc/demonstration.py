@@ -230,7 +230,9 @@ def add_effects(effects: Sequence[str], recording: Path, machine: Path, model: P
 
 def _compd(*arguments: str) -> str:
     """A command of compd as a person enters it: what it prints. Raises CompdError with its message."""
-    result = subprocess.run([sys.executable, "-m", "compd", *arguments], capture_output=True, text=True, check=False)
+    result = subprocess.run(
+        [sys.executable, "-P", "-m", "compd", *arguments], capture_output=True, text=True, check=False
+    )
     if result.returncode:
         raise CompdError(
             Problem(

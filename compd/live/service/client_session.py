@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import socket
 import struct
 from collections import deque
@@ -23,8 +25,9 @@ _LAST_RECEIVE_BYTES = 64 * 1024
 _LONGEST_INTERVAL_S = 1e6
 # struct ucred of unix(7): process, user, group.
 _CREDENTIALS = struct.Struct("3i")
-# Of SCM_RIGHTS.
+# Of SCM_RIGHTS, and how many may come at once: SCM_MAX_FD of unix(7).
 _DESCRIPTOR = struct.Struct("i")
+_MOST_DESCRIPTORS = 253
 
 
 class Stream(Enum):
@@ -181,17 +184,30 @@ class ClientSession:
                 self._lines.append(_ReceivedLine(_too_long(), None, now_s))
 
     def _receive_bytes(self) -> tuple[bytes, int | None]:
-        """What has arrived, and the descriptor among it; TCP carries none. Of several the system closes the others."""
-        if not self.local or self._unwanted.is_full:
+        """What has arrived, and the first descriptor among it; TCP carries none.
+
+        Every one is taken: what is left the system closes, in this thread, which may wait for it. Raises
+        BlockingIOError where one comes before those that came have been closed, and OSError where these hang.
+        """
+        if not self.local:
             return self.connection.recv(_RECEIVE_BYTES), None
+        if self._unwanted.is_full:
+            _, _, flags, _ = self.connection.recvmsg(_RECEIVE_BYTES, 0, socket.MSG_PEEK)
+            if flags & socket.MSG_CTRUNC:
+                raise (OSError if self._unwanted.hangs else BlockingIOError)(errno.EMFILE, os.strerror(errno.EMFILE))
         # socket.recv_fds of Python 3.11 leaves the flags out
         data, control, _, _ = self.connection.recvmsg(
-            _RECEIVE_BYTES, socket.CMSG_LEN(_DESCRIPTOR.size), socket.MSG_CMSG_CLOEXEC
+            _RECEIVE_BYTES, socket.CMSG_LEN(_MOST_DESCRIPTORS * _DESCRIPTOR.size), socket.MSG_CMSG_CLOEXEC
         )
-        for level, kind, content in control:
-            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS) and len(content) >= _DESCRIPTOR.size:
-                return data, _DESCRIPTOR.unpack_from(content)[0]
-        return data, None
+        received = [
+            descriptor
+            for level, kind, content in control
+            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS)
+            for (descriptor,) in _DESCRIPTOR.iter_unpack(content[: len(content) // _DESCRIPTOR.size * _DESCRIPTOR.size])
+        ]
+        for descriptor in received[1:]:
+            self._unwanted.put(descriptor)
+        return data, received[0] if received else None
 
     def _add_line(self, line: bytes, descriptor: int | None, now_s: float) -> None:
         if self._skipping_line:
@@ -299,6 +315,9 @@ class ClientSession:
         self._lines.clear()
         self._unwant(self._descriptor)
         self._descriptor = None
+        if self.local:  # with descriptors among what nobody has read, it may wait
+            self._unwanted.put(self.connection.detach())
+            return
         with suppress(OSError):  # with data that nobody has read the system would reset it, and the last line be lost
             self.connection.recv(_LAST_RECEIVE_BYTES)
         self.connection.close()

@@ -1,14 +1,19 @@
-"""Closing the descriptors that clients sent and nobody wants: to close one may wait for a file system that hangs."""
+"""Closing the descriptors that clients sent and nobody wants: to close one may wait, for a file system or a socket."""
 
 from __future__ import annotations
 
-import os
+import math
 import queue
 import threading
+import time
 from contextlib import suppress
+
+from compd.files.atomic_files import close_descriptor
 
 # Descriptors that wait to be closed. With more the one before them hangs, and no further ones are taken.
 MOST_WAITING = 64
+# Closing takes microseconds where nothing hangs, s.
+_HANGS_AFTER_S = 1.0
 
 
 class DescriptorBin:
@@ -17,11 +22,17 @@ class DescriptorBin:
     def __init__(self) -> None:
         self._waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
+        self._begun_s = math.inf
 
     @property
     def is_full(self) -> bool:
         """Whether no further descriptors should be taken from clients: those before them cannot be closed."""
         return self._waiting.qsize() >= MOST_WAITING
+
+    @property
+    def hangs(self) -> bool:
+        """Whether one has been waited for since long."""
+        return time.monotonic() - self._begun_s > _HANGS_AFTER_S
 
     def put(self, descriptor: int) -> None:
         """Close it soon."""
@@ -32,5 +43,8 @@ class DescriptorBin:
 
     def _close_all(self) -> None:
         while True:
+            descriptor = self._waiting.get()
+            self._begun_s = time.monotonic()
             with suppress(OSError):  # what the file system says at the end is nobody's concern here
-                os.close(self._waiting.get())
+                close_descriptor(descriptor)
+            self._begun_s = math.inf

@@ -120,7 +120,7 @@ class Exports:
         """Number of bytes that are in the new file now."""
         kept = self._kept_before()
         if kept.files + len(self._arriving) >= MOST_FILES:
-            raise _full(kept)
+            raise _full(kept.files + len(self._arriving), kept.bytes + sum(self._arriving.values()))
         self._arriving[temporary] = 0
         with os.fdopen(os.open(temporary, _NEW_FILE, _MODE, dir_fd=directory), "wb") as file:
             os.fchmod(file.fileno(), _MODE)  # whatever the umask is
@@ -130,12 +130,16 @@ class Exports:
                     raise _refused("export", "is too large", allowed=f"{MOST_BYTES >> 20} MB", next_step="split it")
                 self._arriving[temporary] = count
                 # one that came meanwhile is in the directory and no longer arriving: looked up again near the end
-                if kept.bytes + sum(self._arriving.values()) > MOST_BYTES_OF_ALL:
-                    raise _full(kept)
-                file.write(piece)
-        if self._kept_before().bytes + sum(self._arriving.values()) > MOST_BYTES_OF_ALL:
-            raise _full(self._kept_before())
+                self._require_room(kept)
+                await asyncio.to_thread(file.write, piece)  # the disk may be behind
+        self._require_room(self._kept_before())
         return self._arriving[temporary]
+
+    def _require_room(self, kept: Usage) -> None:
+        """Raises RecordingError where what is kept and what is arriving are more than may be."""
+        total = kept.bytes + sum(self._arriving.values())
+        if total > MOST_BYTES_OF_ALL:
+            raise _full(kept.files + len(self._arriving), total)
 
     def _kept_before(self) -> Usage:
         """What the directory holds beside what is just arriving."""
@@ -208,11 +212,12 @@ def _removed(directory: int, name: str) -> None:
         return
 
 
-def _full(kept: Usage) -> RecordingError:
+def _full(files: int, total: int) -> RecordingError:
+    """files, total : of all that are there and just being brought, and their bytes."""
     return _refused(
         "exports",
         "has no room for another file",
-        f"{kept.files} files with {kept.bytes / 2**20:.1f} MB",
+        f"{files} files with {total / 2**20:.1f} MB, those that are being brought among them",
         f"{MOST_FILES} files with {MOST_BYTES_OF_ALL >> 20} MB",
         "delete exports that are not needed any more",
     )

@@ -43,6 +43,17 @@ class OpenWorkbench:
         """Files of effects that were chosen."""
         return [] if self.worker.kept is None else list(self.worker.kept["libraries"])
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether somebody waits for it."""
+        runs = self.diagnosis is not None and not self.diagnosis.has_ended
+        return runs or self.worker.questions + self.planner.questions > 0
+
+    def rest(self) -> None:
+        """End its processes, unless they work on a question; it waits for their end."""
+        self.worker.rest()
+        self.planner.rest()
+
     async def ask(self, question: str, *given: Any, seconds: float = ANSWER_S) -> bytes:
         """The answer of the workbench. question : a method of `Workbench`, or the full name of a function.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -22,10 +23,13 @@ from compd.page.workbench.handlers import HANDLERS, Handler, plain
 from compd.page.workbench.open_workbench import OpenWorkbench
 from compd.page.workbench.plan_handlers import PLAN_HANDLERS
 from compd.page.workers.answering import CLIENT_GONE, BrowserGone
+from compd.page.workers.limits import too_many
 from compd.page.workers.workers import Workers
 
 # A model file that the page may begin.
 MODEL_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\.model\.yaml")
+# What is open takes memory, and is named by whoever opens it.
+MOST_OPEN = 32
 _NOT_OPEN = "it is not open any more: open it again"
 
 _BASE = "/workbench/{recording}/{model}"
@@ -105,6 +109,7 @@ class WorkbenchRoutes:
         """
         workbench = self._open.get(key)
         if workbench is None:
+            await self._make_room()
             workbench = OpenWorkbench(self._workers, self._diagnoses, path, model_path, self._machine)
             self._open[key] = workbench
         try:
@@ -112,6 +117,17 @@ class WorkbenchRoutes:
         finally:
             if workbench.worker.kept is None:  # it could not be opened
                 self._open.pop(key, None)
+                await asyncio.to_thread(workbench.rest)
+
+    async def _make_room(self) -> None:
+        """Close what was used longest ago, where as many are open as may be. Raises StateError where all are busy."""
+        if len(self._open) < MOST_OPEN:
+            return
+        idle = [key for key, workbench in self._open.items() if not workbench.is_busy]
+        if not idle:
+            raise too_many("the workbench", MOST_OPEN)
+        oldest = self._open.pop(min(idle, key=lambda key: self._open[key].worker.used_s))
+        await asyncio.to_thread(oldest.rest)
 
     def _of_open(self, handler: Handler) -> Callable[[Request], Awaitable[Response]]:
         """The handler with the workbench that the address names."""

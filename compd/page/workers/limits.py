@@ -46,7 +46,14 @@ def cancelled(where: str) -> StateError:
 
 
 def too_many(where: str, most: int) -> StateError:
-    """Where every process that may run is busy."""
+    """Where everything that may run, or be open, is busy."""
     what = "the page computes as much as it may already"
     step = "wait until something has ended, or cancel it where it was begun"
-    return StateError(Problem(where=where, what=what, allowed=f"{most} processes at once", next_step=step))
+    return StateError(Problem(where=where, what=what, allowed=f"{most} at once", next_step=step))
+
+
+def none_left(where: str) -> StateError:
+    """Where the system lets the page start no further thread or process."""
+    what = "the system lets the page start no further process"
+    step = "wait until something has ended; in systemd, see `TasksMax` and `MemoryMax` of the page's unit"
+    return StateError(Problem(where=where, what=what, next_step=step))

@@ -87,11 +87,15 @@ class Worker:
         self._workers.prepare()
         asked = Asked(question, given, seconds, progress)
         with self._changed:
+            if self._thread is None:
+                thread = threading.Thread(target=self._answer_all, name=f"worker {self.name}", daemon=True)
+                try:
+                    thread.start()
+                except RuntimeError as error:
+                    raise limited.none_left(self.name) from error
+                self._thread = thread
             self._waiting.append(asked)
             self._changed.notify_all()
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._answer_all, name=f"worker {self.name}", daemon=True)
-                self._thread.start()
         return asked
 
     def cancel(self, asked: Asked) -> None:
@@ -113,18 +117,20 @@ class Worker:
     def rest(self) -> bool:
         """End the process unless it works on a question; whether there is none now."""
         with self._changed:
-            if self._current is None and self._process is not None:
-                self._end_process(self._process)
-            return self._process is None
+            if self._current is not None:
+                return False
+            process = self._detached()
+        _wait_for_end(process)
+        return True
 
     def _answer_all(self) -> None:
-        """In the worker's own thread: until nothing was asked for a while."""
+        """In the worker's own thread: as long as there is a process, and until nothing was asked of it for a while."""
         while (asked := self._next()) is not None:
             # a question that was cancelled while it waited is not begun
             if asked.answer.set_running_or_notify_cancel():
                 try:
                     answer = self._answer(asked)
-                except (CompdError, KeyError, IndexError, OSError, RuntimeError) as error:
+                except Exception as error:  # noqa: BLE001  whoever waits hears of it
                     asked.answer.set_exception(error)
                 else:
                     asked.answer.set_result(answer)
@@ -133,12 +139,14 @@ class Worker:
         with self._changed:
             self._current = None
             self.used_s = time.monotonic()
-            if not self._changed.wait_for(lambda: self._waiting, timeout=self._limits.idle_s):
-                self.rest()
-                self._thread = None
-                return None
-            self._current = self._waiting.popleft()
-            return self._current
+            self._changed.wait_for(lambda: self._waiting or self._process is None, timeout=self._limits.idle_s)
+            if self._waiting:
+                self._current = self._waiting.popleft()
+                return self._current
+            process = self._detached()
+            self._thread = None
+        _wait_for_end(process)
+        return None
 
     def _answer(self, asked: Asked) -> bytes:
         messages, is_new = self._started(asked)
@@ -173,32 +181,46 @@ class Worker:
     def _ended(self, error: CompdError) -> CompdError:
         """`error`, with the process ended."""
         with self._changed:
-            if self._process is not None:
-                self._end_process(self._process)
+            process = self._detached()
+        _wait_for_end(process)
         return error
 
     def _started(self, asked: Asked) -> tuple[Connection, bool]:
-        """The connection to the process, and whether it is a new one. Raises StateError where too many run."""
+        """The connection to the process, and whether it is a new one. Raises StateError where none can be started."""
         with self._changed:
             if self._process is not None and not self._process.is_alive():
-                self._end_process(self._process)
+                self._detached()
             if self._messages is not None:
                 return self._messages, False
-        self._workers.make_room(self)
         arguments = (self._opening, self._arguments, self.kept, self._limits.memory_mb)
-        process, messages = self._workers.start(arguments)
-        with self._changed:
-            self._process, self._messages = process, messages
-            if asked.is_cancelled:
-                process.kill()
+        with self._workers.starting:
+            self._workers.make_room(self)
+            try:
+                process, messages = self._workers.start(arguments)
+            except (OSError, EOFError) as error:  # the process that they are forked from has ended, or cannot fork
+                raise limited.none_left(self.name) from error
+            with self._changed:
+                self._process, self._messages = process, messages
+                if asked.is_cancelled:
+                    process.kill()
         return messages, True
 
-    def _end_process(self, process: ForkServerProcess) -> None:
-        process.kill()
-        process.join()
-        if self._messages is not None:
-            self._messages.close()
+    def _detached(self) -> ForkServerProcess | None:
+        """The process, which is being killed and is not the worker's any more; with `_changed` held."""
+        process, messages = self._process, self._messages
         self._process = self._messages = None
+        if process is not None:
+            process.kill()
+        if messages is not None:
+            messages.close()
+        self._changed.notify_all()
+        return process
+
+
+def _wait_for_end(process: ForkServerProcess | None) -> None:
+    """Until its memory has returned; without any lock, as the system may take its time."""
+    if process is not None:
+        process.join(_ENDS_WITHIN_S)
 
 
 def _reply(messages: Connection, asked: Asked, allowed_s: float) -> tuple[str, Any, Any]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
@@ -32,7 +34,12 @@ _STARTER = ThreadPoolExecutor(1, "workers")
 
 
 class Workers:
-    """Those that there are."""
+    """Those that there are.
+
+    Attributes
+    ----------
+    starting : held by the worker's thread that makes room and starts a process; the first waits for what is imported.
+    """
 
     def __init__(self, most: int = MOST_PROCESSES) -> None:
         """most : processes at once."""
@@ -40,14 +47,16 @@ class Workers:
         self._most = most
         self._workers: WeakSet[Worker] = WeakSet()
         self._lock = threading.Lock()
-        self._starting = threading.Lock()  # the first start waits for what is imported
+        self.starting = threading.Lock()
 
     def prepare(self) -> None:
         """Start the process that workers are forked from, unless it runs. It imports what they need, which takes
         seconds; this does not wait for it. Whoever only looks at the machine needs none."""
-        _STARTER.submit(self._ensure_running).result()
+        with suppress(OSError):  # the start of a worker says it
+            _STARTER.submit(self._ensure_running).result()
 
     def _ensure_running(self) -> None:
+        os.environ["PYTHONSAFEPATH"] = "1"  # nothing is imported from the working directory
         self._context.set_forkserver_preload(PRELOADED)
         forkserver.ensure_running()
 
@@ -61,23 +70,31 @@ class Workers:
     def make_room(self, wanting: Worker) -> None:
         """End the idle process that was used longest ago where as many run as may. Raises StateError if all work."""
         with self._lock:
-            running = [worker for worker in self._workers if worker.pid is not None and worker is not wanting]
-            excess = len(running) + 1 - self._most
-            for worker in sorted(running, key=lambda worker: worker.used_s):
-                if excess <= 0:
-                    return
-                excess -= worker.rest()
-            if excess > 0:
-                raise too_many(wanting.name, self._most)
+            workers = list(self._workers)
+        running = [worker for worker in workers if worker.pid is not None and worker is not wanting]
+        excess = len(running) + 1 - self._most
+        for worker in sorted(running, key=lambda worker: worker.used_s):
+            if excess <= 0:
+                return
+            excess -= worker.rest()
+        if excess > 0:
+            raise too_many(wanting.name, self._most)
 
     def start(self, arguments: tuple[Any, ...]) -> tuple[ForkServerProcess, Connection]:
-        """A new process and the connection to it. arguments : of `serve`, after the connection."""
-        with self._starting:
-            ours, theirs = self._context.Pipe()
+        """A new process and the connection to it. arguments : of `serve`, after the connection.
+
+        Raises OSError or EOFError where the system lets none be started.
+        """
+        ours, theirs = self._context.Pipe()
+        try:
             process = self._context.Process(target=serve, args=(theirs, *arguments), daemon=True)
             process.start()
+        except BaseException:
+            ours.close()
+            raise
+        finally:
             theirs.close()
-            return process, ours
+        return process, ours
 
     def end(self) -> None:
         """End every process."""

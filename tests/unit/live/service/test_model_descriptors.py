@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import socket
+import struct
 import threading
 from pathlib import Path
 
@@ -117,6 +119,8 @@ def test_ten_thousand_lines_with_descriptors_leave_none_open(pair, file):
             case 4:
                 pair.send(b"two\nlines\n", file)
         while True:
+            while pair.bin.is_full:
+                pass
             pair.session.receive(0.0)
             if not pair.session.has_lines:
                 break
@@ -150,16 +154,54 @@ def test_where_closing_hangs_no_more_descriptors_are_taken(pair, file, monkeypat
     """A file system in user space may let whoever closes a file wait for ever."""
     go_on = threading.Event()
     real_close = os.close
-    monkeypatch.setattr(descriptor_bin.os, "close", lambda descriptor: (go_on.wait(), real_close(descriptor)))
+    monkeypatch.setattr(os, "close", lambda descriptor: (go_on.wait(), real_close(descriptor)))
     for _ in range(descriptor_bin.MOST_WAITING + 1):
         pair.bin.put(os.dup(file))
     while not pair.bin.is_full:
         pair.bin.put(os.dup(file))
     before = open_descriptors()
+    pair.send(b"a\n")
+    assert pair.lines() == [(b"a", False)], "a line without one is heard"
     pair.send(b"a\n", file)
-    assert pair.lines() == [(b"a", False)]
+    while pair.session.open:
+        assert pair.lines() == []
     assert open_descriptors() == before
     go_on.set()
+
+
+@pytest.fixture
+def lingering():
+    """Give away a TCP connection whose closing waits for 30 s: what was sent has not been read at its other end."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        sender = socket.create_connection(server.getsockname())
+        reader, _ = server.accept()
+        sender.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("2i", 1, 30))
+        sender.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                sender.send(b"x" * 65536)
+        with reader:
+            yield sender.detach()
+
+
+@pytest.mark.timeout(15)
+@pytest.mark.parametrize("comes", ["first", "second", "when the client goes", "as a model"])
+def test_a_connection_that_lingers_is_waited_for_by_nobody(pair, switch, file, lingering, comes):
+    if comes == "as a model":
+        switch.start(ModelWish("m.yaml"), lingering)
+        assert "not a regular file" in switch.read()
+        return
+    null = os.open(os.devnull, os.O_RDONLY)
+    pair.send(b'{"class":"VERSION"}\n', *((lingering, null) if comes == "first" else (null, lingering)))
+    os.close(lingering)
+    os.close(null)
+    if comes != "when the client goes":
+        pair.session.receive(0.0)
+        assert pair.session.next_line() == b'{"class":"VERSION"}'
+        pair.session.end_line()
+    pair.close()
+    while not pair.bin._waiting.empty():
+        pass
 
 
 class Switch:

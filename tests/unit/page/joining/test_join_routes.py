@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shlex
 from pathlib import Path
 from urllib.parse import quote
 
+import openpyxl
 import pytest
 from starlette.testclient import TestClient
 
@@ -91,6 +93,22 @@ def test_what_cannot_be_read_is_shown_with_the_reason(client, recordings):
     assert refused.status_code == 409
     for name in ("two-units.csv", "broken.csv", "binary.bin"):
         (recordings / "exports" / name).unlink()
+
+
+@pytest.mark.parametrize("name", ["honest.xlsx", "HONEST.XLSM"])
+def test_a_workbook_that_a_browser_brings_is_read(client, recordings, name):
+    """The library that reads it judges a path by its ending, and the page keeps none."""
+    book = openpyxl.Workbook()
+    book.active.append(["x [mm]", "y [mm]", "z [mm]"])
+    for k in range(5):
+        book.active.append([1.5 * k, 2.5, 3.5 + k])
+    file = io.BytesIO()
+    book.save(file)
+    brought = client.post("/join/exports", params={"name": name}, content=file.getvalue()).json()["name"]
+    answer = client.post("/join/table", json={"export": brought}).json()
+    assert answer["problems"] == []
+    assert (answer["roles"], len(answer["rows"])) == (["x", "y", "z"], 5)
+    assert client.delete(f"/join/exports/{brought}").status_code == 200
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Guard, Token, hashed
 from compd.page.recordings import Recordings
 from compd.page.server import Server
+from compd.page.workbench import routes
 from tests.support.measured import gauges, hidden, record
 from tests.support.sampled import sampled
 
@@ -48,6 +50,33 @@ def client_of(directory, tmp_path):
 
 def post(client, path, keys):
     return client.post(f"{BASE}/{path}", content=json.dumps(keys), headers=OWN)
+
+
+def workbench_threads():
+    return [thread for thread in threading.enumerate() if thread.name.startswith("worker workbench")]
+
+
+def test_what_cannot_be_opened_leaves_nothing_behind(client_of, directory):
+    client = client_of("view")
+    (directory / "plan.csv").write_text("u_1_mm\n1\n")
+    before = workbench_threads()
+    for k in range(3):
+        keys = {"recording": "plan", "model": f"n{k}.model.yaml"}
+        assert client.post("/workbench/open", json=keys, headers=OWN).status_code == 409
+    (directory / "plan.csv").unlink()
+    for thread in workbench_threads():
+        if thread not in before:
+            thread.join(60)
+    assert set(workbench_threads()) <= set(before)
+
+
+def test_only_so_many_are_open_and_the_oldest_makes_room(client_of, monkeypatch):
+    monkeypatch.setattr(routes, "MOST_OPEN", 2)
+    client = client_of("view")
+    for model in ("b.model.yaml", "c.model.yaml"):
+        assert client.post("/workbench/open", json={"recording": "run", "model": model}, headers=OWN).status_code == 200
+    assert client.get(f"{BASE}/effects").status_code == 404
+    assert client.get("/workbench/run/c.model.yaml/effects").status_code == 200
 
 
 def test_who_may_only_look_may_try_and_writes_nothing(client_of, tmp_path):

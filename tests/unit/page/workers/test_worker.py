@@ -6,6 +6,8 @@ import asyncio
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 from multiprocessing import forkserver
 from multiprocessing.connection import wait
@@ -17,6 +19,7 @@ from compd.errors import StateError
 from compd.page.workers.limits import WorkerLimits
 from compd.page.workers.worker_group import WorkerGroup
 from compd.page.workers.workers import Workers
+from tests.support.paths import ROOT
 
 STATES = "tests.unit.page.workers.states"
 COUNTER = f"{STATES}:Counter"
@@ -168,7 +171,7 @@ def test_only_so_many_run_and_the_one_that_was_used_longest_ago_makes_room():
                 f"{COUNTER}.tell_and_wait", seconds=PATIENCE_S, progress=lambda text, event=event: event.set()
             )
         assert all(event.wait(PATIENCE_S) for event in begun)
-        with pytest.raises(StateError, match=r"(?s)as much as it may.*2 processes at once"):
+        with pytest.raises(StateError, match=r"(?s)as much as it may.*allowed: 2 at once"):
             ask(second, "count", 1)
     finally:
         workers.end()
@@ -202,6 +205,86 @@ def test_threads_that_ask_and_end_leave_the_process_that_workers_are_forked_from
         thread.start()
         thread.join()
     assert forked_from[0] == forked_from[1]
+
+
+def threads_of(name):
+    return [thread for thread in threading.enumerate() if thread.name == f"worker {name}"]
+
+
+def test_its_thread_lives_as_long_as_its_process(workers):
+    worker = workers.worker("threaded", COUNTER, (), LIMITS)
+    ask(worker, "count", 1)
+    (thread,) = threads_of("threaded")
+    assert worker.rest()
+    thread.join(PATIENCE_S)
+    assert not thread.is_alive()
+    assert json.loads(ask(worker, "count", 1))["count"] == 2
+
+
+@pytest.mark.parametrize("error", [EOFError(), BlockingIOError(11, "Resource temporarily unavailable")])
+def test_where_no_process_can_be_forked_the_question_is_answered_with_that(workers, worker, monkeypatch, error):
+    def refuse(arguments):
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(workers, "start", refuse)
+        with pytest.raises(StateError, match="start no further process"):
+            ask(worker, "count", 1)
+    assert json.loads(ask(worker, "count", 1))["count"] == 1
+
+
+def test_where_no_thread_can_be_started_the_next_question_works(worker, monkeypatch):
+    def refuse(thread):
+        raise RuntimeError("can't start new thread")
+
+    worker._workers.prepare()
+    with monkeypatch.context() as patch:
+        patch.setattr(worker._workers, "prepare", lambda: None)
+        patch.setattr(threading.Thread, "start", refuse)
+        with pytest.raises(StateError, match="start no further process"):
+            ask(worker, "count", 1)
+    assert json.loads(ask(worker, "count", 1))["count"] == 1
+
+
+def test_whoever_wants_a_new_one_does_not_wait_for_the_end_of_another(monkeypatch):
+    """The event loop makes workers; a process in the hands of a disk that hangs takes its time to end."""
+    workers = Workers(most=1)
+    first, second = (workers.worker(f"number {k}", COUNTER, (), LIMITS) for k in range(2))
+    ending, go_on = threading.Event(), threading.Event()
+    try:
+        ask(first, "count", 1)
+        monkeypatch.setattr(process_of(first), "join", lambda timeout: (ending.set(), go_on.wait(PATIENCE_S)))
+        asked = second.submit(f"{COUNTER}.count", 1, seconds=PATIENCE_S)
+        assert ending.wait(PATIENCE_S)
+        workers.worker("number 3", COUNTER, (), LIMITS)
+        assert first.questions == 0
+        go_on.set()
+        asked.answer.result(PATIENCE_S)
+    finally:
+        go_on.set()
+        workers.end()
+
+
+def test_nothing_is_imported_from_the_working_directory(tmp_path):
+    """Somebody else may write there, as in /tmp."""
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    for name in ("selectors", "compd", "signal"):
+        (foreign / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n")
+    script = tmp_path / "own" / "page.py"
+    script.parent.mkdir()
+    script.write_text(
+        "from compd.page.workers.workers import Workers\n"
+        "if __name__ == '__main__':\n"
+        f"    worker = Workers().worker('counter', {COUNTER!r}, (), __import__('compd.page.workers.limits', "
+        "fromlist=['x']).WorkerLimits(100))\n"
+        f"    print(worker.submit('{COUNTER}.count', 1, seconds=60).answer.result())\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
+    command = [sys.executable, script]
+    done = subprocess.run(command, cwd=foreign, env=environment, capture_output=True, text=True, check=False)
+    assert '"count": 1' in done.stdout, done.stderr
+    assert not (tmp_path / "ran").exists()
 
 
 def test_at_the_end_no_process_is_left(workers):
