@@ -20,7 +20,7 @@ from compd.gauge import LineFault, Quality
 from compd.lines import open_line, open_stream
 from compd.lines.modbus_rtu import RtuMaster
 from compd.lines.port import Port, SerialPort, TcpPort
-from compd.lines.stream import FEWEST_RESTS, LATER_REST_S, MOST_DRAIN_TIMEOUTS, StreamLine
+from compd.lines.stream import FEWEST_RESTS, MOST_DRAIN_TIMEOUTS, SHORTEST_REST, StreamLine
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 
 TIMEOUT_S = 0.1
@@ -346,7 +346,7 @@ def test_tcp_refused_is_a_lost_line() -> None:
     assert caught.value.quality is Quality.LINE_LOST
 
 
-def test_the_rest_of_a_reply_is_waited_for_a_little_longer_than_it_ever_took_and_once_more_for_long() -> None:
+def test_the_rest_of_a_reply_is_waited_for_half_of_the_timeout_and_after_that_for_all_of_it() -> None:
     """A device that has become slower is not given up time and again."""
     clock = InstantClock()
     port = ScriptedPort(clock, [b"+1.234\r\n"] * FEWEST_RESTS)
@@ -354,8 +354,8 @@ def test_the_rest_of_a_reply_is_waited_for_a_little_longer_than_it_ever_took_and
     assert line.rest_timeout_s == 0.15
     for _ in range(FEWEST_RESTS):
         line.receive(8)
-    assert line.rest_timeout_s == LATER_REST_S
-    for waited_s in (LATER_REST_S, 0.15):
+    assert line.rest_timeout_s == SHORTEST_REST * 0.15
+    for waited_s in (SHORTEST_REST * 0.15, 0.15):
         port.script, start_s = [b"+1.23"], clock.now_s
         with pytest.raises(LineFault) as caught:
             line.receive(8)
@@ -364,4 +364,4 @@ def test_the_rest_of_a_reply_is_waited_for_a_little_longer_than_it_ever_took_and
         line.drain(0.0)
     port.script = [b"+1.234\r\n"]
     line.receive(8)
-    assert line.rest_timeout_s == LATER_REST_S, "a whole reply came"
+    assert line.rest_timeout_s == SHORTEST_REST * 0.15, "a whole reply came"

@@ -30,7 +30,7 @@ from compd.simulation.wires.simulated_line import ByteDevices
 from tests.support.paths import CONFIG
 from tests.support.wire_rig import PATIENCE_S
 
-SECONDS = 8.0
+SECONDS = 12.0
 SHOWN_MM = 0.0012
 # Whole replies at the beginning.
 WARM = 30
