@@ -23,8 +23,9 @@ from compd.gauge import GaugeOptions
 from compd.live.acquisition.polled_round import FASTEST_ROUND_S
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
 
-# By how much later than planned the next reading comes, and was perhaps sampled, s: 99.9 % of the readings of the
-# shipped tripod, simulated, on two processors: alone, and with four busy processes (tests/benchmarks/bench_polls.py).
+# By how much later than planned the next reading comes, and was perhaps sampled, s. Measured on the shipped tripod,
+# simulated, on two processors: quiet, by the jumps that were believed at load 1.2 (25 um of a joint); with other
+# processes on both processors all the time, 99.9 % of the readings.
 LATE_S, LATE_BUSY_S = 0.015, 0.08
 
 

@@ -21,6 +21,8 @@ RESTS_IN_MIND, FEWEST_RESTS = 256, 20
 # The rest of a reply may take so much longer than it ever did beyond its time on the wire, and so much, s: an adapter
 # hands over what has come after its latency timer.
 SLOWER_REST, LATER_REST_S = 1.25, 10e-3
+# At least this share of the timeout: a device may pause within a reply now and then.
+SHORTEST_REST = 0.5
 
 
 def shown(data: bytes) -> str:
@@ -155,7 +157,9 @@ class StreamLine:
         """
         if self._given_up or len(self._rests_s) < FEWEST_RESTS:
             return self._timeout_s
-        return min(self._timeout_s, SLOWER_REST * max(self._rests_s) + LATER_REST_S)
+        return min(
+            self._timeout_s, max(SHORTEST_REST * self._timeout_s, SLOWER_REST * max(self._rests_s) + LATER_REST_S)
+        )
 
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes. Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST."""

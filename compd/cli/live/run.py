@@ -9,6 +9,7 @@ import typer
 
 from compd.cli.loading import loading
 from compd.cli.waiting import wait_for_file
+from compd.live.process_limits import exhaustion_named, require_descriptors, require_limits
 
 
 def run(config: Annotated[Path, typer.Argument(help="The machine's configuration (YAML).")]) -> None:
@@ -16,12 +17,15 @@ def run(config: Annotated[Path, typer.Argument(help="The machine's configuration
 
     A configuration that is not there yet is waited for, for half a minute: `compd simulate` may be about to write it.
     """
-    with loading():
-        from compd.live.run import run as run_daemon
-        from compd.machine_check import load_whole
+    require_limits()
+    with exhaustion_named():
+        with loading():
+            from compd.live.run import run as run_daemon
+            from compd.machine_check import load_whole
 
-        wait_for_file(config)
-        configuration = load_whole(config)
-    failed = run_daemon(configuration)
+            wait_for_file(config)
+            configuration = load_whole(config)
+        require_descriptors(len(configuration.lines))
+        failed = run_daemon(configuration)
     if failed:
         raise typer.Exit(1)

@@ -76,6 +76,7 @@ def simulate(
 
     from compd.clock import MonotonicClock
     from compd.configuration import load
+    from compd.live.realtime import use_fifo
     from compd.simulation.campaign.plan_reader import read_plan
     from compd.simulation.causes.hidden_cause import write_answer
     from compd.simulation.truth.mechanism import Mechanism
@@ -111,6 +112,8 @@ def simulate(
         directory.mkdir(parents=True, exist_ok=True)
         simulation = Simulation(configuration, world, directory.resolve(), clock, _address(broker))
         stack.callback(simulation.stop)
+        # devices are never late because a computer is busy: below the daemon that polls them, above everybody else
+        use_fifo(configuration.loop.priority // 8)
         daemon = simulation.start()
         if sized:
             write_answer(directory / SEALED_ANSWER, sized, [], seed)

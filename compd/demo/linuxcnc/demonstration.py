@@ -129,6 +129,7 @@ class _Session:
         tell: Callable[[str], None],
     ) -> None:
         self._directory, self._controller, self._tell = directory, controller, tell
+        self._told = ""  # last
         self._mechanism = Mechanism(configuration.geometry)
         self._links = configuration.geometry.links
         self._program = self._copied("program.ngc", program.read_text())
@@ -193,7 +194,10 @@ class _Session:
         """What an operator does whose machine stands: acknowledge what waits for it, and arm."""
         acknowledged = self._acknowledge()
         outcome = "armed again" if self._controller.arms() else "not armed yet"
-        self._tell(f"  The feed was held: {held_by}. {', '.join([*acknowledged, outcome])}.")
+        told = f"  The feed was held: {held_by}. {', '.join([*acknowledged, outcome])}."
+        if told != self._told:
+            self._tell(told)
+        self._told = told
 
     def _acknowledge(self) -> list[str]:
         """Accept every gauge that waits for a person; what was accepted, in words. In this machine none is wrong."""

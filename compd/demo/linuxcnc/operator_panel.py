@@ -86,7 +86,7 @@ class Operator:
             return ""
         if hal.get_value("compd.armed"):
             return "the watchdog has bitten: no good setpoint came in time"
-        return REASONS[hal.get_value("compd.reason")]
+        return str(REASONS[hal.get_value("compd.reason")])
 
     def set_signal(self, name: str, value: str) -> bool:
         return subprocess.run(["halcmd", "sets", name, value], check=False).returncode == 0

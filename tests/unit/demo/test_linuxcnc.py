@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,9 @@ from compd.demo.linuxcnc.artefact import (
     reading_times_s,
     write_probed_recording,
 )
+from compd.demo.linuxcnc.controller import LinuxCnc, ProgramStopped
 from compd.demo.linuxcnc.motion_log import read_motion_log, tip_errors, wanted_tips_mm
+from compd.errors import DaemonError
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 from compd.simulation.truth.mechanism import Mechanism
@@ -30,16 +33,23 @@ def scales_mm(tip_M_mm: np.ndarray) -> np.ndarray:
     return drawn.lengths(drawn.posture_at(tip_M_mm, np.zeros(3))) - drawn.lengths0_mm
 
 
-def write_log(path: Path, readings: tuple[tuple[float, float], ...] = ()) -> None:
-    """Two seconds on the move, two at rest; the true tip is 4 um above where the program wants it, every fifth time."""
+def write_log(
+    path: Path, readings: tuple[tuple[float, float], ...] = (), held: tuple[float, float] = (np.inf, np.inf)
+) -> None:
+    """Two seconds on the move, two at rest; the true tip is 4 um above where the program wants it, every fifth time.
+
+    held : from when to when the feed was, s; the tip is 1 mm off then.
+    """
     lines = []
     for number in range(400):
         tip_mm = np.array([0.1 * min(number, 200), 0.0, 320.0])
         nominal_mm = scales_mm(tip_mm).tolist()
-        true_mm = np.add(tip_mm, [0.0, 0.0, UP_MM]).tolist() if number % 5 == 0 else None
         time_s = 1000.0 + number * PERIOD_S
+        inhibited = held[0] <= time_s <= held[1]
+        up_mm = 1.0 if inhibited else UP_MM
+        true_mm = np.add(tip_mm, [0.0, 0.0, up_mm]).tolist() if number % 5 == 0 else None
         reading = any(start_s <= time_s <= end_s for start_s, end_s in readings)
-        lines.append(json.dumps([time_s, nominal_mm, nominal_mm, true_mm, True, False, reading, 0.0, 0.0]))
+        lines.append(json.dumps([time_s, nominal_mm, nominal_mm, true_mm, True, inhibited, reading, 0.0, 0.0]))
     path.write_text("\n".join([*lines, "[1004.0, [0.0, 0"]))
 
 
@@ -91,6 +101,55 @@ def test_a_probed_recording_has_the_gauges_of_each_mark_and_the_calibrated_place
     assert (first["scale_1_mm"], second["scale_1_mm"]) == (7.0, 9.0)
     assert (first["session"], first["point"], second["point"]) == (1, 1, 2)
     assert [second[f"reference_{axis}_mm"] for axis in "xyz"] == [place + CLEAR_mm for place in CORNERS_mm[1]]
+
+
+def test_a_feed_that_was_held_counts_as_no_error_and_gives_no_row(tmp_path: Path) -> None:
+    write_log(tmp_path / "motion.log", ((1002.5, 1002.9), (1003.3, 1003.7)), held=(1003.0, 1003.4))
+    samples = read_motion_log(tmp_path / "motion.log")
+    np.testing.assert_allclose(tip_errors(Mechanism(hexapod()), samples).error_um, UP_MM * 1e3, atol=1e-6)
+    columns = {"time_s": np.arange(0.0, 5.0, 0.1), "scale_1_mm": np.zeros(50)}
+    sidecar = sidecar_contents("hexapod", provenance={"started_at_monotonic_s": 1000.0})
+    write_recording(tmp_path / "gauges-0001.csv", columns, sidecar)
+    assert write_probed_recording(tmp_path / "probed.csv", [tmp_path / "gauges-0001.csv"], [samples]) == 1
+
+
+class Panel(LinuxCnc):
+    """LinuxCNC as its panel answers, without LinuxCNC: a program that is held until the bridge is armed."""
+
+    def __init__(self, directory: Path, held_by: str, message: str = "") -> None:
+        super().__init__(directory, directory)
+        self.held, self.message, self.asked = held_by, message, 0
+
+    def ask(self, do: str, timeout_s: float = 0.0, **arguments: Any) -> Any:
+        if do == "wait_for_end":
+            self.asked += 1
+            if self.message:
+                self.errors.append(self.message)
+            return not self.held
+        return self.held if do == "held_by" else True
+
+
+def test_a_program_whose_feed_is_held_goes_on_when_somebody_attends(tmp_path: Path) -> None:
+    panel, seen = Panel(tmp_path, "the last setpoint has expired"), []
+
+    def attend(held_by: str) -> None:
+        seen.append(held_by)
+        panel.held = "" if len(seen) == 2 else panel.held
+
+    start_s, end_s = panel.run(tmp_path / "program.ngc", 600.0, attend)
+    assert start_s <= end_s
+    assert seen == ["the last setpoint has expired"] * 2
+
+
+def test_a_program_that_does_not_end_says_what_holds_it(tmp_path: Path) -> None:
+    with pytest.raises(DaemonError, match=r"program.ngc has not ended.*the last setpoint has expired"):
+        Panel(tmp_path, "the last setpoint has expired").run(tmp_path / "program.ngc", 0.0)
+
+
+def test_a_message_of_linuxcnc_stops_a_program_and_lateness_does_not(tmp_path: Path) -> None:
+    Panel(tmp_path, "", "Unexpected realtime delay on task 0").run(tmp_path / "program.ngc", 600.0)
+    with pytest.raises(ProgramStopped, match="Probe is already tripped"):
+        Panel(tmp_path, "", "Probe is already tripped").run(tmp_path / "program.ngc", 600.0)
 
 
 def test_the_probing_program_touches_three_faces_of_every_corner() -> None:

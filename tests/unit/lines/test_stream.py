@@ -20,7 +20,7 @@ from compd.gauge import LineFault, Quality
 from compd.lines import open_line, open_stream
 from compd.lines.modbus_rtu import RtuMaster
 from compd.lines.port import Port, SerialPort, TcpPort
-from compd.lines.stream import MOST_DRAIN_TIMEOUTS, StreamLine
+from compd.lines.stream import FEWEST_RESTS, MOST_DRAIN_TIMEOUTS, SHORTEST_REST, StreamLine
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 
 TIMEOUT_S = 0.1
@@ -344,3 +344,24 @@ def test_tcp_refused_is_a_lost_line() -> None:
     with pytest.raises(LineFault) as caught:
         TcpPort("127.0.0.1", 1, TIMEOUT_S)
     assert caught.value.quality is Quality.LINE_LOST
+
+
+def test_the_rest_of_a_reply_is_waited_for_half_of_the_timeout_and_after_that_for_all_of_it() -> None:
+    """A device that has become slower is not given up time and again."""
+    clock = InstantClock()
+    port = ScriptedPort(clock, [b"+1.234\r\n"] * FEWEST_RESTS)
+    line = StreamLine(port, 0.15, 0.0, clock)
+    assert line.rest_timeout_s == 0.15
+    for _ in range(FEWEST_RESTS):
+        line.receive(8)
+    assert line.rest_timeout_s == SHORTEST_REST * 0.15
+    for waited_s in (SHORTEST_REST * 0.15, 0.15):
+        port.script, start_s = [b"+1.23"], clock.now_s
+        with pytest.raises(LineFault) as caught:
+            line.receive(8)
+        assert caught.value.quality is Quality.INCOMPLETE
+        assert clock.now_s - start_s == pytest.approx(waited_s)
+        line.drain(0.0)
+    port.script = [b"+1.234\r\n"]
+    line.receive(8)
+    assert line.rest_timeout_s == SHORTEST_REST * 0.15, "a whole reply came"
