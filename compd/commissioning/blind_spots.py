@@ -237,7 +237,7 @@ def _lost_periods(figures: Figures) -> str:
 def _scatter(figures: Figures) -> str:
     gauges = figures.configuration.gauges
     kinds = {d.gauge: d.length.partition(" ")[0] for d in figures.drifts}
-    declared = {g: options.noise_um for g in kinds if (options := gauges[g]).noise_um is not None}
+    declared = {gauge: noise_um for gauge in kinds if (noise_um := gauges[gauge].noise_um) is not None}
     parts = [
         f"{gauge}: {RATIO * noise_um:.3g} um, {RATIO * noise_um * figures.leverage(kinds[gauge]):.3g} um at the tip"
         for gauge, noise_um in declared.items()

@@ -139,7 +139,8 @@ def unreadable(path: Path, reason: str) -> Problem:
 def read_sheet_part(path: Path, name: str) -> SheetPart:
     """What the reader of cells does not tell of a sheet. name : of its part in the archive."""
     has_formulas = False
-    number, scanned, hidden = 0, 0, set()
+    number = scanned = 0
+    hidden: set[int] = set()
     merged: dict[str, MergedArea] = {}
     with zipfile.ZipFile(path) as archive, archive.open(name.lstrip("/")) as file:
         rest = b""

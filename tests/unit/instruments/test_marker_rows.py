@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from compd.arrays import FloatArray
 from tests.unit.instruments.reading import read
 
 RNG = np.random.default_rng(4)
@@ -14,7 +15,7 @@ TRACKER_MM = RNG.normal((2400.0, -950.0, 410.0), 60.0, (20, 3))
 PLATE_MM = RNG.normal((0.0, 0.0, 190.0), 30.0, (20, 3))
 
 
-def points(rows: list[str], places_mm: np.ndarray = TRACKER_MM) -> str:
+def points(rows: list[str], places_mm: FloatArray = TRACKER_MM) -> str:
     measured = [",".join(f"{value:.6f}" for value in place) for place in places_mm]
     return "X [mm],Y [mm],Z [mm]\n" + "\n".join([*measured[:10], *rows, *measured[10:]]) + "\n"
 
@@ -25,7 +26,7 @@ def points(rows: list[str], places_mm: np.ndarray = TRACKER_MM) -> str:
         "-9999,-9999,-9999",
         "99999.999,99999.999,99999.999",
         "2400.1,-950.3,-999.999",
-        "9.99e+37,9.99e+37,9.99e+37",
+        "9.99e+20,9.99e+20,9.99e+20",
         "0,0,0",
         "0.000000,0.000000,0.000000",
     ],

@@ -13,6 +13,7 @@ import pytest
 from openpyxl import Workbook
 
 from compd.errors import RecordingError
+from compd.instruments import workbook_parts
 from compd.instruments.export import ReadOptions
 from compd.instruments.raw_table import RawTable
 from compd.instruments.read_limits import ReadLimits
@@ -271,10 +272,13 @@ def test_hidden_rows_are_told(tmp_path: Path, attributes: str, hidden: bool) -> 
         assert "hidden rows" not in table.assumed
 
 
-def test_a_hidden_row_of_a_long_sheet_is_told(tmp_path: Path) -> None:
-    """The sheet is read in parts of a megabyte: a row is found wherever it stands."""
-    rows = [("name", "X [mm]"), *((f"P{k}", k + 0.5) for k in range(40_000))]
-    hidden = set(range(2, 40_000, 7))
+@pytest.mark.parametrize("chunk", [131, 997, 4096])
+def test_a_hidden_row_is_told_wherever_the_sheet_is_cut(
+    tmp_path: Path, chunk: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workbook_parts, "_CHUNK", chunk)
+    rows = [("name", "X [mm]"), *((f"P{k}", k + 0.5) for k in range(200))]
+    hidden = set(range(2, 200, 7))
 
     def hide(text: str) -> str:
         return re.sub(r'<row r="(\d+)"', lambda match: match[0] + ' hidden="1"' * (int(match[1]) in hidden), text)
