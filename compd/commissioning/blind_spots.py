@@ -414,7 +414,7 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "wrong_thermometer",
         "a thermometer that an effect reads is wrong: its wire, its module or its place has changed",
         "beyond its range, faster than heat changes anything, or far from most other thermometers "
-        "(`plausible`, `fastest_per_s`, `apart` of the quantity); or the same digits while all others change",
+        "(`plausible`, `fastest_change`, `apart` of the quantity); or the same digits while all others change",
         "standing_temperature_K",
         "what is slower and nearer than that, or nearer when the daemon starts; several alike; one that falls off its "
         "part into air as warm",

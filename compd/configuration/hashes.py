@@ -14,7 +14,7 @@ from compd.configuration.operation import TargetSettings, VoteSettings
 # What says how far a gauge is believed, and not what it shows.
 NOT_IN_ZERO = (
     *("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss"),
-    *("plausible", "fastest_per_s", "apart"),
+    *("plausible", "fastest_change", "apart"),
 )
 # Options that a later release has brought, with the value that leaves everything as it was.
 _LATER_OPTIONS: Mapping[str, Any] = {
@@ -53,7 +53,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "gateway_wait_s": None,
     "wake_latency_us": None,
     "plausible": None,
-    "fastest_per_s": None,
+    "fastest_change": None,
     "apart": None,
     "standing_temperature_K": VoteSettings().standing_temperature_K,
     "tip_error_um": None,

@@ -65,7 +65,7 @@ class QuantityWire(Section):
         description="lowest and highest plausible value: a reading beyond is not believed; left out: by the name, "
         "a room 0 to 50 degC, a part of the machine -20 to 150 degC, air 500 to 1100 hPa",
     )
-    fastest_per_s: Positive | None = Field(
+    fastest_change: Positive | None = Field(
         default=None,
         description="fastest change per second, in the name's unit: a reading that jumped further is not believed; "
         "left out: by the unit, 0.2 degC, 0.1 hPa, 3 pct; else no limit",

@@ -52,7 +52,7 @@ def quantity_limits(wire: QuantityWire) -> QuantityLimits:
     return QuantityLimits(
         low,
         high,
-        unit.fastest_per_s if wire.fastest_per_s is None else wire.fastest_per_s,
+        unit.fastest_per_s if wire.fastest_change is None else wire.fastest_change,
         unit.apart if wire.apart is None else wire.apart,
         max(unit.tolerance, SAME_VALUE_SIGMAS * (wire.noise or 0.0)),
     )

@@ -83,7 +83,7 @@ class FittedRanges(NamedTuple):
             return read._replace(values=within)
         beyond = ", ".join(
             f"{names[k]} is {values[k]:.6g}, fitted from {self.low[k]:.6g} to {self.high[k]:.6g}"
-            for k in np.flatnonzero(within != values)
+            for k in np.flatnonzero(within != values).tolist()
         )
         return read._replace(values=within, beyond=beyond)
 

@@ -17,7 +17,8 @@ from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.tip_uncertainty import stated_noise
 from compd.live.pipeline import Pipeline, build_pipeline
-from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER, Message
+from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER
+from compd.live.record.table_rows import Message
 from compd.live.service.readings_message import RecordedCycle, parse_readings
 from compd.live.service.state_json import FORMER_TIP_NOISE
 from compd.recording.columns import SKEW_COLUMN

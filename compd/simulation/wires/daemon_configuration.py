@@ -72,7 +72,7 @@ def daemon_configuration(
     if fastest_K_per_s:
         for wire in data["wiring"].get("quantities") or ():
             if wire["name"].endswith("_degC"):
-                wire |= {"fastest_per_s": fastest_K_per_s, "apart": _HELD_APART_K}
+                wire |= {"fastest_change": fastest_K_per_s, "apart": _HELD_APART_K}
     data["state"] = {"directory": str(directory / STATE)}
     (directory / STATE).mkdir(exist_ok=True)
     _write(path, configuration.path, data)

@@ -155,7 +155,7 @@ def test_after_a_long_silence_it_may_have_changed(warm):
 
 def test_the_healthy_ones_are_not_named_where_one_of_three_is_broken(tmp_path):
     limits = quantity_limits(QuantityWire(name=NAME, gauge=CHANNEL))
-    live = warm_machine("tripod-cmm.yaml", tmp_path, fastest_per_s=1e6)
+    live = warm_machine("tripod-cmm.yaml", tmp_path, fastest_change=1e6)
     live.run(1.0)
     for name in live.cabinet.shows:
         live.cabinet.shows[name] = lambda _: 23.0 + limits.apart + 1.0
@@ -172,7 +172,7 @@ def test_the_healthy_ones_are_not_named_where_one_of_three_is_broken(tmp_path):
         ("temperature_room_degC", {}, "high", 50.0),
         ("temperature_spindle_degC", {"plausible": (10, 90)}, "high", 90.0),
         ("temperature_spindle_degC", {}, "fastest_per_s", 0.2),
-        ("temperature_spindle_degC", {"fastest_per_s": 3.0}, "fastest_per_s", 3.0),
+        ("temperature_spindle_degC", {"fastest_change": 3.0}, "fastest_per_s", 3.0),
         ("temperature_spindle_degC", {"apart": 50.0}, "apart", 50.0),
         ("temperature_spindle_degC", {"noise": 0.5}, "tolerance", 0.5 * 6 * math.sqrt(2)),
         ("pressure_hPa", {}, "low", 500.0),
