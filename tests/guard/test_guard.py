@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from compd.live.record.compared_table import differing_cells
 from compd.live.record.replay import RecordedCycles, replay_cycles
 from tests.support.command import run_in_process
 from tests.support.live_machine import machine
@@ -41,6 +42,7 @@ def test_setpoints_are_those_of_0_1_0_to_the_last_digit(run):
     assert len(cycles) == 20
     # a share of nothing may have lost the sign of its zero
     assert [cycle.where for cycle in cycles if json.loads(cycle.sent) != json.loads(cycle.replayed)] == []
+    assert list(differing_cells(RecordedCycles(HERE / "replay" / run))) == []
 
 
 @pytest.mark.parametrize("name", sampled(COMPARISONS, 3))

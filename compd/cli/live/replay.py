@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+# Cells of the CSV that are listed; a file that was opened and saved by another program differs everywhere.
+_MOST_CELLS = 5
 
 
 def replay(
@@ -20,9 +24,11 @@ def replay(
 ) -> None:
     """Compute a recorded run again and compare its setpoints with those that were sent, bit for bit.
 
-    Orders that clients gave meanwhile are listed. Exit code 1 when one differs, or when rows of the CSV have no cycle.
+    Orders that clients gave meanwhile are listed. Exit code 1 when one differs, when rows of the CSV have no cycle, or
+    when a cell of the CSV is not what its cycle says.
     """
     from compd.configuration import load
+    from compd.live.record.compared_table import differing_cells
     from compd.live.record.replay import RecordedCycles, ReplayedCycle, replay_cycles
 
     configuration = load(machine)
@@ -43,12 +49,17 @@ def replay(
     lacking = transcripts.rows_without_cycle()
     for table, rows in lacking.items():
         typer.echo(f"{table}: {rows} rows have no cycle beside them, and cannot be replayed", err=True)
+    cells = list(islice(differing_cells(RecordedCycles(name)), _MOST_CELLS))
+    for cell in cells:
+        text = f"{cell.cell or 'no value'}, by the cycle {cell.recorded or 'no value'}"
+        typer.echo(f"{cell.where} was changed: {text}", err=True)
     others = transcripts.config_hashes() - {configuration.config_hash}
     another = f"recorded with another configuration ({', '.join(sorted(others))}, this is {configuration.config_hash})"
     if first is None:
         same = f", though {another}" if others else ""
-        typer.echo(f"{cycles} cycles replayed; every setpoint is the one that was sent{same}", err=True)
-        if lacking:
+        changed = "; the CSV is not what was recorded" if cells else ""
+        typer.echo(f"{cycles} cycles replayed; every setpoint is the one that was sent{same}{changed}", err=True)
+        if lacking or cells:
             raise typer.Exit(1)
         return
     typer.echo(f"{differing} of {cycles} setpoints differ; the first is tick {first.tick}, {first.where}", err=True)

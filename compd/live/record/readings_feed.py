@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 from compd.clock import Clock
 from compd.errors import DaemonError
-from compd.live.record.recording_part import Message
+from compd.live.record.table_rows import Message
 
 # A daemon that starts takes seconds; whoever waits for it costs it nothing.
 _TRY_EVERY_S = 0.5

@@ -33,7 +33,8 @@ from compd.clock import Clock
 from compd.errors import CompdError, Problem, RecordingError, StateError
 from compd.live.record.part_table import close_left_parts
 from compd.live.record.readings_feed import FeedItem
-from compd.live.record.recording_part import ORDER, Message, RecordingPart
+from compd.live.record.recording_part import ORDER, RecordingPart
+from compd.live.record.table_rows import Message
 from compd.recording.table_file import PARQUET
 from compd.recording.tables.parquet_table import arrow_modules
 from compd.recording.tables.table_format import TableFormat

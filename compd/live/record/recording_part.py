@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from compd.configuration.yaml_reader import LARGEST_BYTES
 from compd.files.atomic_files import read_small_file, sync_directory, write_new_file
 from compd.live.record.appended_file import AppendedFile
-from compd.live.record.part_table import Row, part_table
-from compd.recording.columns import SKEW_COLUMN, approach_columns, decimals
+from compd.live.record.part_table import part_table
+from compd.live.record.table_rows import Message, TableRows
 from compd.recording.sidecar import sidecar_contents, sidecar_text
 from compd.recording.tables.table_format import TableFormat
 from compd.text.json_text import encode_compact
-from compd.units import UM_PER_MM
-
-Message = Mapping[str, Any]
 
 CYCLES_SUFFIX = ".cycles.jsonl"
 MODEL_MARK = ".model-"
@@ -63,16 +59,10 @@ class RecordingPart:
         self.start_s: float = first_readings["time_s"]
         self.rows = 0
         self._rows_added = 0
-        self._columns: Sequence[Message] = watch["columns"]
-        names = ["time_s", *(column["column"] for column in self._columns), SKEW_COLUMN]
-        self._decimals = {name: decimals(name) for name in names}
-        self._origin_s = origin_s
+        self._table_rows = TableRows(watch, first_readings, origin_s)
         sidecar = sidecar_text(self._sidecar(version, watch, started_at)).encode()
         first_lines = b"".join(encode_compact(message).encode() + b"\n" for message in first_messages)
-        self._links = len(first_readings.get("approach", ()))
-        names += approach_columns(self._links)
-        in_full = {column["column"] for column in self._columns if "sign" not in column}
-        self._table = part_table(stem, table_format, names, in_full)
+        self._table = part_table(stem, table_format, self._table_rows.names, self._table_rows.in_full)
         self._stem = stem
         self._models: dict[str, Path] = {}
         self._complete_size = 0
@@ -102,7 +92,7 @@ class RecordingPart:
     def add(self, line: bytes, message: Message) -> None:
         """Append a READINGS message and the line in which it came; `sync` writes both."""
         self._cycles.add(line)
-        self._table.add(self._row(message))
+        self._table.add(self._table_rows.row(message))
         self._rows_added += 1
 
     def add_order(self, line: bytes) -> None:
@@ -163,31 +153,6 @@ class RecordingPart:
         write_new_file(path, content)
         self._complete_size += len(content)
 
-    def _row(self, message: Message) -> Row:
-        now_s, readings = message["time_s"], message["readings"]
-        row: list[float | None] = [self._number("time_s", now_s - self._origin_s)]
-        row += [self._value(column, readings[column["channel"]], now_s) for column in self._columns]
-        row += [self._number(SKEW_COLUMN, message["setpoint"]["skew_s"]) if "skew_s" in message["setpoint"] else None]
-        # None until a link has moved
-        row += [float(direction) if direction else None for direction in message.get("approach", ())[: self._links]]
-        return row
-
-    def _value(self, column: Message, reading: Message, now_s: float) -> float | None:
-        """None where the reading is not good, or too old for the daemon to use."""
-        if "value" not in reading or now_s - reading["time_s"] > column["stale_after_s"]:
-            return None
-        value: float = reading["value"]
-        name = column["column"]
-        if "sign" not in column:
-            return value
-        change_mm = column["sign"] * (value - self.zero["readings_mm"][column["channel"]])
-        return self._number(name, change_mm * UM_PER_MM if name.endswith("_um") else change_mm)
-
-    def _number(self, column: str, value: float) -> float:
-        """`value` with the decimals of its column; -0 is 0."""
-        places = self._decimals[column]
-        return (value if places is None else round(value, places)) + 0.0
-
     def _sidecar(self, version: Message, watch: Message, started_at: str) -> dict[str, Any]:
         return sidecar_contents(
             version["machine"],
@@ -205,7 +170,7 @@ class RecordingPart:
                         "sign": column["sign"],
                         "zero_mm": self.zero["readings_mm"][column["channel"]],
                     }
-                    for column in self._columns
+                    for column in watch["columns"]
                     if "sign" in column
                 },
             },

@@ -13,7 +13,8 @@ from compd.errors import Problem, RecordingError
 from compd.live.loop.cycle import step
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.pipeline import build_pipeline
-from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER, Message
+from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER
+from compd.live.record.table_rows import Message
 from compd.live.service.readings_message import RecordedCycle, parse_readings
 from compd.recording.columns import SKEW_COLUMN
 from compd.recording.open_part import ARROW, OpenPart
@@ -76,7 +77,7 @@ class RecordedCycles:
 
     def config_hashes(self) -> set[str]:
         """Hashes of the configurations with which the parts were recorded."""
-        first_messages = [next(self._messages(path), None) for path in self.paths]
+        first_messages = [next(self.messages(path), None) for path in self.paths]
         return {str(message.get("config_hash")) for _, message in filter(None, first_messages)}
 
     def model_files(self) -> list[Path]:
@@ -91,7 +92,7 @@ class RecordedCycles:
     def cycles(self) -> Iterator[tuple[str, Message]]:
         """(file:line, READINGS message) of every cycle. An incomplete last line is left out and counted."""
         for path in self.paths:
-            for where, message in self._messages(path):
+            for where, message in self.messages(path):
                 if message.get("class") == "READINGS":
                     yield where, message
                 elif message.get("class") == ORDER:
@@ -111,7 +112,8 @@ class RecordedCycles:
                     lacking[table] = rows - cycles
         return lacking
 
-    def _messages(self, path: Path) -> Iterator[tuple[str, Message]]:
+    def messages(self, path: Path) -> Iterator[tuple[str, Message]]:
+        """(file:line, message) of every line of a part; an incomplete last one is left out, and counted."""
         with path.open("rb") as file:
             for number, line in enumerate(file, start=1):
                 if not line.endswith(b"\n"):
@@ -147,7 +149,8 @@ def replay_cycles(
     """
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
     files = [*recording.model_files(), *model_files]
-    models = {"": pipeline.loader.without_effects} | {model.hash: model for model in map(pipeline.loader.read, files)}
+    read = [pipeline.loader.read(file, plausible=False) for file in files]
+    models = {"": pipeline.loader.without_effects} | {model.hash: model for model in read}
     for where, message in recording.cycles():
         recorded = _recorded_cycle(where, message, pipeline.latest.channels, configuration.geometry.links)
         applied = _model(where, message.get("model", ""), models)

@@ -10,12 +10,14 @@ from itertools import product
 
 import numpy as np
 import pytest
+import typer
 
 from compd.cli.live.replay import replay as replay_command
 from compd.errors import Problem, RecordingError, StateError
 from compd.live.loop.cycle import step
 from compd.live.loop.model_loader import Models
 from compd.live.loop.states import State
+from compd.live.record.compared_table import differing_cells
 from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.live.service.readings_message import parse_readings
 from compd.live.service.state_json import from_plain, to_plain
@@ -54,6 +56,44 @@ def test_a_recorded_run_replays_bit_for_bit(tmp_path, name, on_stale, on_limit):
     beyond = {"clamp": State.CLAMPED, "refuse": State.REFUSED}[on_limit]
     assert {State.OK, State.SLEWING, lost, beyond} <= {setpoint.state for setpoint in sent}
     assert {"cmm", "machine_tool"} == {setpoint.mode for setpoint in sent}
+
+
+@pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
+def test_a_csv_that_is_not_what_was_recorded_is_seen(tmp_path, name):
+    """One bit of a digit, in any place, whether or not a column of the daemon's."""
+    run = Run(machine(name), seed=11)
+    with run.recorder(tmp_path / "run") as recorder:
+        for line, message, _ in run.quiet(40):
+            recorder.put(line, message)
+    (table,) = tmp_path.glob("run-*.csv")
+    assert list(differing_cells(RecordedCycles(tmp_path / "run"))) == []
+    content = table.read_bytes()
+    head = content.index(b"\n") + 1
+    digits = [k for k in range(head, len(content)) if content[k : k + 1].isdigit()]
+    for k in digits[:: len(digits) // 25]:
+        table.write_bytes(content[:k] + bytes([content[k] ^ 1]) + content[k + 1 :])
+        cells = list(differing_cells(RecordedCycles(tmp_path / "run")))
+        assert cells, (k, content[k - 20 : k + 20])
+        row = content[:k].count(b"\n") + 1
+        assert f"{table}:{row}, " in cells[-1].where or "time_s" in cells[0].where
+
+
+def test_replay_says_which_cell_of_the_csv_was_changed(tmp_path, capsys):
+    run = Run(machine(), seed=11)
+    with run.recorder(tmp_path / "run") as recorder:
+        for line, message, _ in run.quiet(5):
+            recorder.put(line, message)
+    (table,) = tmp_path.glob("run-*.csv")
+    lines = table.read_text().splitlines(keepends=True)
+    cells = lines[3].split(",")
+    recorded, cells[1] = cells[1], "0.5"
+    table.write_text("".join([*lines[:3], ",".join(cells), *lines[4:]]))
+    with pytest.raises(typer.Exit) as ended:
+        replay_command(tmp_path / "run", run.machine.configuration.path)
+    assert ended.value.exit_code == 1
+    said = capsys.readouterr().err
+    assert f"{table}:4, scale_1_mm was changed: 0.5, by the cycle {float(recorded)!r}" in said
+    assert "the CSV is not what was recorded" in said
 
 
 def test_a_thinned_recording_replays_bit_for_bit_too(tmp_path):
