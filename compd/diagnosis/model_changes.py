@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TypeAlias
@@ -19,10 +19,12 @@ from compd.diagnosis.candidates.candidates import library_pool
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
-from compd.model.effect import Effect
+from compd.model.effect import Effect, FittedEffect
+from compd.model.effect_needs import needed_quantities
 from compd.model.library import load_library
+from compd.model.observations import Observations
 from compd.model_file.model_document import Declaration, Kind, ModelStep, StoredModel
-from compd.model_file.model_file import ModelFile
+from compd.model_file.model_file import ModelFile, Range
 
 # What makes of a fit, and the standard deviations (m,) of the noise that it was weighed by, a better one.
 Refinement: TypeAlias = Callable[[FitResult, FloatArray], FitResult]
@@ -150,7 +152,21 @@ def _changed(
         covariance=np.asarray(result.covariance),
         steps=(*old.steps, step),
         geometry=aligned.geometry_hash,  # all numbers were fitted on it
+        fitted_range=_fitted_range(result.fitted, aligned.rows),
+        plausible={id_: ranges for id_, ranges in model.plausible.items() if id_ in fitted_ids},
+        warnings=(),
     )
+
+
+def _fitted_range(fitted: Sequence[FittedEffect], rows: Observations) -> dict[str, Range]:
+    """Lowest and highest value in these rows of each quantity that the effects read."""
+    ranges = {}
+    for effect in fitted:
+        for name in needed_quantities(effect.effect, rows.links):
+            values = rows.quantities.get(name, np.array([]))
+            if np.isfinite(values).any():
+                ranges[name] = float(np.nanmin(values)), float(np.nanmax(values))
+    return ranges
 
 
 def _now() -> str:

@@ -2,7 +2,7 @@
 
 Each step keeps what it replaced, so that it can be undone. `compd.model_file.model_file` makes effects of the data.
 
-    format: 2               # 1 was written by release 0.1.0, with the same keys; a file without it counts as 1
+    format: 3               # 2 and 1, of releases up to 0.2.0, have no `fitted_range` and no `checksum`
     machine: tripod-cmm     # name of the configuration, or "external"
     geometry: 9f3a...       # hash of the geometry that it was fitted on; left out where that is not known
     release: 0.2.0          # of compd, that wrote it
@@ -11,12 +11,16 @@ Each step keeps what it replaced, so that it can be undone. `compd.model_file.mo
       shape: {n: 3.0}       # values of its nonlinear constants
       parameters:
       - {name: s, value: 1.0, std: 0.1, unit: um}
+      plausible: {s: [0, 5]}  # only where a person means another range than the effect's own
     covariance: [[0.01]]    # of all fitted numbers jointly, in the order of the file
+    fitted_range: {temperature_link_1_degC: [19.2, 24.6]}  # of each quantity that the effects read
     steps: []               # see ModelStep
+    checksum: 5c1f...       # of all that is above
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -26,14 +30,18 @@ import yaml
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
+from compd.configuration.section import Finite
 from compd.configuration.yaml_reader import decode, parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem, StateError
 from compd.files.atomic_files import write_files
+from compd.files.checksum import CHECKSUM, checksum_of
 from compd.files.file_kind import FileKind
 from compd.release import __version__
 from compd.text.secrets import has_secret, holds_secret
 
-FORMAT = 2
+FORMAT = 3
+# By which a covariance may exceed what its variances allow: numbers are computed.
+_ROUNDING = 1e-6
 Kind = Literal["add", "remove", "fit", "undo"]
 # An effect's id, /absolute/file.py:NAME, or a formula written out.
 Declaration: TypeAlias = str | dict[str, Any]
@@ -72,15 +80,37 @@ class StoredModel:
     geometry: str = ""
 
 
-def _square(rows: list[list[float]]) -> list[list[float]]:
+def _covariance(rows: list[list[float]]) -> list[list[float]]:
+    """ValueError for what is no covariance; nan stands for what is not known."""
     if any(len(row) != len(rows) for row in rows):
         raise ValueError("is no matrix of numbers: it has not as many rows as columns")
+    for i, row in enumerate(rows):
+        if row[i] < 0:
+            raise ValueError(f"has a negative variance, {row[i]:g}: number {i + 1} of its diagonal")
+        for k, value in enumerate(row[:i]):
+            if math.isinf(value) or (value != rows[k][i] and not math.isnan(value)):
+                raise ValueError(f"is not symmetric: {value:g} and {rows[k][i]:g} at {i + 1}, {k + 1}")
+            if abs(value) > (1 + _ROUNDING) * math.sqrt(row[i] * rows[k][k]):
+                raise ValueError(f"has a correlation beyond 1: {value:g} at {i + 1}, {k + 1}")
     return rows
+
+
+def _standard_error(std: float) -> float:
+    if std < 0:
+        raise ValueError("is negative: a standard error is 0 or more, .nan where it is not known")
+    return std
+
+
+def _range(ends: tuple[float, float]) -> tuple[float, float]:
+    if not ends[0] <= ends[1]:
+        raise ValueError("is no range: [lowest, highest]")
+    return ends
 
 
 # A key without a value is an empty list or mapping.
 _EmptyList = BeforeValidator(lambda value: [] if value is None else value)
 _EmptyMapping = BeforeValidator(lambda value: {} if value is None else value)
+_Range = Annotated[tuple[Finite, Finite], AfterValidator(_range)]
 
 
 class FilePart(BaseModel):
@@ -92,8 +122,10 @@ class ParameterEntry(FilePart):
 
     name: str = Field(description="name of the parameter; b_1, b_2, ... where there is one for each link")
     value: float = Field(description="in its unit")
-    std: float = Field(default=float("nan"), description="standard error, in the same unit; nan where it is not known")
-    unit: str = Field(default="", description="the unit, for people")
+    std: Annotated[float, AfterValidator(_standard_error)] = Field(
+        default=float("nan"), description="standard error, in the same unit; nan where it is not known"
+    )
+    unit: str = Field(default="", description="the unit, which must be the effect's")
 
 
 class EffectEntry(FilePart):
@@ -104,13 +136,18 @@ class EffectEntry(FilePart):
         default={}, description="values of its nonlinear constants, by name"
     )
     parameters: list[ParameterEntry] = Field(description="its fitted parameters")
+    plausible: Annotated[dict[str, _Range], _EmptyMapping] = Field(
+        default={},
+        description="lowest and highest plausible value of a parameter or constant, by its name, where a person means "
+        "another range than the effect's: the daemon refuses a number beyond it",
+    )
 
 
 class ModelDocument(FilePart):
     """The keys of the file."""
 
     format: Annotated[int, Field(ge=1)] = Field(
-        default=1, description=f"number of the format: {FORMAT}; 1, of release 0.1, has the same keys"
+        default=1, description=f"number of the format: {FORMAT}; up to 2 without `fitted_range` and `checksum`"
     )
     machine: str = Field(description='name of the machine\'s configuration, or "external"')
     geometry: str = Field(
@@ -119,11 +156,20 @@ class ModelDocument(FilePart):
     )
     release: str = Field(default="", description="release of compd that wrote the file")
     effects: Annotated[list[EffectEntry], _EmptyList] = Field(default=[], description="the effects of the machine")
-    covariance: Annotated[list[list[float]], _EmptyList, AfterValidator(_square)] = Field(
+    covariance: Annotated[list[list[float]], _EmptyList, AfterValidator(_covariance)] = Field(
         default=[], description="covariance of all fitted parameters jointly, in the order of the file, one row a list"
+    )
+    fitted_range: Annotated[dict[str, _Range], _EmptyMapping] = Field(
+        default={},
+        description="lowest and highest value of each quantity that the effects read, in the recording that they were "
+        "fitted on; beyond it the daemon computes with the nearer end",
     )
     steps: Annotated[list[ModelStep], _EmptyList] = Field(
         default=[], description="every step by which the model came to be, the last one last"
+    )
+    checksum: str = Field(
+        default="",
+        description="of all other keys; whoever changes the file by hand removes this line, and is warned in its use",
     )
 
 
@@ -171,8 +217,26 @@ def read_document(path: Path, content: bytes | None = None) -> tuple[ModelDocume
         document = ModelDocument.model_validate(data)
     except ValidationError as error:
         raise StateError([_problem(detail, where) for detail in error.errors(include_url=False)]) from error
+    if document.checksum and document.checksum != (fitting := _checksum(data)):
+        raise StateError(
+            Problem(
+                where=where,
+                what="was changed after it was written: its checksum does not fit",
+                value=document.checksum,
+                allowed=fitting,
+                next_step="take it from a copy; where the change is meant, remove the line `checksum`",
+            )
+        )
     state = {"effects": data.get("effects") or [], "covariance": data.get("covariance") or []}
+    state |= {"fitted_range": data["fitted_range"]} if data.get("fitted_range") else {}
     return document, StoredModel(document.machine, state, tuple(document.steps), document.geometry)
+
+
+def _checksum(data: Mapping[str, Any]) -> str:
+    try:
+        return checksum_of(data)
+    except TypeError as error:
+        return f"none: {error}"
 
 
 def _problem(detail: ErrorDetails, where: str) -> Problem:
@@ -233,6 +297,8 @@ def write_stored(path: Path, stored: StoredModel) -> None:
     text = yaml.dump(
         data, Dumper=_DumperWithoutAliases, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110
     )
+    written, _ = parse_yaml(text, path, MODEL, dumped=True)
+    text += f'{CHECKSUM}: "{checksum_of(written)}"\n'
     try:
         # the daemon, another user, must be able to read it
         write_files({path: text}, mode=0o644)

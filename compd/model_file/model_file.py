@@ -5,21 +5,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effect import Effect, FittedEffect
+from compd.model.effect_needs import needed_quantities
 from compd.model.library import find_effect
 from compd.model_file.model_document import (
     Declaration,
     EffectEntry,
+    ModelDocument,
     ModelStep,
     State,
     StoredModel,
@@ -31,6 +34,11 @@ from compd.tables import Columns, data_frame, html_table
 
 if TYPE_CHECKING:
     import pandas as pd
+
+# Lowest and highest value.
+Range: TypeAlias = tuple[float, float]
+# By which a standard error may differ from the covariance's: numbers are written with all their digits.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -68,7 +76,9 @@ class EffectNumber:
 
     @property
     def plausible(self) -> bool:
-        """Whether it lies in the plausible range."""
+        """Whether it lies in the plausible range, and its standard error, where it is known, is no larger than that."""
+        if self.standard_error > self.plausible_high - self.plausible_low:
+            return False
         return self.plausible_low <= self.value <= self.plausible_high
 
 
@@ -94,6 +104,13 @@ class ModelFile:
         The ledger: every change, with the recording it was fitted on and the error before and after.
     geometry : str
         Hash of the geometry that it was fitted on; ``""`` where that is not known.
+    fitted_range : dict
+        Lowest and highest value of each quantity that the effects read, in the recording that they were fitted on, by
+        the quantity's name; empty where that is not known. Beyond it the daemon computes with the nearer end.
+    plausible : dict
+        Ranges that a person means in place of the effects' own, by the effect's id and the number's name.
+    warnings : tuple of Problem
+        What the file, as it was read, does not say of itself.
     """
 
     machine: str
@@ -103,6 +120,9 @@ class ModelFile:
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     steps: tuple[ModelStep, ...] = ()
     geometry: str = ""
+    fitted_range: Mapping[str, Range] = field(default_factory=dict)
+    plausible: Mapping[str, Mapping[str, Range]] = field(default_factory=dict)
+    warnings: tuple[Problem, ...] = ()
 
     def write(self, path: str | Path) -> None:
         """Write the model file (YAML), whole or not at all; an existing file is replaced.
@@ -126,10 +146,12 @@ class ModelFile:
                 "effect": declared if isinstance(declared, str) else dict(declared),
                 "shape": {name: float(value) for name, value in fitted.constants.items()},
                 "parameters": _estimates(fitted, self.links),
+                **({"plausible": _lists(meant)} if (meant := self.plausible.get(fitted.effect.id)) else {}),
             }
             for declared, fitted in zip(self.declared, _with_own_covariance(self.fitted, self.covariance), strict=True)
         ]
-        return {"effects": effects, "covariance": self.covariance.tolist()}
+        ranges = {"fitted_range": _lists(self.fitted_range)} if self.fitted_range else {}
+        return {"effects": effects, "covariance": self.covariance.tolist(), **ranges}
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per number of each effect, as a pandas data frame.
@@ -167,16 +189,15 @@ class ModelFile:
         numbers: list[EffectNumber] = []
         for fitted in _with_own_covariance(self.fitted, self.covariance):
             effect = fitted.effect
+            meant = self.plausible.get(effect.id, {})
             for column, estimate in zip(effect.columns(self.links), _estimates(fitted, self.links), strict=True):
                 name, value, std, unit = estimate.values()
-                numbers.append(
-                    EffectNumber(effect.id, name, value, std, unit, column.parameter.low, column.parameter.high, False)
-                )
+                low, high = meant.get(name, (column.parameter.low, column.parameter.high))
+                numbers.append(EffectNumber(effect.id, name, value, std, unit, low, high, False))
             for constant in effect.constants:
                 value, unit = float(fitted.constants[constant.name]), constant.unit
-                numbers.append(
-                    EffectNumber(effect.id, constant.name, value, np.nan, unit, constant.low, constant.high, True)
-                )
+                low, high = meant.get(constant.name, (constant.low, constant.high))
+                numbers.append(EffectNumber(effect.id, constant.name, value, np.nan, unit, low, high, True))
         return numbers
 
     def _columns(self) -> Columns:
@@ -246,17 +267,41 @@ def read_model_file(
                 next_step="fit it again with `compd effect fit`",
             )
         )
+    with_covariance = () if problems else _with_own_covariance(fitted, covariance)
+    for effect, (_, entry, where) in zip(with_covariance, found, strict=False):
+        problems += _error_problems(effect, entry, links, where)
     if problems:
         raise StateError(problems)
     return ModelFile(
         stored.machine,
         links,
         tuple(entry.effect for entry in document.effects),
-        _with_own_covariance(fitted, covariance),
+        with_covariance,
         covariance,
         stored.steps,
         stored.geometry,
+        document.fitted_range,
+        {effect.id: entry.plausible for effect, entry, _ in found if entry.plausible},
+        tuple(_warnings(document, with_covariance, links, path)),
     )
+
+
+def _warnings(document: ModelDocument, fitted: Sequence[FittedEffect], links: int, path: Path) -> Iterator[Problem]:
+    """What the file does not say of itself, as those of releases up to 0.2.0 do not."""
+    if not document.checksum:
+        yield Problem(
+            where=str(path),
+            what="has no checksum: what was changed in it after it was written cannot be seen",
+            next_step="`compd effect fit` writes one",
+        )
+    needed = dict.fromkeys(chain.from_iterable(needed_quantities(effect.effect, links) for effect in fitted))
+    if unknown := [name for name in needed if name not in document.fitted_range]:
+        yield Problem(
+            where=str(path),
+            what="does not say in which range it was fitted: its effects are extrapolated without a limit",
+            value=", ".join(unknown),
+            next_step="fit it again with `compd effect fit`",
+        )
 
 
 def _with_own_covariance(fitted: Sequence[FittedEffect], covariance: FloatArray) -> tuple[FittedEffect, ...]:
@@ -276,8 +321,9 @@ def _links_of(effect: Effect, entry: EffectEntry) -> int:
 
 
 def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, problems: list[Problem]) -> FittedEffect:
-    """The effect with its numbers; what is missing goes to `problems`."""
+    """The effect with its numbers; what is missing, or in another unit, goes to `problems`."""
     values = {parameter.name: parameter.value for parameter in entry.parameters}
+    units = {parameter.name: parameter.unit for parameter in entry.parameters}
     columns = effect.columns(links)
     names = [column.name for column in columns]
     if sorted(values) != sorted(names):
@@ -291,6 +337,29 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
             )
         )
         return FittedEffect(effect, np.zeros(len(columns)))
+    problems += [
+        Problem(
+            where=f"{where}, {effect.id}, {column.name}",
+            what="is in another unit than the effect has" if units[column.name] else "has no unit",
+            value=f"unit: {units[column.name]}" if units[column.name] else "",
+            allowed=f"unit: {column.parameter.unit}",
+            next_step=f"write the value in {column.parameter.unit}, or fit it again with `compd effect fit`",
+        )
+        for column in columns
+        if units[column.name] != column.parameter.unit
+    ]
+    known = [*names, *(constant.name for constant in effect.constants)]
+    problems += [
+        Problem(
+            where=f"{where}, {effect.id}, plausible",
+            what="is a range of no number of this effect",
+            value=name,
+            allowed=", ".join(known),
+            next_step="mend the name, or remove it",
+        )
+        for name in entry.plausible
+        if name not in known
+    ]
     theta = np.array([column.parameter.to_theta(values[column.name]) for column in columns])
     missing = [constant.name for constant in effect.constants if constant.name not in entry.shape]
     if missing:
@@ -303,6 +372,26 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
             )
         )
     return FittedEffect(effect, theta, entry.shape)
+
+
+def _error_problems(fitted: FittedEffect, entry: EffectEntry, links: int, where: str) -> Iterator[Problem]:
+    """Standard errors that are not those of the covariance: one of the two was changed."""
+    said = {parameter.name: parameter.std for parameter in entry.parameters}
+    for estimate in _estimates(fitted, links):
+        std, of_covariance = said[estimate["name"]], estimate["std"]
+        if math.isnan(std) or math.isclose(std, of_covariance, rel_tol=_ROUNDING):
+            continue
+        yield Problem(
+            where=f"{where}, {fitted.effect.id}, {estimate['name']}",
+            what="has a standard error that is not the one of the covariance",
+            value=f"std: {std:g}",
+            allowed=f"std: {of_covariance:g}",
+            next_step="fit it again with `compd effect fit`",
+        )
+
+
+def _lists(ranges: Mapping[str, Range]) -> dict[str, list[float]]:
+    return {name: [float(low), float(high)] for name, (low, high) in ranges.items()}
 
 
 def _estimates(fitted: FittedEffect, links: int) -> list[dict[str, Any]]:

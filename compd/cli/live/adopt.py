@@ -45,6 +45,9 @@ def ask_daemon(file: Path | None, daemon: str, none: bool, shadow: bool) -> dict
             problems = [replace(problem, what=_with_hashes(problem.what)) for problem in error.problems]
             raise DaemonError(problems) from None
     typer.echo(f"applied: {_model_text(answer['applied'])}")
+    for model in answer.values():
+        for warning in model.get("warnings", ()) if isinstance(model, Mapping) else ():
+            typer.echo(f"warning: {warning}", err=True)
     if "shadow" in answer:
         typer.echo(f"shadow:  {_model_text(answer['shadow'])}")
     return answer

@@ -18,7 +18,7 @@ from compd.compensation.compensation import compensate_cmm
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.errors import StateError
 from compd.live.loop.commands import Target
-from compd.live.loop.cycle_readings import age_uncertainty_mm, read_comparators, read_scales
+from compd.live.loop.cycle_readings import Scales, age_uncertainty_mm, read_comparators, read_scales
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors
 from compd.live.loop.limits import LimitedCorrection, limit_correction, slewed, stroke_problem
 from compd.live.loop.machine_zero import MachineZero
@@ -187,11 +187,18 @@ def _compute(
         compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
         if code := int(compensation.reason):
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
-    reported = max(limited.state, usable.state, scales.state or State.OK, key=lambda state: state.rank)
-    reason = "; ".join(filter(None, (usable.reason, scales.reason, limited.reason)))
+    reported, reason = _reported(usable, scales, limited)
     u_tip_um = with_age(*u_tip, lambda: age_uncertainty_mm(snapshot, comparators, target, settings))
     setpoint_values = _setpoint_values(compensation, limited.applied_mm, u_tip_um, shadow, wires.tool_on_plate)
     return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state
+
+
+def _reported(usable: UsableComparators, scales: Scales, limited: LimitedCorrection) -> tuple[State, str]:
+    """State and reason of a valid setpoint: of what concerns it the worst state, and all reasons."""
+    beyond = f"effects stay at the edge of their range: {usable.beyond}" if usable.beyond else ""
+    at_edge = State.CLAMPED if beyond else State.OK
+    state = max(limited.state, usable.state, scales.state or State.OK, at_edge, key=lambda state: state.rank)
+    return state, "; ".join(filter(None, (usable.reason, scales.reason, limited.reason, beyond)))
 
 
 def _refused_skew(snapshot: Snapshot, skew_s: float, target: Target | None, settings: CycleSettings) -> _Outcome:

@@ -36,16 +36,19 @@ def read_comparators(
     lengths = wires.comparators.read(snapshot, zero_mm, extrapolate)
     lost, oldest_s = lengths.lost, lengths.oldest_s
     quantities: Mapping[str, FloatArray] = {}
+    beyond = ""
     if applied.quantities:
         needed = applied.read(snapshot)
         lost = lost.and_also(needed.lost)
         oldest_s = min(oldest_s, needed.oldest_s)
         quantities = applied.by_name(needed)
+        beyond = needed.beyond
     if not lost:
         length_times_s = lengths.oldest_s, lengths.newest_s
         drift_mm_per_s = () if settings.noise is None else wires.comparators.drift_mm_per_s(snapshot)
         live = ComparatorSet(lengths.values, now_s, oldest_s, quantities, (), length_times_s, drift_mm_per_s)
-        return live, usable_comparators(live, last_good, lost, now_s, settings.loop)
+        usable = usable_comparators(live, last_good, lost, now_s, settings.loop)
+        return live, usable._replace(beyond=beyond) if beyond else usable
     if settings.loop.on_stale == "degrade":
         groups = (
             _group(wires.joint, snapshot, zero_mm[: wires.joints], extrapolate),
@@ -57,7 +60,7 @@ def read_comparators(
 
 
 def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray, extrapolate: bool) -> GroupReadings:
-    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, extrapolate)
+    values, oldest_s, newest_s, lost, _ = wires.read(snapshot, zero_mm, extrapolate)
     return GroupReadings(values, lost, oldest_s, newest_s)
 
 
@@ -90,7 +93,7 @@ def read_scales(
             return unread
         state = State.FAULT if lost.distrusted else State.DEGRADED
         return unread._replace(state=state, reason=f"not compared with the setpoint: {lost}")
-    values, oldest_s, newest_s, lost = wires.read(snapshot, zero_mm, settings.loop.extrapolate)
+    values, oldest_s, newest_s, lost, _ = wires.read(snapshot, zero_mm, settings.loop.extrapolate)
     if not lost:
         return Scales(values, oldest_s, newest_s)
     # no policy replaces a scale: without it the tip is not known

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import structlog
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.errors import Problem, StateError
 from compd.files.atomic_files import read_small_file, write_files
+from compd.files.checksum import CHECKSUM, checksum_of
 from compd.files.file_kind import FileKind
 
 FILE_NAME = "machine-zero.json"
@@ -22,6 +23,8 @@ OLD_FILE_NAME = "machine-zero.json.old"
 _FORMAT = 2
 _LARGEST_FILE_BYTES = 1_000_000
 _TAKE_ONE = "bring the machine to its zero position and run `compd zero`"
+
+log = structlog.get_logger()
 
 
 class _ZeroFile(BaseModel):
@@ -64,12 +67,6 @@ class MachineZero:
         """Plain data from which `MachineZero(**data)` makes the same zero again."""
         return {"zero_hash": self.zero_hash, "taken_at": self.taken_at, "readings_mm": dict(self.readings_mm)}
 
-    @property
-    def checksum(self) -> str:
-        """First 16 hexadecimal digits of the SHA-256 of its content: a digit that was changed by hand shows."""
-        text = json.dumps(self.to_json(), sort_keys=True, allow_nan=False)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
-
     def changes_mm(self, before: MachineZero) -> dict[str, float]:
         """By how much each gauge reads more here than in `before`, by channel, mm; of the channels that both have."""
         return {
@@ -84,7 +81,7 @@ class MachineZero:
         The file that was there stays beside it as OLD_FILE_NAME. Raises StateError when the disk refuses.
         """
         path = directory / FILE_NAME
-        content = {"format": _FORMAT, **self.to_json(), "checksum": self.checksum}
+        content = {"format": _FORMAT, **self.to_json(), CHECKSUM: checksum_of(self.to_json())}
         text = json.dumps(content, indent=1, allow_nan=False) + "\n"
         try:
             directory.mkdir(parents=True, exist_ok=True)
@@ -182,13 +179,15 @@ def _parse_zero(content: Any, path: Path) -> MachineZero:
             ]
         ) from error
     zero = MachineZero(file.zero_hash, file.taken_at, file.readings_mm)
-    if file.format == _FORMAT and file.checksum != zero.checksum:
+    if file.format < _FORMAT:
+        log.warning("machine zero has no checksum: what was changed in it cannot be seen", path=str(path))
+    elif file.checksum != (checksum := checksum_of(zero.to_json())):
         raise StateError(
             Problem(
                 where=str(path),
                 what="was changed after it was written: its checksum does not fit",
                 value=file.checksum or "no checksum",
-                allowed=zero.checksum,
+                allowed=checksum,
                 next_step=f"{_TAKE_ONE}; the one before it is in {OLD_FILE_NAME}",
             )
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -24,8 +24,9 @@ from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
 from compd.model.observations import available_settings
-from compd.model_file.model_file import read_model_file
+from compd.model_file.model_file import ModelFile, Range, read_model_file
 from compd.plugins import OWN_CODE, Code
+from compd.recording.checks import limit_of
 
 _HASH_DIGITS = 16
 
@@ -59,6 +60,33 @@ class ModelText(NamedTuple):
         return hashlib.sha256(self.content).hexdigest()[:_HASH_DIGITS]
 
 
+class FittedRanges(NamedTuple):
+    """The range (k) of each quantity of a model in the recording that its effects were fitted on."""
+
+    low: FloatArray
+    high: FloatArray
+
+    @classmethod
+    def of(cls, names: Sequence[str], ranges: Mapping[str, Range]) -> Self | None:
+        """Of these quantities; one without a range has no limits. None where no range is known."""
+        known = [ranges.get(name, (-np.inf, np.inf)) for name in names]
+        if not any(name in ranges for name in names):
+            return None
+        return cls(np.array([low for low, _ in known]), np.array([high for _, high in known]))
+
+    def limited(self, read: WiredValues, names: Sequence[str]) -> WiredValues:
+        """The values (k) that were read, those beyond at the nearer end of their range. names : theirs."""
+        values = read.values
+        within = np.minimum(np.maximum(values, self.low), self.high)
+        if (within == values).all() or read.lost:
+            return read._replace(values=within)
+        beyond = ", ".join(
+            f"{names[k]} is {values[k]:.6g}, fitted from {self.low[k]:.6g} to {self.high[k]:.6g}"
+            for k in np.flatnonzero(within != values).tolist()
+        )
+        return read._replace(values=within, beyond=beyond)
+
+
 @dataclass(frozen=True, eq=False)
 class LiveModel:
     """A machine model that can be used in the loop.
@@ -69,12 +97,16 @@ class LiveModel:
     quantities : names of the temperatures, forces and so on that its effects need.
     wires : of these quantities, in the same order.
     text : its model file; None without effects.
+    ranges : in which each quantity was when the effects were fitted, in the same order; None where that is not known.
+    warnings : what the file does not say of itself.
     """
 
     machine: MachineModel
     quantities: tuple[str, ...]
     wires: Wires
     text: ModelText | None = None
+    ranges: FittedRanges | None = None
+    warnings: tuple[Problem, ...] = ()
 
     @property
     def file(self) -> str:
@@ -87,8 +119,9 @@ class LiveModel:
         return self.text.hash if self.text else ""
 
     def read(self, snapshot: Snapshot) -> WiredValues:
-        """The quantities in a snapshot, in their own units."""
-        return self.wires.read(snapshot, np.zeros(len(self.quantities)))
+        """The quantities in a snapshot, in their own units; one beyond the range of the fit is at its nearer end."""
+        read = self.wires.read(snapshot, np.zeros(len(self.quantities)))
+        return read if self.ranges is None else self.ranges.limited(read, self.quantities)
 
     def by_name(self, read: WiredValues) -> Mapping[str, FloatArray]:
         """What `read` returned, by name."""
@@ -102,6 +135,10 @@ class LiveModel:
             summary |= {"model": self.hash, "file": self.file}
         if not_live := [fitted.effect.id for fitted in self.machine.effects if not fitted.effect.live]:
             summary["not_live"] = not_live
+        if self.warnings:
+            summary["warnings"] = [
+                " ".join(filter(None, (w.what, w.value))) + f": {w.next_step}" for w in self.warnings
+            ]
         return summary
 
 
@@ -151,27 +188,34 @@ class ModelLoader:
         self._wires = wires
         self._code = code
 
-    def read(self, path: Path) -> LiveModel:
-        """The model in a file.
+    def read(self, path: Path, plausible: bool = True) -> LiveModel:
+        """The model in a file; `plausible` as of `load`.
 
         Raises CompdError with every problem: a file that cannot be read, what `read_model_file` refuses, gauges that
         the effects need and the machine does not have, an effect that fails.
         """
-        return self.load(ModelText.read(path))
+        return self.load(ModelText.read(path), plausible)
 
-    def load(self, text: ModelText | None) -> LiveModel:
-        """The model in a file that has been read; None is the machine without effects. Raises as `read` does."""
+    def load(self, text: ModelText | None, plausible: bool = True) -> LiveModel:
+        """The model in a file that has been read; None is the machine without effects. Raises as `read` does.
+
+        plausible : whether to refuse what is not plausible. False for a recording, which is replayed with what it had.
+        """
         if text is None:
             return self.without_effects
         model = self.without_effects.machine
         file = read_model_file(Path(text.file), self._machine, model.links, self._geometry, text.content, self._code)
-        if problems := [*self._unmet_needs(file.fitted), *_id_and_value_problems(file.fitted)]:
+        problems = [*self._unmet_needs(file.fitted), *_id_and_value_problems(file.fitted)]
+        if plausible and not problems:
+            problems = [*_implausible_numbers(file), *_implausible_ranges(file)]
+        if problems:
             raise StateError(problems)
         machine = replace(model, effects=file.fitted, covariance=file.covariance)
         needed = (needed_quantities(fitted.effect, model.links) for fitted in machine.live_effects)
         names = tuple(dict.fromkeys(chain.from_iterable(needed)))
         try_model(machine, names, text.file)
-        return LiveModel(machine, names, self._wires.quantity_wires(names), text)
+        ranges = FittedRanges.of(names, file.fitted_range)
+        return LiveModel(machine, names, self._wires.quantity_wires(names), text, ranges, file.warnings)
 
     def _unmet_needs(self, effects: tuple[FittedEffect, ...]) -> list[Problem]:
         """Live effects that need a gauge or a setting which is not there, or the time since a recording's start."""
@@ -218,6 +262,38 @@ def _id_and_value_problems(effects: tuple[FittedEffect, ...]) -> list[Problem]:
         )
         for fitted in effects
         if not np.isfinite([*fitted.theta, *fitted.constants.values()]).all()
+    ]
+
+
+def _implausible_numbers(file: ModelFile) -> list[Problem]:
+    """Numbers beyond the plausible range of their effect, and standard errors that are larger than it."""
+    return [
+        Problem(
+            where=f"effect {number.effect}, {number.parameter}",
+            what="is not plausible",
+            value=f"{number.value:g} {number.unit}, standard error {number.standard_error:g}",
+            allowed=f"{number.plausible_low:g} to {number.plausible_high:g} {number.unit}, with a smaller error",
+            next_step="fit it again with `compd effect fit`; where it is meant, write the range under the effect: "
+            f"`plausible: {{{number.parameter}: [LOW, HIGH]}}`, and remove the line `checksum`",
+        )
+        for number in file.numbers()
+        if not number.plausible
+    ]
+
+
+def _implausible_ranges(file: ModelFile) -> list[Problem]:
+    """Quantities that were broken in the recording that the effects were fitted on."""
+    limits = {name: limit for name in file.fitted_range if (limit := limit_of(name)) is not None}
+    return [
+        Problem(
+            where=f"fitted_range, {name}",
+            what="was not plausible in the recording that the effects were fitted on",
+            value=f"{file.fitted_range[name][0]:g} to {file.fitted_range[name][1]:g}",
+            allowed=f"{limit.low:g} to {limit.high:g}: {limit.why}",
+            next_step="leave these rows out of the recording, and fit it again with `compd effect fit`",
+        )
+        for name, limit in limits.items()
+        if not limit.low <= file.fitted_range[name][0] <= file.fitted_range[name][1] <= limit.high
     ]
 
 

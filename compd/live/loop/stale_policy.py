@@ -54,6 +54,7 @@ class UsableComparators(NamedTuple):
         multiplied by it already.
     absent_mm : (k + 9), standard uncertainty of what is taken for each comparator beyond its noise; None for none.
         Infinite where it is not known.
+    beyond : which quantities are beyond the range in which the effects were fitted; "" for none.
     """
 
     comparators: ComparatorSet | None
@@ -62,6 +63,7 @@ class UsableComparators(NamedTuple):
     expires_s: float
     weight: float = 1.0
     absent_mm: FloatArray | None = None
+    beyond: str = ""
 
 
 def usable_comparators(

@@ -48,8 +48,8 @@ class State(StrEnum):
         "when it has arrived",
     )
     CLAMPED = (
-        "clamped", 4, True, 3, "a link's correction is at its limit, `limits.correction_mm`",
-        "when the gauges ask for less",
+        "clamped", 4, True, 3, "a link's correction is at its limit, `limits.correction_mm`, or an effect at the edge "
+        "of the range in which it was fitted", "when the gauges ask for less, or the model is fitted again",
     )
     HOLD = "hold", 5, True, 2, _LOST + "the last good set of them is used, at most `loop.hold_s`", _BACK
     FADE = "fade", 6, True, 2, _LOST + "the last good set is taken back to zero over `loop.hold_s`", _BACK

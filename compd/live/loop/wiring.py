@@ -28,12 +28,14 @@ class WiredValues(NamedTuple):
         for temperatures and other quantities, whose zero is 0. nan where the reading cannot be used.
     oldest_s, newest_s : monotonic times of the oldest and of the newest reading; inf and -inf without wires.
     lost : which readings cannot be used, and why.
+    beyond : which values were beyond the range that they are limited to; "" for none.
     """
 
     values: FloatArray
     oldest_s: float
     newest_s: float
     lost: Lost
+    beyond: str = ""
 
 
 class Wire(NamedTuple):

@@ -1,4 +1,4 @@
-"""What every length gauge showed last, on disk: one that was switched off with the computer may count anew.
+"""What every gauge showed last, on disk: one that was switched off with the computer may count anew.
 
 When the daemon starts, a gauge must show what it showed last, as after any loss of its line; so must one that was not
 believed. A daemon that was away for seconds only, on a computer that was not started anew, goes on.
@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.clock import Clock
 from compd.files.atomic_files import write_files
+from compd.files.checksum import CHECKSUM, checksum_of
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
 FILE_NAME = "last-readings.json"
@@ -32,13 +33,22 @@ _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 log = structlog.get_logger()
 
 
-class _LastReading(BaseModel):
+class _LastDoubt(BaseModel):
     model_config = ConfigDict(strict=True)
 
-    value_mm: FiniteFloat
     doubt: int = 0
     amount: float | None = None
     evidence: str = ""
+
+
+class _LastReading(_LastDoubt):
+    value_mm: FiniteFloat
+
+
+class _LastQuantity(_LastDoubt):
+    """value : in the unit of the quantity's name."""
+
+    value: FiniteFloat
 
 
 class _LastReadingsFile(BaseModel):
@@ -49,6 +59,8 @@ class _LastReadingsFile(BaseModel):
     boot_id: str
     time_s: FiniteFloat
     readings: dict[str, _LastReading]
+    quantities: dict[str, _LastQuantity] = {}
+    checksum: str = ""
 
 
 class LastReadings:
@@ -67,28 +79,20 @@ class LastReadings:
 
     def recall(self) -> None:
         """Take what is on disk into the memory; before any gauge is read."""
-        try:
-            content = self._path.read_text(encoding="utf-8")
-        except FileNotFoundError:
-            return
-        except (OSError, UnicodeDecodeError) as error:
-            log.warning("last readings cannot be read", path=str(self._path), reason=str(error))
-            return
-        try:
-            file = _LastReadingsFile.model_validate(json.loads(content))
-        except (ValueError, RecursionError, ValidationError) as error:
-            log.warning("last readings are damaged", path=str(self._path), reason=str(error).splitlines()[0])
-            return
-        if file.zero_hash != self._zero_hash or file.format != _FORMAT:
+        file = self._read()
+        if file is None or file.zero_hash != self._zero_hash or file.format != _FORMAT:
             return
         now_s = self._clock.monotonic()
         goes_on = file.boot_id == boot_id() and 0.0 <= now_s - file.time_s <= _LONGEST_ABSENCE_S
         memory = self._memory
-        for channel, last in file.readings.items():
+        values = {channel: last.value_mm for channel, last in file.readings.items()}
+        values |= {channel: last.value for channel, last in file.quantities.items()}
+        for channel, value in values.items():
             i = memory.index.get(channel)
             if i is not None:
-                memory.believe(i, last.value_mm, file.time_s if goes_on else now_s)
-        for channel, last in file.readings.items():
+                memory.believe(i, value, file.time_s if goes_on else now_s)
+        doubts: dict[str, _LastDoubt] = {**file.readings, **file.quantities}
+        for channel, last in doubts.items():
             i = memory.index.get(channel)
             if i is None:
                 continue
@@ -96,8 +100,29 @@ class LastReadings:
                 memory.distrust(i, Doubt(min(last.doubt, max(Doubt))), math.nan if last.amount is None else last.amount)
             elif not goes_on:
                 memory.lose(i, now_s)
-        if evidence := {channel: last.evidence for channel, last in file.readings.items() if last.evidence}:
+        if evidence := {channel: last.evidence for channel, last in doubts.items() if last.evidence}:
             memory.evidence.write(evidence)
+
+    def _read(self) -> _LastReadingsFile | None:
+        """What is on disk; None where there is nothing, or nothing that can be used."""
+        try:
+            content = self._path.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return None
+        except (OSError, UnicodeDecodeError) as error:
+            log.warning("last readings cannot be read", path=str(self._path), reason=str(error))
+            return None
+        try:
+            data = json.loads(content)
+            file = _LastReadingsFile.model_validate(data)
+            if file.checksum and file.checksum != checksum_of(data):
+                raise ValueError("the checksum does not fit")
+        except (ValueError, RecursionError, ValidationError) as error:
+            log.warning("last readings are damaged", path=str(self._path), reason=str(error).splitlines()[0])
+            return None
+        if not file.checksum:
+            log.warning("last readings have no checksum: what was changed in them cannot be seen", path=str(self._path))
+        return file
 
     def start(self) -> None:
         """Write from now on."""
@@ -125,18 +150,21 @@ class LastReadings:
             if not (moved.any() or new.any() or (doubt != self._written[1]).any()):
                 return
         evidence = memory.evidence.read() or {}
-        readings = {
+        entries = {
             channel: self._entry(i, float(value[i]), int(doubt[i]), evidence.get(channel, ""))
             for i, channel in enumerate(memory.channels)
             if known[i]
         }
-        content = {
+        lengths = set(memory.channels[: memory.lengths])
+        content: dict[str, Any] = {
             "format": _FORMAT,
             "zero_hash": self._zero_hash,
             "boot_id": boot_id(),
             "time_s": self._clock.monotonic(),
-            "readings": readings,
+            "readings": {channel: entry for channel, entry in entries.items() if channel in lengths},
+            "quantities": {channel: entry for channel, entry in entries.items() if channel not in lengths},
         }
+        content[CHECKSUM] = checksum_of(content)
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             write_files({self._path: json.dumps(content, indent=1, allow_nan=False) + "\n"})
@@ -148,8 +176,8 @@ class LastReadings:
         self._failed = False
         self._written = value, doubt
 
-    def _entry(self, i: int, value_mm: float, doubt: int, evidence: str) -> dict[str, Any]:
-        entry: dict[str, Any] = {"value_mm": value_mm}
+    def _entry(self, i: int, value: float, doubt: int, evidence: str) -> dict[str, Any]:
+        entry: dict[str, Any] = {"value_mm" if i < self._memory.lengths else "value": value}
         if doubt > Doubt.LOST:
             amount = float(self._memory.amount[i])
             entry |= {"doubt": doubt, **({"amount": amount} if math.isfinite(amount) else {})}

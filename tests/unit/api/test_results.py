@@ -104,6 +104,18 @@ def test_the_error_falls_to_the_floor_and_the_ledger_says_so(recording: AlignedR
     assert value.value == pytest.approx(1.1, abs=4 * value.standard_error)
 
 
+def test_a_model_keeps_the_range_that_it_was_fitted_in(
+    recording: AlignedRecording, model: ModelFile, tmp_path: Path
+) -> None:
+    assert list(model.fitted_range) == [f"temperature_link_{i}_degC" for i in (1, 2, 3)]
+    for name, (low, high) in model.fitted_range.items():
+        values = recording.rows.quantities[name]
+        assert low == values.min() < values.max() == high
+    model.write(tmp_path / "model.yaml")
+    opened = compd.open_model(tmp_path / "model.yaml")
+    assert (opened.fitted_range, opened.warnings) == (model.fitted_range, ())
+
+
 def test_adding_changes_nothing_of_the_model_before(recording: AlignedRecording, model: ModelFile) -> None:
     longer = compd.add_effect(model, FORMULA, recording)
     assert [step.effect for step in longer.steps] == ["link_expansion", "my_growth"]

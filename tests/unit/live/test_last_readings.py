@@ -111,3 +111,33 @@ def test_a_machine_at_rest_is_written_once_and_a_disk_that_refuses_stops_nothing
     last = LastReadings(tmp_path / "file" / "no directory", HASH, left, Clock())
     last.start()
     last.stop()
+
+
+def test_a_thermometer_that_was_not_believed_is_not_believed_after_a_start(tmp_path):
+    def with_thermometer() -> TrustMemory:
+        return TrustMemory((*CHANNELS, "cabinet.link_1"), [0.001] * 3 + [0.25], ["degC"])
+
+    left = with_thermometer()
+    left.believe(0, 12.5, 100.0)
+    left.believe(3, 23.0, 100.0)
+    left.distrust(3, Doubt.JUMPED, 5.0)
+    last = LastReadings(tmp_path, HASH, left, Clock(now_s=100.0))
+    last.start()
+    last.stop()
+    found = with_thermometer()
+    LastReadings(tmp_path, HASH, found, Clock(now_s=103.0)).recall()
+    assert found.value[3] == 23.0
+    assert "jumped by 5.000 degC: look at it, then `compd accept cabinet`" in found.explanation(3)
+
+
+def test_a_file_that_was_changed_is_damaged_and_one_without_a_checksum_is_warned_of(tmp_path, capsys):
+    written(tmp_path)
+    path = tmp_path / FILE_NAME
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"time_s": 99.0}))
+    assert math.isnan(recalled(tmp_path).value[0])
+    assert "the checksum does not fit" in capsys.readouterr().out
+    del content["checksum"]
+    path.write_text(json.dumps(content))
+    assert recalled(tmp_path).value[0] == 12.5
+    assert "have no checksum" in capsys.readouterr().out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -97,11 +98,16 @@ def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
     assert found.fitted[0].effect.equation == effect.equation
 
 
+def parameter(data: dict[str, Any]) -> dict[str, Any]:
+    entry: dict[str, Any] = data["effects"][0]["parameters"][0]
+    return entry
+
+
 @pytest.mark.parametrize(
     ("edit", "said"),
     [
         (lambda data: data.update(machine="hexapod"), "belongs to another machine"),
-        (lambda data: data.update(format=9), "was written by a later release(.|\n)*format: 1 to 2(.|\n)*next: install"),
+        (lambda data: data.update(format=9), "was written by a later release(.|\n)*format: 1 to 3(.|\n)*next: install"),
         (lambda data: data.update(format=0), "format: "),
         (lambda data: data.update(colour="red"), "m.yaml, colour: is no key that belongs here"),
         (lambda data: data["effects"][0].update(effect="link_elastisity"), "no such effect"),
@@ -111,6 +117,16 @@ def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
         (lambda data: data.update(covariance=[[1.0]]), "another size"),
         (lambda data: data["effects"][0].update(effect=None), "effects 1, effect: is no text"),
         (lambda data: data["effects"][0]["parameters"][0].update(value="much"), "parameters 1, value: is no number"),
+        (lambda data: parameter(data).update(unit="1/K"), "another unit(.|\n)*unit: 1/K(.|\n)*unit: N/um"),
+        (lambda data: parameter(data).pop("unit"), "has no unit(.|\n)*allowed: unit: N/um"),
+        (lambda data: parameter(data).update(std=-0.1), "std: is negative: a standard error is 0 or more"),
+        (lambda data: parameter(data).update(std=1e-9), "standard error that is not the one of the covariance"),
+        (lambda data: data["covariance"][0].__setitem__(0, -1e-7), "negative variance, -1e-07: number 1"),
+        (lambda data: data["covariance"][1].__setitem__(1, 1e300), "standard error that is not the one of the cov"),
+        (lambda data: data["covariance"][1].__setitem__(0, 1.0), "is not symmetric: 1 and 2e-08 at 2, 1"),
+        (lambda data: data.update(covariance=[[1e-7, 1e-3], [1e-3, 4e-6]]), "has a correlation beyond 1"),
+        (lambda data: data.update(fitted_range={"temperature_link_1_degC": [25, 19]}), "is no range: .lowest, highest"),
+        (lambda data: data["effects"][0].update(plausible={"z": [0, 1]}), "is a range of no number of this effect"),
         (lambda data: data["steps"][0].update(kind="guess"), "steps 1, kind: is none of the choices"),
         (lambda data: data["steps"][0].update(colour="red"), "steps 1, colour: is no key that belongs here"),
         (lambda data: data["steps"][0].pop("kind"), "steps 1, kind: is missing"),
@@ -121,19 +137,64 @@ def test_a_wrong_file_is_refused_in_words(tmp_path: Path, edit: object, said: st
     example().write(path)
     data = yaml.safe_load(path.read_text())
     edit(data)  # type: ignore[operator]
+    del data["checksum"]
     path.write_text(yaml.safe_dump(data))
     with pytest.raises(StateError, match=said):
         read_model_file(path, "tripod-cmm", 3)
 
 
-@pytest.mark.parametrize("format_", [1, None])
-def test_files_of_release_0_1_0_are_read(tmp_path: Path, format_: int | None) -> None:
+@pytest.mark.parametrize("format_", [2, 1, None])
+def test_files_of_earlier_releases_are_read_and_warned_of(tmp_path: Path, format_: int | None) -> None:
     path = tmp_path / "m.yaml"
     example().write(path)
     data = yaml.safe_load(path.read_text())
-    assert data.pop("format") == 2
+    assert data.pop("format") == 3
+    del data["checksum"]
     path.write_text(yaml.safe_dump(data if format_ is None else {"format": format_, **data}))
-    assert read_model_file(path, "tripod-cmm", 3).declared == example().declared
+    found = read_model_file(path, "tripod-cmm", 3)
+    assert found.declared == example().declared
+    no_checksum, no_range = found.warnings
+    assert "has no checksum" in no_checksum.what
+    assert "does not say in which range it was fitted" in no_range.what
+    assert "temperature_link_3_degC" in no_range.value
+
+
+def test_what_a_person_means_and_where_it_was_fitted_are_kept(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    ranges = {f"temperature_link_{i}_degC": (19.2, 24.6) for i in (1, 2, 3)} | {
+        f"force_{axis}_N": (-50.0, 50.0) for axis in "xyz"
+    }
+    meant = {"link_expansion_lag": {"a": (-5.0, 30.0)}}
+    replace(example(), fitted_range=ranges, plausible=meant).write(path)
+    found = read_model_file(path, "tripod-cmm", 3)
+    assert (found.fitted_range, found.plausible, found.warnings) == (ranges, meant, ())
+    assert [(number.plausible_low, number.plausible_high) for number in found.numbers() if number.parameter == "a"] == [
+        (-5.0, 30.0)
+    ]
+
+
+def test_every_changed_digit_is_seen_and_no_comment(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    example().write(path)
+    text = path.read_text()
+    digits = [k for k, character in enumerate(text) if character.isdigit()]
+    for k in digits[:: max(1, len(digits) // 40)]:
+        changed = text[:k] + str((int(text[k]) + 1) % 10) + text[k + 1 :]
+        if yaml.safe_load(changed) == yaml.safe_load(text):  # the 17th digit of a number
+            continue
+        path.write_text(changed)
+        with pytest.raises(StateError):
+            read_stored(path)
+    path.write_text("# of the week after the move\n" + text)
+    assert read_stored(path).machine == "tripod-cmm"
+
+
+def test_a_changed_file_says_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    example().write(path)
+    path.write_text(path.read_text().replace("value: 28.0", "value: 29.0"))
+    with pytest.raises(StateError, match=r"its checksum does not fit(.|\n)*where the change is meant, remove the line"):
+        read_stored(path)
 
 
 def test_every_mistake_in_the_structure_is_in_one_message(tmp_path: Path) -> None:
@@ -157,6 +218,7 @@ def test_every_problem_is_in_one_message(tmp_path: Path) -> None:
     data = yaml.safe_load(path.read_text())
     data["effects"][0]["effect"] = "nothing"
     data["effects"][1]["shape"] = {}
+    del data["checksum"]
     path.write_text(yaml.safe_dump(data))
     with pytest.raises(StateError) as caught:
         read_model_file(path, "tripod-cmm", 3)

@@ -48,6 +48,7 @@ class ModelSummaryKeys(Keys):
 
     effects: list[str] = Field(description="ids of the effects that are computed")
     not_live: list[str] | None = Field(default=None, description="ids of effects at the reference, not computed")
+    warnings: list[str] | None = Field(default=None, description="what the model file does not say of itself")
     model: str | None = Field(default=None, description="hash of its file; absent without effects")
     file: str | None = Field(default=None, description="path of its file; absent without effects, and from STATUS")
 
