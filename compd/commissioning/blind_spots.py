@@ -22,12 +22,15 @@ from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.errors import KinematicsError
+from compd.live.quantity_limits import UNIT_LIMITS
 from compd.machine_builder import build_model
 from compd.model.machine import MachineModel
 from compd.model.tool import ToolOnPlate
 from compd.units import UM_PER_MM
 
 DRIFT_UM = 10.0
+# Handbooks: steel 11 to 12.5.
+STEEL_PPM_PER_K = 11.5
 # Where no gauge says how fast the machine moves: a measuring machine between two points.
 _USUAL_SPEED_MM_PER_S = 50.0
 
@@ -223,6 +226,19 @@ def _is_absolute(configuration: Configuration, gauge: str) -> bool:
     return configuration.drivers[gauge].absolute if said is None else said
 
 
+def _wrong_thermometer(figures: Figures) -> str:
+    """Steel links: errors of a thermometer at one link that stay unseen at once, and for good."""
+    configuration = figures.configuration
+    length_mm = float(max(build_model(configuration.geometry, configuration.wiring).zero.link_length_mm))
+    um_per_K = STEEL_PPM_PER_K * 1e-6 * length_mm * UM_PER_MM * figures.leverage("scale")
+    limits = UNIT_LIMITS["degC"]
+    return (
+        f"with steel links ({STEEL_PPM_PER_K:g} ppm/K), {um_per_K:.1f} um at the tip for each kelvin of a link's "
+        f"thermometer: {um_per_K * limits.tolerance:.1f} um at once, {um_per_K * limits.apart:.0f} um as slowly as "
+        f"{limits.fastest_per_s:g} K/s; where the model file keeps the range of its fit, no more than that range makes"
+    )
+
+
 def shown_by(spot: BlindSpot, configuration: Configuration | None = None) -> str:
     """What shows a fault, in words: with the vote for it, and whether that is on in this configuration."""
     if not spot.vote:
@@ -310,6 +326,16 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "tip_mm_per_s",
         "in machine-tool mode, and whatever is slower",
         lambda figures: f"1 mm of a scale is {figures.leverage('scale'):.2f} mm at the tip",
+    ),
+    BlindSpot(
+        "wrong_thermometer",
+        "a thermometer that an effect reads is wrong: its wire, its module or its place has changed",
+        "beyond its range, faster than heat changes anything, or far from most other thermometers "
+        "(`plausible`, `fastest_change`, `apart` of the quantity); or the same digits while all others change",
+        "standing_temperature_K",
+        "what is slower and nearer than that, or nearer when the daemon starts; several alike; one that falls off its "
+        "part into air as warm",
+        _wrong_thermometer,
     ),
     BlindSpot(
         "power_cut",

@@ -9,10 +9,13 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from compd.configuration.operation import TargetSettings
+from compd.configuration.operation import TargetSettings, VoteSettings
 
 # What says how far a gauge is believed, and not what it shows.
-NOT_IN_ZERO = ("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss")
+NOT_IN_ZERO = (
+    *("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss"),
+    *("plausible", "fastest_change", "apart"),
+)
 # Options that a later release has brought, with the value that leaves everything as it was.
 _LATER_OPTIONS: Mapping[str, Any] = {
     "fastest_mm_per_s": None,
@@ -47,6 +50,10 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "round_trigger": None,
     "gateway_wait_s": None,
     "wake_latency_us": None,
+    "plausible": None,
+    "fastest_change": None,
+    "apart": None,
+    "standing_temperature_K": VoteSettings().standing_temperature_K,
 }
 # Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
 _FORMER_SPEED_LIMITS: Mapping[str, float] = {

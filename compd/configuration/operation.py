@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
-from compd.configuration.section import AbsolutePath, Positive, Section, Text, refusal
+from compd.configuration.section import AbsolutePath, Finite, Positive, Section, Text, refusal
 
 # The nine distances of the frame's octahedron: t_k between the base platform's supports, u_k from them to the plate.
 FrameDistance = Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]
@@ -60,6 +60,27 @@ class QuantityWire(Section):
     )
     gauge: GaugeChannel = Field(description=_GAUGE)
     noise: Positive | None = Field(default=None, description="standard deviation of one reading, in the name's unit")
+    plausible: tuple[Finite, Finite] | None = Field(
+        default=None,
+        description="lowest and highest plausible value: a reading beyond is not believed; left out: by the name, "
+        "a room 0 to 50 degC, a part of the machine -20 to 150 degC, air 500 to 1100 hPa",
+    )
+    fastest_change: Positive | None = Field(
+        default=None,
+        description="fastest change per second, in the name's unit: a reading that jumped further is not believed; "
+        "left out: by the unit, 0.2 degC, 0.1 hPa, 3 pct; else no limit",
+    )
+    apart: Positive | None = Field(
+        default=None,
+        description="largest difference from the other quantities of this unit: a reading that is further from most of "
+        "them, and from two at least, is not believed; left out: 15 degC; else no limit",
+    )
+
+    @model_validator(mode="after")
+    def _is_range(self) -> Self:
+        if self.plausible is not None and not self.plausible[0] < self.plausible[1]:
+            raise refusal("plausible is an empty range", "[lowest, highest], lowest < highest", "exchange the two")
+        return self
 
 
 class Wiring(Section):
@@ -147,6 +168,11 @@ class VoteSettings(Section):
         default=True,
         description="a length gauge that repeats the very same digits while others scatter is stuck; for gauges whose "
         "`noise_um` is larger than their resolution",
+    )
+    standing_temperature_K: Positive | None = Field(
+        default=2.0,
+        description="a thermometer that repeats the very same digits while all others have changed by this much, the "
+        "same way, is stuck; null: not looked at",
     )
     standing_scale_mm: Positive | None = Field(
         default=2.0,

@@ -26,7 +26,6 @@ from compd.configuration.pushed_lines import PushedLineSettings
 from compd.errors import DaemonError, StateError
 from compd.live.acquisition.acquisition import Acquisition
 from compd.live.acquisition.votes.votes import Votes
-from compd.live.length_trust import length_memory, length_trust, wired_lengths
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
@@ -57,6 +56,7 @@ from compd.live.service.status_message import StatusReport
 from compd.live.service.tcp_access import TcpAccess
 from compd.live.service.udp_sender import UdpSender
 from compd.live.service.zero_capture import ZeroCapture
+from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.model.machine import MachineModel
 from compd.release import __version__
 
@@ -230,7 +230,7 @@ class Daemon:
     def _acquisition(self, gauges: dict[str, Any], votes: Votes, clock: Clock) -> list[AcquisitionProcess]:
         """One process for all lines but those that have one of their own; the first one looks at the votes."""
         configuration = self.configuration
-        trust = length_trust(configuration, self._wires, self.trust)
+        trust = wired_trust(configuration, self._wires, self.trust)
         own = configuration.acquisition.own_process
         on_line = {
             line: [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line]
@@ -279,7 +279,7 @@ class Daemon:
         return Votes(
             configuration.votes,
             self.trust,
-            wired_lengths(configuration, self._wires, model),
+            wired_channels(configuration, self._wires, model),
             self._wires.quantity_channels,
             self.latest,
             zero_mm,
@@ -293,8 +293,8 @@ class Daemon:
         return None if content is None else SentSetpoint.unpack(content).line
 
     def _trust(self, before: Daemon | None) -> TrustMemory:
-        """What is known of the length gauges: that of the daemon whose place this one takes, where it has the same."""
-        memory = length_memory(self.configuration, self._wires)
+        """What is known of the wired gauges: that of the daemon whose place this one takes, where it has the same."""
+        memory = wired_memory(self.configuration, self._wires)
         if before is not None and before.configuration.zero_hash == self.configuration.zero_hash:
             before.trust.tolerance_mm[:] = memory.tolerance_mm
             return before.trust
@@ -326,5 +326,7 @@ def _first_models(configuration: Configuration, loader: ModelLoader) -> Models:
     if file is None:
         return Models(loader.without_effects)
     model = loader.read(Path(file))
+    for warning in model.warnings:
+        _log.warning("model file", reason=str(warning))
     _log.info("model", file=file, hash=model.hash, effects=[fitted.effect.id for fitted in model.machine.live_effects])
     return Models(model)

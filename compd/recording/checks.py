@@ -88,6 +88,11 @@ LIMITS: tuple[Limit, ...] = tuple(
 _SMALLEST_JOINT_UM = 0.05
 
 
+def limit_of(name: str) -> Limit | None:
+    """What values of the column of this name are plausible; None where nothing is known."""
+    return next((limit for limit in LIMITS if limit.pattern.fullmatch(name)), None)
+
+
 def check_values(table: Table, problems: ProblemList) -> None:
     """Check every column but the time: rules first (problems), then plausible limits (warnings)."""
     for name in ID_COLUMNS:
@@ -198,21 +203,20 @@ def check_time(table: Table, problems: ProblemList) -> None:
 def _check_limits(table: Table, problems: ProblemList) -> None:
     """Warn of values that are implausible for their unit; the values are used all the same."""
     for name, values in table.columns.items():
-        for limit in LIMITS:
-            if limit.pattern.fullmatch(name):
-                with np.errstate(invalid="ignore"):
-                    strange = (values < limit.low) | (values > limit.high)
-                _report(
-                    table,
-                    name,
-                    strange,
-                    problems,
-                    "implausible for its unit",
-                    f"{limit.low:g} to {limit.high:g}: {limit.why}",
-                    "look; it is used as it stands",
-                    warn=True,
-                )
-                break
+        if (limit := limit_of(name)) is None:
+            continue
+        with np.errstate(invalid="ignore"):
+            strange = (values < limit.low) | (values > limit.high)
+        _report(
+            table,
+            name,
+            strange,
+            problems,
+            "implausible for its unit",
+            f"{limit.low:g} to {limit.high:g}: {limit.why}",
+            "look; it is used as it stands",
+            warn=True,
+        )
 
 
 def largest_joint_um(table: Table) -> float:

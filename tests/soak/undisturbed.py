@@ -19,13 +19,13 @@ from compd.configuration import Configuration, load
 from compd.gauge import Channel, Gauge, Quality, Reading, good
 from compd.live.acquisition.polled_gauge import PolledGauge
 from compd.live.acquisition.votes.votes import LOOK_EVERY_S, Votes
-from compd.live.length_trust import length_memory, length_trust, wired_lengths
 from compd.live.loop.commands import Commands
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.memory.trust_memory import Doubt
 from compd.live.pipeline import build_pipeline
+from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.simulation.truth.world import World
 from compd.simulation.wires.sensing import Sensing
 
@@ -130,8 +130,8 @@ class TimeLapse:
         self._gauges = self._drivers(configuration)
         pipeline = build_pipeline(configuration, self._gauges)
         self._latest, self._settings = pipeline.latest, pipeline.settings
-        self.memory = length_memory(configuration, pipeline.wires)
-        trust = length_trust(configuration, pipeline.wires, self.memory)
+        self.memory = wired_memory(configuration, pipeline.wires)
+        trust = wired_trust(configuration, pipeline.wires, self.memory)
         self._polled = [
             PolledGauge(name, gauge, self._latest, REST_AFTER_FAULT_S, STALE_S, self._clock, trust)
             for name, gauge in self._gauges.items()
@@ -145,7 +145,7 @@ class TimeLapse:
         self._votes = Votes(
             configuration.votes,
             self.memory,
-            wired_lengths(configuration, pipeline.wires, self._settings.model),
+            wired_channels(configuration, pipeline.wires, self._settings.model),
             pipeline.wires.quantity_channels,
             self._latest,
             lambda: readings,

@@ -14,17 +14,22 @@ from compd.model_file.model_file import ModelFile
 from tests.support.live_machine import Machine
 
 
-def file_with(path: Path, *declared, name="tripod-cmm", links=3, **theta) -> Path:
-    """A model file with these effects; numbers by id, else ones."""
-    fitted = []
+def file_with(path: Path, *declared, name="tripod-cmm", links=3, fitted_range=None, **theta) -> Path:
+    """A model file with these effects; numbers by id, else ones, which need not be plausible."""
+    fitted, anything = [], {}
     for declaration in declared:
         effect = find_effect(declaration, "here")
         columns = effect.columns(links)
         numbers = np.broadcast_to(theta.get(effect.id, 1.0), (len(columns),)).astype(float)
         shape = {constant.name: constant.grid[0] for constant in effect.constants}
         fitted.append(FittedEffect(effect, numbers, shape))
+        anything[effect.id] = dict.fromkeys(
+            (*(column.name for column in columns), *shape), (-1000000000.0, 1000000000.0)
+        )
     count = sum(len(effect.theta) for effect in fitted)
-    ModelFile(name, links, tuple(declared), tuple(fitted), np.eye(count) * 1e-2).write(path)
+    covariance = np.eye(count) * 1e-2
+    file = ModelFile(name, links, tuple(declared), tuple(fitted), covariance, plausible=anything)
+    replace(file, fitted_range=fitted_range or {}).write(path)
     return path
 
 

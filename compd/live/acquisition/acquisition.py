@@ -19,11 +19,11 @@ from compd.configuration.pushed_lines import PushedLineSettings
 from compd.gauge import Gauge, LineFault, Quality
 from compd.lines import open_line
 from compd.lines.modbus_tcp import ModbusTcp
+from compd.live.acquisition.gauge_trust import Judge
 from compd.live.acquisition.peers import Peers
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.polled_round import OpenLine, PolledRound
 from compd.live.acquisition.pushed_round import PushedRound
-from compd.live.acquisition.reading_trust import ReadingTrust
 from compd.live.acquisition.round_trigger import RoundBuffer
 from compd.live.memory.latest import Latest
 from compd.live.memory.poll_requests import PollRequests
@@ -31,7 +31,7 @@ from compd.live.realtime import sharpen_timers
 
 log = structlog.get_logger()
 
-_NO_TRUST: Mapping[str, ReadingTrust] = {}
+_NO_TRUST: Mapping[str, Judge] = {}
 # Opens a line from its settings; raises LineFault (LINE_LOST) where it cannot.
 Opener = Callable[[Any, Clock], OpenLine]
 
@@ -55,14 +55,14 @@ class LineThread:
         latest: Latest,
         clock: Clock,
         opener: Opener = open_line,
-        trust: Mapping[str, ReadingTrust] = _NO_TRUST,
+        trust: Mapping[str, Judge] = _NO_TRUST,
         peers: Peers | None = None,
         poll_requests: PollRequests | None = None,
     ) -> None:
         """`gauges`: (name, driver) in the order of polling; `latest` must have their channels as "gauge.channel".
 
         `stale_after_s`: by gauge, age (s) from which its readings are not used. `trust`: judges the readings of each
-        length channel that is wired, by "gauge.channel". `peers`: of the lines beside this one.
+        channel that is wired, by "gauge.channel". `peers`: of the lines beside this one.
         `poll_requests`: of clients.
         """
         self.name = name
@@ -183,7 +183,7 @@ class Acquisition:
         latest: Latest,
         clock: Clock,
         opener: Opener = open_line,
-        trust: Mapping[str, ReadingTrust] = _NO_TRUST,
+        trust: Mapping[str, Judge] = _NO_TRUST,
         poll_requests: PollRequests | None = None,
     ) -> None:
         """`lines`: settings of each line and its gauges as (name, driver), by name of the line.

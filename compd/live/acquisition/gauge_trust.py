@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 from compd.clock import Clock
 from compd.gauge import Quality, Reading
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
+from compd.live.acquisition.quantity_trust import QuantityTrust
 from compd.live.acquisition.reading_trust import ReadingTrust
+
+# Of a length, and of any other quantity.
+Judge: TypeAlias = ReadingTrust | QuantityTrust
 
 
 class GaugeTrust:
     """Judges the readings of one gauge, channel by channel; used by its line's thread."""
 
-    def __init__(self, channels: Sequence[ReadingTrust | None], clock: Clock) -> None:
-        """`channels`: the judge of each channel, in their order; None for one that is no length or is not wired."""
+    def __init__(self, channels: Sequence[Judge | None], clock: Clock) -> None:
+        """`channels`: the judge of each channel, in their order; None for one that is not wired."""
         self._channels = tuple(channels)
         self._clock = clock
         self._first: Sequence[Reading | None] = ()
@@ -24,7 +29,7 @@ class GaugeTrust:
         self._surprising: dict[int, Reading] = {}  # by place: came unasked, and waits for the next
 
     def read(self, ask: Callable[[], Sequence[Reading]]) -> Sequence[Reading]:
-        """The readings of one poll by `ask`, or of a second one where a length is not where its last readings lead.
+        """The readings of one poll by `ask`, or of a second one where a value is not where its last readings lead.
 
         They are not judged yet. Raises what `ask` raises.
         """
@@ -63,7 +68,7 @@ class GaugeTrust:
     def hear(self, place: int, reading: Reading, window_s: float, now_s: float) -> Reading:
         """A reading of the channel number `place` that came unasked, as it may be published.
 
-        Nobody can ask again: where a length is not where its last readings lead, the next reading is the second answer.
+        Nobody can ask again: where a value is not where its last readings lead, the next reading is the second answer.
         window_s : by how much later than its time it may have been measured, s.
         """
         channel = self._channels[place]
@@ -86,7 +91,7 @@ class GaugeTrust:
             if channel is not None:
                 channel.fail(quality, now_s)
 
-    def _surprises(self, channel: ReadingTrust | None, reading: Reading) -> bool:
+    def _surprises(self, channel: Judge | None, reading: Reading) -> bool:
         if channel is None or not reading.ok:
             return False
         return channel.surprises(GaugeSample(reading.value, reading.time_s, self._window_s))

@@ -10,8 +10,7 @@ import structlog
 
 from compd.clock import Clock
 from compd.gauge import Gauge, Quality, Reading, bad
-from compd.live.acquisition.gauge_trust import GaugeTrust
-from compd.live.acquisition.reading_trust import ReadingTrust
+from compd.live.acquisition.gauge_trust import GaugeTrust, Judge
 from compd.live.acquisition.round_trigger import RoundBuffer, stamped
 from compd.live.memory.latest import Latest
 from compd.live.memory.readings import LONGEST_DETAIL
@@ -19,7 +18,7 @@ from compd.pushed_gauge import Heard
 
 log = structlog.get_logger()
 
-_NO_TRUST: Mapping[str, ReadingTrust] = {}
+_NO_TRUST: Mapping[str, Judge] = {}
 # Faults of the wire: the next poll may well be answered, and the last good reading says what it said.
 MAY_PASS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
 # A gauge on a line that is open rests at most so long, s: what a fault has cost is known again within a second.
@@ -70,10 +69,10 @@ class PolledGauge:
         timeout_s: float,
         stale_after_s: float,
         clock: Clock,
-        trust: Mapping[str, ReadingTrust] = _NO_TRUST,
+        trust: Mapping[str, Judge] = _NO_TRUST,
     ) -> None:
         """`timeout_s`: of the line; `stale_after_s`: age (s) from which a reading is not used; `trust`: judges the
-        readings of each length channel that is wired, by "gauge.channel"."""
+        readings of each channel that is wired, by "gauge.channel"."""
         self.name = name
         self.driver = driver
         self.polls = 0
@@ -98,7 +97,7 @@ class PolledGauge:
         self._logged = Quality.NEVER_READ
 
     def read(self, line: Any, latched_s: float | None = None) -> Sequence[Reading]:
-        """Poll the device; twice where a length is not where its last readings lead. Raises what the driver raises.
+        """Poll the device; twice where a value is not where its last readings lead. Raises what the driver raises.
 
         latched_s : when the round trigger has latched it, monotonic time (s); None without one.
         """

@@ -14,6 +14,8 @@ from typing import NamedTuple
 BASE_S = 0.02
 # Of a reply that took no longer than others.
 WINDOW_S = 1e-3
+# Two readings of the same value differ by less than this many standard deviations of one: 6 sigma of a difference.
+SAME_VALUE_SIGMAS = 6 * math.sqrt(2)
 
 
 class GaugeSample(NamedTuple):

@@ -22,6 +22,7 @@ from compd.gauge import Quality, Reading, bad
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import (
     BASE_S,
+    SAME_VALUE_SIGMAS,
     GaugeSample,
     Interval,
     MotionLimits,
@@ -34,8 +35,6 @@ from compd.live.memory.trust_memory import Doubt, TrustMemory
 
 # Last digit of a display that stands still, mm, where no noise is declared.
 UNREST_MM = 0.001
-# Two readings of the same value differ by less than this many standard deviations of one: 6 sigma of a difference.
-_SIGMAS = 6 * math.sqrt(2)
 # A gauge that was not asked for longer, s, may have been switched off: it was away.
 LONGEST_OWN_GAP_S = 10.0
 # After a silence, s, until the others have been read that have begun to move at the same time.
@@ -54,7 +53,7 @@ _ACCELERATION_MARGIN = 2.0
 
 def tolerance_mm(noise_um: float | None) -> float:
     """By how much two readings of the same value may differ, mm. noise_um : standard deviation of one, um."""
-    return UNREST_MM if noise_um is None else max(UNREST_MM, _SIGMAS * noise_um * 1e-3)
+    return UNREST_MM if noise_um is None else max(UNREST_MM, SAME_VALUE_SIGMAS * noise_um * 1e-3)
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ class ReadingTrust:
         if quality is Quality.LINE_LOST or now_s - memory.time_s[i] > self._settings.stale_after_s:
             memory.lose(i, now_s)
         elif self._before_silence is None:
-            self._before_silence = memory.value[: len(memory.channels)].copy()
+            self._before_silence = memory.value[: memory.lengths].copy()
         self._heard_s = math.nan
 
     def judge(self, reading: Reading, window_s: float, first: Reading | None = None) -> Reading:
@@ -112,8 +111,7 @@ class ReadingTrust:
         """
         memory, i = self._memory, self._i
         sample = GaugeSample(reading.value, reading.time_s, window_s)
-        self._count(sample)
-        memory.shown[i], memory.shown_s[i] = sample.value, sample.time_s
+        memory.show(i, sample.value, sample.time_s)
         # one that was accepted while it was asked is asked twice at the next poll
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
             memory.obeyed[i] = memory.accepted[i]
@@ -312,17 +310,3 @@ class ReadingTrust:
                 earlier = (middle.value - start.value) / (middle.time_s - start.time_s)
                 return abs(speed - earlier) / ((middle.time_s - start.time_s + base_s) / 2)
         return 0.0
-
-    def _count(self, sample: GaugeSample) -> None:
-        """Count how often the very same value comes, for the vote on gauges that are stuck."""
-        memory, i = self._memory, self._i
-        change_mm = abs(sample.value - float(memory.shown[i]))
-        if change_mm == 0.0:
-            memory.repeats[i] += 1
-        elif change_mm > 0.0:
-            memory.repeats[i] = 0
-            if memory.changes[i] == 0:
-                memory.first_change_s[i] = sample.time_s
-            memory.changes[i] += 1
-            memory.last_change_s[i] = sample.time_s
-            memory.step_mm[i] = min(float(memory.step_mm[i]), change_mm)

@@ -17,10 +17,10 @@ def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -
     What counts are the channels that have been good all the time. Where there are none, because everything was off,
     half of those that are back are enough to say that the machine has stood still. back_s : since when `i` answers.
     """
-    n = len(memory.channels)
+    n = memory.lengths
     others = np.arange(n) != i
     witness = memory.witness[i]
-    tolerance = memory.tolerance_mm
+    tolerance = memory.tolerance_mm[:n]
     lost_s = float(memory.lost_s[i])
     stayed = others & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(witness)
     if stayed.any():
@@ -41,6 +41,8 @@ def stood_still(memory: TrustMemory, i: int, before: NDArray[np.float64]) -> boo
 
     before : values of all channels then, shape (n,), mm; nan where not known.
     """
-    n = len(memory.channels)
+    n = memory.lengths
     compared = (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(before)
-    return bool(compared.any() and (np.abs(memory.value[:n] - before)[compared] <= memory.tolerance_mm[compared]).all())
+    return bool(
+        compared.any() and (np.abs(memory.value[:n] - before)[compared] <= memory.tolerance_mm[:n][compared]).all()
+    )

@@ -1,4 +1,4 @@
-"""What is known of every length channel beyond its newest reading: the last one that was believed, and since when not.
+"""What is known of every wired channel beyond its newest reading: the last one that was believed, and since when not.
 
 The readings themselves are in `Latest`. This outlives a process that polls gauges, so that a gauge which came back with
 another value is not believed only because that process was started anew.
@@ -27,9 +27,13 @@ class Doubt(IntEnum):
     MOVED_MEANWHILE = 3
     """It came back with the same value, but another gauge, number `amount`, has moved meanwhile."""
     JUMPED = 4
-    """It jumped by `amount` mm, further than what is measured can move."""
+    """It jumped by `amount`, further than what is measured can move or change."""
     VOTED = 5
     """Other gauges contradict it; `TrustMemory.evidence` says how."""
+    IMPLAUSIBLE = 6
+    """A quantity shows `amount`, which is beyond its plausible range."""
+    APART = 7
+    """A quantity is `amount` away from its neighbours, the other quantities of its unit."""
 
     @property
     def until_accepted(self) -> bool:
@@ -43,31 +47,37 @@ class TrustMemory:
 
     Attributes
     ----------
-    channels : "gauge.channel" of every length channel. index : of each in the arrays, all (n,).
-    value, time_s : the last reading that was believed, mm, and its monotonic time, s; nan before the first.
-    shown, shown_s : the last value that the gauge gave, believed or not, mm, and its time, s; nan before the first.
-    tolerance_mm : by which a reading may differ from another one of the same value.
-    witness : (n, n), row i: the values of all channels when channel i was lost, mm.
+    channels : "gauge.channel" of every length channel, then of every quantity. index : of each in the arrays, all (n,).
+        Their values are in the channel's own unit, `unit`: mm of a length.
+    lengths : how many of them are lengths.
+    value, time_s : the last reading that was believed, and its monotonic time, s; nan before the first.
+    shown, shown_s : the last value that the gauge gave, believed or not, and its time, s; nan before the first.
+    tolerance_mm : by which a reading may differ from another one of the same value; of a quantity in its unit.
+    witness : (lengths, lengths), row i: the values of all lengths when channel i was lost, mm.
     lost_s : monotonic time at which the channel was lost, s.
     doubt : a `Doubt`. amount : what it says of it.
     repeats : how many polls in a row have given the very same value. changes : how many polls have given another one.
     first_change_s, last_change_s : when the first and the last of these were, s.
-    step_mm : the smallest change seen; inf before the first.
+    step_mm : the smallest change seen, of a quantity in its unit; inf before the first.
     accepted, obeyed : how often a person has accepted the channel, and how often its thread has followed.
     voted, heard : how often a vote has named the channel, and how often its thread has followed.
     suspected : 1 while a vote waits for more evidence against the channel: it has no value meanwhile.
     evidence : of the votes, by channel.
     """
 
-    def __init__(self, channels: Sequence[str], tolerance_mm: Sequence[float]) -> None:
+    def __init__(self, channels: Sequence[str], tolerance_mm: Sequence[float], units: Sequence[str] = ()) -> None:
+        """`units`: of the quantities, which are the last channels; all others are lengths."""
         self.channels = tuple(channels)
+        self.lengths = len(self.channels) - len(units)
+        self._units = ("mm",) * self.lengths + tuple(units)
         self.index: Mapping[str, int] = {name: i for i, name in enumerate(self.channels)}
         n = len(self.channels)
         self.tolerance_mm = np.array(tolerance_mm, dtype=float)
         self.value, self.time_s, self.shown, self.shown_s, self.lost_s = (shared_floats(max(n, 1)) for _ in range(5))
         for array in (self.value, self.time_s, self.shown, self.shown_s, self.lost_s):
             array[:] = math.nan
-        self.witness = shared_floats(max(n * n, 1))[: n * n].reshape(n, n)
+        m = self.lengths
+        self.witness = shared_floats(max(m * m, 1))[: m * m].reshape(m, m)
         self.doubt, self.amount, self.step_mm = (shared_floats(max(n, 1)) for _ in range(3))
         self.repeats, self.changes = (shared_floats(max(n, 1)) for _ in range(2))
         self.first_change_s, self.last_change_s = (shared_floats(max(n, 1)) for _ in range(2))
@@ -76,10 +86,29 @@ class TrustMemory:
         self.suspected = shared_counters(max(n, 1))
         self.evidence = SharedMessage()
 
+    def unit(self, i: int) -> str:
+        """Of the values of channel `i`."""
+        return self._units[i]
+
+    def show(self, i: int, value: float, time_s: float) -> None:
+        """Note what the gauge of channel `i` gave at `time_s` (s), believed or not, and count how often it repeats."""
+        change = abs(value - float(self.shown[i]))
+        if change == 0.0:
+            self.repeats[i] += 1
+        elif change > 0.0:
+            self.repeats[i] = 0
+            if self.changes[i] == 0:
+                self.first_change_s[i] = time_s
+            self.changes[i] += 1
+            self.last_change_s[i] = time_s
+            self.step_mm[i] = min(float(self.step_mm[i]), change)
+        self.shown[i], self.shown_s[i] = value, time_s
+
     def lose(self, i: int, now_s: float) -> None:
-        """Note that channel `i` is away from now on (s), with what the others show."""
+        """Note that channel `i` is away from now on (s); of a length with what the others show."""
         if self.doubt[i] == Doubt.NONE:
-            self.witness[i] = self.value[: len(self.channels)]
+            if i < self.lengths:
+                self.witness[i] = self.value[: self.lengths]
             self.lost_s[i] = now_s
             self.doubt[i] = Doubt.LOST
 
@@ -89,19 +118,19 @@ class TrustMemory:
         self.doubt[i] = doubt
 
     def believe(self, i: int, value: float, time_s: float) -> None:
-        """Note a reading of channel `i` (mm, s) that is believed."""
+        """Note a reading of channel `i` (in its unit, s) that is believed."""
         self.value[i], self.time_s[i] = value, time_s
         self.doubt[i] = Doubt.NONE
 
     def accept(self, name: str) -> list[str]:
         """Believe what the channels of `name` show from now on, and return those that were not believed.
 
-        name : a gauge, a "gauge.channel", or "all". Raises ValueError where there is no such length gauge.
+        name : a gauge, a "gauge.channel", or "all". Raises ValueError where no such gauge is wired.
         """
         channels = [c for c in self.channels if name in ("all", c, c.partition(".")[0])]
         if not channels:
             gauges = dict.fromkeys(channel.partition(".")[0] for channel in self.channels)
-            raise ValueError(f"no length gauge is called {name[:40]!r}, allowed: all, {', '.join(gauges)}")
+            raise ValueError(f"no wired gauge is called {name[:40]!r}, allowed: all, {', '.join(gauges)}")
         doubted = [c for c in channels if Doubt(int(self.doubt[self.index[c]])).until_accepted]
         for channel in channels:
             self.accepted[self.index[channel]] += 1
@@ -122,14 +151,19 @@ class TrustMemory:
     def explanation(self, i: int) -> str:
         """Why channel `i` is not believed, and what to do; "" where it is."""
         doubt, amount = Doubt(int(self.doubt[i])), float(self.amount[i])
-        accept = f"then `compd accept {self.short_name(i)}`"
+        unit, accept = self.unit(i), f"then `compd accept {self.short_name(i)}`"
+        mend = "reference it" if i < self.lengths else "look at it"
         match doubt:
             case Doubt.RETURNED:
                 return f"came back {amount:.3f} mm away: reference it, {accept}"
             case Doubt.MOVED_MEANWHILE:
                 return f"came back, but {self.short_name(int(amount))} has moved meanwhile: reference it, {accept}"
             case Doubt.JUMPED:
-                return f"jumped by {amount:.3f} mm: reference it, {accept}"
+                return f"jumped by {amount:.3f} {unit}: {mend}, {accept}"
+            case Doubt.IMPLAUSIBLE:
+                return f"shows {amount:.6g} {unit}, which is not plausible: {mend}, {accept}"
+            case Doubt.APART:
+                return f"is {amount:+.3g} {unit} from its neighbours: {mend}, {accept}"
             case Doubt.VOTED:
                 evidence = (self.evidence.read() or {}).get(self.channels[i], "other gauges contradict it")
                 return f"{evidence}: look at it, {accept}"

@@ -16,6 +16,7 @@ from compd.simulation.truth.closure import Posture
 from compd.simulation.truth.equilibrium import Equilibrium, EquilibriumState
 from compd.simulation.truth.follow_motion import FollowMotion, MotorCommand
 from compd.simulation.truth.frame import Frame
+from compd.simulation.truth.heat import HELD_TIME_CONSTANT_S
 from compd.simulation.truth.joints import Joints
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.motion import Approach, Phase, SetpointMotion, TourMotion, braking, standing
@@ -26,6 +27,11 @@ from compd.simulation.truth.strengths import Strengths
 from compd.simulation.truth.warm_up import Heat, WarmUp
 from compd.simulation.truth.weather import Weather
 from compd.simulation.truth.workspace import STROKE_SHARE, draw_points_mm
+
+# What a real part's thermometer shows at most, K/s: 94 W in each kilogram of steel. One that a water jacket holds 20 K
+# away begins with ten times as much.
+_FASTEST_K_PER_S = 0.2
+_FASTEST_HELD_K_PER_S = 20.0 / HELD_TIME_CONSTANT_S
 
 Mode = Literal["zero", "tour", "plan", "commanded", "following", "blocked"]
 
@@ -143,6 +149,12 @@ class World:
             )
         self._motion = PlanMotion(self._rows, self._braking(), self.hold, self._speedup, [*self._points_mm])
         self.mode, self.zero_hold_s = "plan", 0.0
+
+    @property
+    def unnatural_K_per_s(self) -> float:
+        """How fast its parts warm up at most, K/s, where that is faster than in nature; 0 where it is not."""
+        natural = _FASTEST_HELD_K_PER_S if self._rows else _FASTEST_K_PER_S
+        return 0.0 if natural * self._speedup <= _FASTEST_K_PER_S else natural * self._speedup
 
     def hold(self, quantities: Mapping[str, float]) -> None:
         """Hold temperatures of parts, room, air and load on the tip at these values from now on, by name with unit.

@@ -18,6 +18,8 @@ from compd.simulation.wires.tcp_port import ANY, LOOPBACK
 
 # What a pty does not have, and a simulated line does not do; nor does anybody log in to a simulated machine.
 NOT_SIMULATED = ("dtr", "rts", "rs485", "echo", "security", "tls", "user", "password_file", "client_id")
+# A plan may hold parts at any temperature, K from one another.
+_HELD_APART_K = 60.0
 Port = str | tuple[str, int]
 
 
@@ -37,11 +39,16 @@ def daemon_path(configuration: Configuration, directory: Path) -> Path:
 
 
 def daemon_configuration(
-    configuration: Configuration, ports: Mapping[str, Port], directory: Path, tcp_port: int = ANY
+    configuration: Configuration,
+    ports: Mapping[str, Port],
+    directory: Path,
+    tcp_port: int = ANY,
+    fastest_K_per_s: float = 0.0,
 ) -> Configuration:
     """Write and load a copy of the configuration, under the same file name in `directory`, with these ports.
 
     ports : by line, a device path or (host, port). tcp_port : where the daemon listens, if it does over TCP.
+    fastest_K_per_s : of the simulated parts, where they warm up faster than real ones; 0 where they do not.
 
     Unix socket and state directory are in `directory`. TCP and UDP are bound to this computer, so that no real
     controller receives setpoints for a machine that does not exist.
@@ -62,6 +69,10 @@ def daemon_configuration(
         sockets["tcp"] = {"host": LOOPBACK, "port": tcp_port}
     if configuration.sockets.udp is not None:
         sockets["udp"] = {"host": LOOPBACK, "port": configuration.sockets.udp.port}
+    if fastest_K_per_s:
+        for wire in data["wiring"].get("quantities") or ():
+            if wire["name"].endswith("_degC"):
+                wire |= {"fastest_change": fastest_K_per_s, "apart": _HELD_APART_K}
     data["state"] = {"directory": str(directory / STATE)}
     (directory / STATE).mkdir(exist_ok=True)
     _write(path, configuration.path, data)

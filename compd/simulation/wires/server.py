@@ -98,7 +98,7 @@ class Simulation:
         self.ports = ports
         tcp = self.configuration.sockets.tcp
         tcp_port = ANY if tcp is None else self._running.enter_context(claimed_port(tcp.port))
-        daemon = daemon_configuration(self.configuration, ports, self.directory, tcp_port)
+        daemon = daemon_configuration(self.configuration, ports, self.directory, tcp_port, self.world.unnatural_K_per_s)
         self._thread.start()
         self._running.callback(self._thread.join)
         self._running.callback(self._stop.set)

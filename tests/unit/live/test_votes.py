@@ -24,11 +24,11 @@ FRAME = ("cabinet.t1", "cabinet.t2")
 CHANNELS = (*SCALES, *JOINTS, *FRAME)
 NAN = math.nan
 WIRED = (
-    *(WiredLength("scale", f"scale {k}", 1, k, "", NAN, NOISE_UM) for k in (1, 2, 3)),
-    WiredLength("joint", "joint 1", 1, 1, "Ra", NAN, NOISE_UM),
-    WiredLength("joint", "joint 2", 1, 1, "Rb", NAN, NOISE_UM),
-    WiredLength("frame", "frame t1", 1, 0, "", 500.0, NOISE_UM),
-    WiredLength("frame", "frame t2", -1, 0, "", 500.0, NOISE_UM),
+    *(WiredLength("scale", f"scale {k}", 1, k, "", NAN, NOISE_UM * 1e-3) for k in (1, 2, 3)),
+    WiredLength("joint", "joint 1", 1, 1, "Ra", NAN, NOISE_UM * 1e-3),
+    WiredLength("joint", "joint 2", 1, 1, "Rb", NAN, NOISE_UM * 1e-3),
+    WiredLength("frame", "frame t1", 1, 0, "", 500.0, NOISE_UM * 1e-3),
+    WiredLength("frame", "frame t2", -1, 0, "", 500.0, NOISE_UM * 1e-3),
 )
 
 

@@ -13,20 +13,20 @@ from compd.live.memory.trust_memory import TrustMemory
 
 
 class WiredLength(NamedTuple):
-    """What a length channel measures.
+    """What a channel measures: a length, or any other quantity.
 
     kind : of the gauge. meaning : for people, as "scale 1". sign : +1 or -1. link : from 1, of a scale or a joint; 0.
     role : S, Ra, Rb or B of a joint comparator; "". length_mm : of the distance that a frame comparator measures; nan.
-    noise_um : standard deviation of a reading; nan where it is not declared.
+    noise : standard deviation of a reading, mm; of a quantity in its unit; nan where it is not declared.
     """
 
-    kind: Literal["scale", "joint", "frame"]
+    kind: Literal["scale", "joint", "frame", "quantity"]
     meaning: str
     sign: int
     link: int
     role: str
     length_mm: float
-    noise_um: float
+    noise: float
 
 
 class MachineView(NamedTuple):
@@ -35,10 +35,10 @@ class MachineView(NamedTuple):
     Attributes
     ----------
     now_s : monotonic time, s.
-    memory : of the length channels, with how often each has repeated its digits.
-    wired : what each length channel measures, (n).
-    value : (n), mm, as read. believed : (n), whether it is.
-    change : (n), mm since machine zero, with its sign; nan without a machine zero.
+    memory : of the channels, with how often each has repeated its digits.
+    wired : what each channel measures, (n): lengths, then quantities.
+    value : (n), as read, mm; of quantities in their unit. believed : (n), whether it is.
+    change : (n), mm since machine zero, with its sign; nan without a machine zero, and of quantities.
     quantities : temperatures and the rest that are good, by name.
     setpoint : the newest SETPOINT message; None before the first.
     """
@@ -51,6 +51,10 @@ class MachineView(NamedTuple):
     change: FloatArray
     quantities: Mapping[str, float]
     setpoint: Mapping[str, Any] | None
+
+    def of_unit(self, unit: str) -> list[int]:
+        """The quantities of this unit."""
+        return [i for i in self.of_kind("quantity") if self.memory.unit(i) == unit]
 
     def of_kind(self, kind: str) -> list[int]:
         """The channels of this kind."""

@@ -28,12 +28,12 @@ class RepeatedDigits:
 
     def look(self, view: MachineView) -> Iterator[Contradiction]:
         memory = view.memory
-        noise_mm = np.array([wired.noise_um for wired in view.wired]) * 1e-3
+        noise = np.array([wired.noise for wired in view.wired])
         n = len(view.wired)
         changes = memory.changes[:n]
         usual_s = (memory.last_change_s[:n] - memory.first_change_s[:n]) / np.maximum(changes - 1.0, 1.0)
         since_s = memory.shown_s[:n] - memory.last_change_s[:n]
-        able = view.believed & (changes >= _FEWEST_CHANGES) & (noise_mm >= memory.step_mm[:n])
+        able = view.believed & (changes >= _FEWEST_CHANGES) & (noise >= memory.step_mm[:n])
         scatter = able & (since_s <= _SCATTERING * usual_s)
         if not scatter.any():
             return

@@ -84,7 +84,7 @@ class StandingScale:
     def _reach_mm(self, view: MachineView, i: int) -> float:
         """How far a scale may have moved that counts as standing, mm: more, where its digits show whether it lives."""
         tolerance_mm = float(view.memory.tolerance_mm[i])
-        scatters = view.wired[i].noise_um * 1e-3 >= view.memory.step_mm[i]
+        scatters = view.wired[i].noise >= view.memory.step_mm[i]
         return max(tolerance_mm, _HARDLY_MM) if scatters else tolerance_mm
 
 

@@ -17,6 +17,7 @@ from compd.live.acquisition.votes.joint_pair import JointPair
 from compd.live.acquisition.votes.machine_view import MachineView, Vote, WiredLength
 from compd.live.acquisition.votes.repeated_digits import RepeatedDigits
 from compd.live.acquisition.votes.standing_scale import StandingScale
+from compd.live.acquisition.votes.standing_temperature import StandingTemperature
 from compd.live.acquisition.votes.tip_speed import TipSpeed
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import Doubt, TrustMemory
@@ -93,6 +94,8 @@ def _votes(settings: VoteSettings) -> list[Vote]:
         votes.append(RepeatedDigits())
     if settings.standing_scale_mm is not None:
         votes.append(StandingScale(settings.standing_scale_mm))
+    if settings.standing_temperature_K is not None:
+        votes.append(StandingTemperature(settings.standing_temperature_K))
     if settings.following_mm is not None:
         votes.append(FollowingError(settings.following_mm))
     if settings.joint_pair_um is not None:

@@ -91,5 +91,5 @@ def test_where_all_were_believed_the_answer_comes_at_once(trust):
 
 
 def test_no_such_gauge(trust):
-    with pytest.raises(ValueError, match="no length gauge is called 'scale_9'"):
+    with pytest.raises(ValueError, match="no wired gauge is called 'scale_9'"):
         Acceptance(trust, AcquisitionClock()).start("scale_9", print)

@@ -1,0 +1,196 @@
+"""Whether the readings of a temperature, a force, a pressure are believed.
+
+A quantity is plausible where it lies in its range, near its neighbours (the other quantities of the same unit), and
+where it has not changed faster than it can. What it can have become is followed from reading to reading: by no more
+than its fastest change. So a jump shows at once, a ramp that is too fast after a moment, and noise by its size.
+
+Quantities move slowly beside lengths, so that there is time: an implausible reading is not published, and the last one
+stays as long as it is not stale. A quantity that was implausible for a second, less what it was plausible since, is
+not believed before a person accepts it. One that was away may have changed meanwhile as fast as it can.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.gauge import Quality, Reading, bad
+from compd.live.acquisition.possible_motion import GaugeSample
+from compd.live.memory.trust_memory import Doubt, TrustMemory
+
+# So long a quantity may be implausible, s: longer than a burst of interference, shorter than the usual `loop.hold_s`.
+LASTING_S = 1.0
+# One reading counts as at most so much of it, s, however seldom the gauge is asked.
+_LONGEST_SHARE_S = LASTING_S / 5
+# Until neighbours have been read for the first time, s; what a neighbour showed longer ago than `_OLD_S` says nothing.
+_WAIT_FOR_NEIGHBOURS_S = 1.0
+_OLD_S = 60.0
+_FEWEST_NEIGHBOURS = 2
+
+
+class QuantityLimits(NamedTuple):
+    """What readings of a quantity are plausible, in its unit; infinite where nothing is known.
+
+    low, high : its range. fastest_per_s : its fastest change, per second. apart : the largest difference from its
+    neighbours. tolerance : by which two readings of the same value may differ.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+    fastest_per_s: float = math.inf
+    apart: float = math.inf
+    tolerance: float = 0.0
+
+
+class _Fault(NamedTuple):
+    """Why a reading is not plausible, as `TrustMemory` keeps it, and in words."""
+
+    doubt: Doubt
+    amount: float
+    text: str
+
+
+class QuantityTrust:
+    """Judges the readings of one channel as `ReadingTrust` does those of a length; used by its line's thread."""
+
+    def __init__(self, memory: TrustMemory, channel: str, limits: QuantityLimits) -> None:
+        self._memory = memory
+        self._i = i = memory.index[channel]
+        self._limits = limits
+        self._unit = memory.unit(i)
+        same = [j for j in range(memory.lengths, len(memory.channels)) if j != i and memory.unit(j) == self._unit]
+        self._neighbours = np.array(same, dtype=np.int64)
+        self._expected = math.nan  # follows the readings by no more than the fastest change
+        self._expected_s = math.nan
+        self._implausible_s = 0.0
+        self._judged_s = math.nan
+        self._begun_s = math.nan
+
+    def surprises(self, sample: GaugeSample) -> bool:
+        """Whether a second answer is needed: a good reading is not plausible, or follows none."""
+        memory, i = self._memory, self._i
+        if memory.accepted[i] != memory.obeyed[i]:
+            return True
+        if Doubt(int(memory.doubt[i])).until_accepted:
+            return False
+        return not self._recall() or self._fault(sample.value, sample.time_s) is not None
+
+    def fail(self, quality: Quality, now_s: float) -> None:
+        """Note a poll without a value: what the quantity has become meanwhile, its fastest change limits."""
+
+    def judge(self, reading: Reading, window_s: float, first: Reading | None = None) -> Reading:
+        """The reading as it may be published; parameters as of `ReadingTrust.judge`."""
+        memory, i = self._memory, self._i
+        memory.show(i, reading.value, reading.time_s)
+        if memory.accepted[i] != memory.obeyed[i] and first is not None:
+            memory.obeyed[i] = memory.accepted[i]
+            memory.heard[i] = memory.voted[i]
+            return self._accepted(reading, first)
+        if memory.voted[i] != memory.heard[i]:
+            memory.heard[i] = memory.voted[i]
+            memory.distrust(i, Doubt.VOTED, math.nan)
+        if Doubt(int(memory.doubt[i])).until_accepted:
+            return bad(reading.time_s, Quality.DISTRUSTED, memory.explanation(i))
+        share_s = self._share_s(reading.time_s)
+        known = self._recall()
+        candidates = (reading,) if first is None else (reading, first)
+        faults = [self._fault(each.value, each.time_s) for each in candidates]
+        for each, fault in zip(candidates, faults, strict=True):
+            if fault is None:
+                if not any(faults):  # one of two answers that is plausible says nothing of the next poll
+                    self._implausible_s = max(0.0, self._implausible_s - share_s)
+                return self._believed(each) if known else self._begin(each, candidates)
+        assert faults[0] is not None
+        self._implausible_s += share_s
+        if self._implausible_s < LASTING_S:
+            return bad(reading.time_s, Quality.MISMATCH, faults[0].text)
+        return self._distrusted(reading, faults[0])
+
+    def _recall(self) -> bool:
+        """Whether a reading is known that the next one follows; that of another process counts, too."""
+        memory, i = self._memory, self._i
+        if memory.doubt[i] == Doubt.LOST:  # since a daemon has ended: nobody knows for how long
+            memory.value[i], memory.doubt[i] = math.nan, Doubt.NONE
+            self._expected = math.nan
+        elif math.isnan(self._expected) and not math.isnan(memory.value[i]):
+            self._expected, self._expected_s = float(memory.value[i]), float(memory.time_s[i])
+        return not math.isnan(self._expected)
+
+    def _accepted(self, reading: Reading, first: Reading) -> Reading:
+        """The readings after a person's acceptance: whatever was before, but plausible, and two that agree."""
+        self._expected, self._implausible_s = math.nan, 0.0
+        if fault := self._fault(reading.value, reading.time_s):
+            return self._distrusted(reading, fault)
+        return self._begin(reading, (reading, first))
+
+    def _begin(self, reading: Reading, answers: tuple[Reading, ...]) -> Reading:
+        """The first reading: two answers agree, and the neighbours, if there are any, have been read."""
+        if len(answers) < 2:
+            return bad(reading.time_s, Quality.MISMATCH, f"{reading.value:g} is not confirmed by a second answer")
+        one, other = answers
+        if abs(one.value - other.value) > self._limits.tolerance + self._possible_change(one.time_s, other.time_s):
+            return bad(reading.time_s, Quality.MISMATCH, f"two answers disagree: {other.value:g}, {one.value:g}")
+        if math.isnan(self._begun_s):
+            self._begun_s = reading.time_s
+        unread = np.isnan(self._memory.shown[self._neighbours]).any() and math.isfinite(self._limits.apart)
+        if unread and reading.time_s - self._begun_s < _WAIT_FOR_NEIGHBOURS_S:
+            return bad(reading.time_s, Quality.MISMATCH, "its neighbours have not been read yet")
+        self._expected, self._expected_s = reading.value, reading.time_s
+        return self._believed(reading)
+
+    def _believed(self, reading: Reading) -> Reading:
+        change = self._possible_change(reading.time_s, self._expected_s)
+        self._expected = min(max(reading.value, self._expected - change), self._expected + change)
+        self._expected_s = reading.time_s
+        self._memory.believe(self._i, reading.value, reading.time_s)
+        return reading
+
+    def _distrusted(self, reading: Reading, fault: _Fault) -> Reading:
+        self._implausible_s = 0.0
+        self._memory.distrust(self._i, fault.doubt, fault.amount)
+        return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i))
+
+    def _share_s(self, time_s: float) -> float:
+        """For how long a reading speaks, s."""
+        passed_s, self._judged_s = time_s - self._judged_s, time_s
+        return min(max(passed_s, 0.0), _LONGEST_SHARE_S) if math.isfinite(passed_s) else 0.0
+
+    def _fault(self, value: float, time_s: float) -> _Fault | None:
+        """Why a value at this time is not plausible; None where it is."""
+        limits, unit = self._limits, self._unit
+        if not limits.low <= value <= limits.high:
+            text = f"{value:g} {unit}, plausible {limits.low:g} to {limits.high:g} {unit}"
+            return _Fault(Doubt.IMPLAUSIBLE, value, text)
+        if not math.isnan(self._expected):
+            away = value - self._expected
+            if abs(away) > limits.tolerance + self._possible_change(time_s, self._expected_s):
+                text = f"{value:g} {unit}, {away:+.3g} at once, fastest {limits.fastest_per_s:g} a second"
+                return _Fault(Doubt.JUMPED, away, text)
+        if math.isfinite(limits.apart) and len(self._neighbours) >= _FEWEST_NEIGHBOURS:
+            return self._apart(value, time_s)
+        return None
+
+    def _possible_change(self, time_s: float, since_s: float) -> float:
+        """By how much it can have changed between two times, s."""
+        fastest = self._limits.fastest_per_s
+        return math.inf if math.isinf(fastest) else fastest * max(0.0, time_s - since_s)
+
+    def _apart(self, value: float, time_s: float) -> _Fault | None:
+        """Where more than half of the neighbours, and two at least, are far away.
+
+        A neighbour that is not believed has no voice.
+        """
+        memory, places = self._memory, self._neighbours
+        speak = (memory.doubt[places] <= Doubt.LOST) & (time_s - memory.shown_s[places] < _OLD_S)
+        others = memory.shown[places][speak]
+        far = np.abs(others - value) > self._limits.apart
+        if 2 * far.sum() <= len(others) or far.sum() < _FEWEST_NEIGHBOURS:
+            return None
+        away = value - float(np.median(others))
+        return _Fault(
+            Doubt.APART,
+            away,
+            f"{value:g} {self._unit}, {away:+.3g} from its neighbours, allowed {self._limits.apart:g}",
+        )

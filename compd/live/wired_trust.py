@@ -1,0 +1,84 @@
+"""What the configuration says of how far its gauges are believed: lengths, and the quantities that effects may read."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from compd.configuration import Configuration
+from compd.configuration.operation import FRAME_DISTANCES
+from compd.gauge import GaugeOptions
+from compd.live.acquisition.gauge_trust import Judge
+from compd.live.acquisition.possible_motion import MotionLimits
+from compd.live.acquisition.quantity_trust import QuantityLimits, QuantityTrust
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.acquisition.votes.machine_view import WiredLength
+from compd.live.loop.wiring import MachineWires, Wire
+from compd.live.memory.trust_memory import TrustMemory
+from compd.live.quantity_limits import quantity_limits
+from compd.model.machine import MachineModel
+from compd.units import UM_PER_MM, unit_of
+
+
+def wired_memory(configuration: Configuration, wires: MachineWires) -> TrustMemory:
+    """The memory for the channels that are wired: lengths, then quantities."""
+    gauges, limits = configuration.gauges, _quantity_limits(configuration)
+    return TrustMemory(
+        [wire.channel for wire in wires.all_wires],
+        [
+            *(tolerance_mm(gauges[channel.split(".")[0]].noise_um) for channel in wires.length_channels),
+            # what may change by anything is not worth keeping
+            *(
+                limits[name].tolerance if math.isfinite(limits[name].fastest_per_s) else math.inf
+                for name in wires.quantity_names
+            ),
+        ],
+        [unit_of(name) for name in wires.quantity_names],
+    )
+
+
+def wired_trust(configuration: Configuration, wires: MachineWires, memory: TrustMemory) -> dict[str, Judge]:
+    """The judge of each channel that is wired, by "gauge.channel"."""
+    lengths: dict[str, Judge] = {
+        wire.channel: ReadingTrust(memory, wire.channel, _settings(configuration, wire)) for wire in wires.length_wires
+    }
+    limits = _quantity_limits(configuration)
+    return lengths | {
+        channel: QuantityTrust(memory, channel, limits[name]) for name, (channel, _) in wires.quantity_channels.items()
+    }
+
+
+def wired_channels(configuration: Configuration, wires: MachineWires, model: MachineModel) -> list[WiredLength]:
+    """What each channel measures, for the votes: lengths, then quantities."""
+    wiring, gauges = configuration.wiring, configuration.gauges
+    distance_mm = dict(zip(FRAME_DISTANCES, model.zero.distances_mm.tolist(), strict=True))
+    unknown = math.nan
+    parts: list[tuple[Literal["scale", "joint", "frame"], int, str, float]] = [
+        *(("scale", link, "", unknown) for link in range(1, len(wiring.scale) + 1)),
+        *(("joint", joint.link, joint.role, unknown) for joint in wiring.joint),
+        *(("frame", 0, "", distance_mm[distance]) for distance in FRAME_DISTANCES),
+    ]
+    lengths = [
+        WiredLength(kind, wire.meaning, wire.sign, link, role, length_mm, _noise_mm(gauges[wire.channel.split(".")[0]]))
+        for wire, (kind, link, role, length_mm) in zip(wires.length_wires, parts, strict=True)
+    ]
+    noise = {quantity.name: quantity.noise or unknown for quantity in wiring.quantities}
+    return lengths + [WiredLength("quantity", name, 1, 0, "", unknown, noise[name]) for name in wires.quantity_names]
+
+
+def _quantity_limits(configuration: Configuration) -> dict[str, QuantityLimits]:
+    return {quantity.name: quantity_limits(quantity) for quantity in configuration.wiring.quantities}
+
+
+def _noise_mm(options: GaugeOptions) -> float:
+    return math.nan if options.noise_um is None else options.noise_um / UM_PER_MM
+
+
+def _settings(configuration: Configuration, wire: Wire) -> TrustSettings:
+    gauge = wire.channel.split(".")[0]
+    options, driver = configuration.gauges[gauge], configuration.drivers[gauge]
+    return TrustSettings(
+        MotionLimits(options.fastest_mm_per_s or math.inf, options.acceleration_mm_per_s2 or math.inf),
+        options.trust_after_loss or (driver.absolute if options.absolute is None else options.absolute),
+        wire.stale_after_s,
+    )
