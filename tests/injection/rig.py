@@ -199,7 +199,8 @@ class InjectedMachine:
 
     def signal(self, process: str, number: signal.Signals) -> None:
         """Send a signal to one of the daemon's processes."""
-        os.kill(self.daemon.pids()[process], number)
+        # one that is just being started has the number 0, which is everybody in this process's own group
+        os.kill(until(f"{process} runs", lambda: self.daemon.pids()[process]), number)
 
     def stop_for(self, duration_s: float) -> None:
         """Stop all of the daemon for so long."""

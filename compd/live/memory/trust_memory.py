@@ -162,7 +162,7 @@ class TrustMemory:
         """(k, 2) monotonic time (s) and value (mm) of the last readings of channel `i` that were believed, in order."""
         readings = self._recent[i].copy()
         readings = readings[~np.isnan(readings[:, 0])]
-        return readings[np.argsort(readings[:, 0], kind="stable")]
+        return np.asarray(readings[np.argsort(readings[:, 0], kind="stable")])
 
     def accept(self, name: str) -> list[str]:
         """Believe what the channels of `name` show from now on, and return those that were not believed.
