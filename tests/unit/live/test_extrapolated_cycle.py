@@ -27,6 +27,11 @@ AGES_S = {"scale_1.position": 0.02, "scale_2.position": 0.05, "scale_3.position"
 SPEEDS = {"scale_1.position": 50.0, "scale_2.position": -30.0, "scale_3.position": 10.0, "joints.4": 0.05}
 
 
+def unlimited(name="tripod-cmm.yaml", **changes):
+    """The machine without a limit of the tip's error."""
+    return machine(name, tip_error_um=None, **changes)
+
+
 def moving(live, u=0.0, cycles=1, horizon_s=1.0, extrapolate=True):
     """The last setpoint of some cycles in which lengths move steadily and are read at different times."""
     live.settings = replace(live.settings, loop=live.settings.loop.model_copy(update={"extrapolate": extrapolate}))
@@ -56,46 +61,46 @@ def quick(live):
 
 
 def test_the_tip_is_where_it_is_at_the_time_of_the_cycle():
-    setpoint = moving(quick(machine()), cycles=20)
-    truth = at_once(quick(machine()), setpoint.time_s)
-    as_read = moving(quick(machine()), cycles=20, extrapolate=False)
+    setpoint = moving(quick(unlimited()), cycles=20)
+    truth = at_once(quick(unlimited()), setpoint.time_s)
+    as_read = moving(quick(unlimited()), cycles=20, extrapolate=False)
     assert setpoint.values.tip_M_mm == pytest.approx(truth.values.tip_M_mm, abs=1e-9)
     assert setpoint.values.correction_mm == pytest.approx(truth.values.correction_mm, abs=1e-9)
     assert np.linalg.norm(as_read.values.tip_M_mm - truth.values.tip_M_mm) > 0.5
 
 
 def test_age_and_skew_stay_those_of_the_measurements():
-    setpoint = moving(machine())
+    setpoint = moving(unlimited())
     assert setpoint.age_s == pytest.approx(0.17)
     assert setpoint.skew_s == pytest.approx(0.169)
 
 
 def test_readings_without_a_motion_are_used_as_they_are():
-    live = quick(machine())
+    live = quick(unlimited())
     moving(live)
-    still = quick(machine())
+    still = quick(unlimited())
     still.change_mm["scale_1.position"] = 1.0
     assert still.step().values.scale_setpoint_mm == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
 
 
 def test_the_bound_grows_with_age_and_is_larger_where_nothing_is_carried_on():
-    at_rest = with_noise(machine(), 0.1).step().values.u_tip_um
+    at_rest = with_noise(unlimited(), 0.1).step().values.u_tip_um
     carried, as_read = (
-        moving(with_noise(machine(), 0.1), extrapolate=extrapolate).values.u_tip_um for extrapolate in (True, False)
+        moving(with_noise(unlimited(), 0.1), extrapolate=extrapolate).values.u_tip_um for extrapolate in (True, False)
     )
     assert at_rest < carried < as_read - 1500.0, "50 mm/s for 0.02 s and 30 mm/s for 0.05 s are not carried on"
 
 
 @pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
 def test_the_bound_by_age_is_that_of_the_worst_signs_of_the_scales(name):
-    live, step_mm = with_noise(machine(name), 0.1), 1e-3
+    live, step_mm = with_noise(unlimited(name), 0.1), 1e-3
     bound_um = moving(live).values.u_tip_um - 1.2 * live.state.tip_noise_um[3]
     lengths_mm, _ = live.wires.lengths.age_bound_mm(live.latest.snapshot(live.now_s), live.model.links, True, 0.4)
     moved = []
     for channel in live.wires.length_channels:
         pair = []
         for sign in (1, -1):
-            changed = quick(machine(name))
+            changed = quick(unlimited(name))
             changed.change_mm[channel] += sign * step_mm
             pair.append(changed.step().values.tip_M_mm)
         moved.append(1e3 * (pair[0] - pair[1]) / (2 * step_mm))
@@ -108,25 +113,25 @@ def test_the_bound_by_age_is_that_of_the_worst_signs_of_the_scales(name):
 
 
 def test_the_age_of_the_scales_does_not_count_where_they_are_not_used():
-    live = with_noise(machine(), 0.1)
+    live = with_noise(unlimited(), 0.1)
     tip_mm = tuple(live.step().values.tip_B0_mm.tolist())
     live.commands.target = Target(tip_mm)
     bound_um = moving(live, extrapolate=False).values.u_tip_um
-    assert bound_um < 400.0, "the joints alone: the oldest is 0.17 s old"
+    assert bound_um < 500.0, "the joints alone: the oldest is 0.17 s old"
 
 
 def test_a_motion_that_is_not_known_yet_leaves_the_bound_unknown_and_is_named_with_a_limit():
-    setpoint = moving(with_noise(machine(), 0.1), u=float("nan"))
+    setpoint = moving(with_noise(unlimited(), 0.1), u=float("nan"))
     assert setpoint.valid
     assert json.loads(setpoint.to_json())["u_tip_um"] is None
-    refused = moving(with_noise(machine(), 0.1, tip_error_um=100.0), u=float("nan"))
+    refused = moving(with_noise(unlimited(), 0.1, tip_error_um=100.0), u=float("nan"))
     assert refused.state is State.REFUSED
     assert "scale 1 (scale_1.position), scale 2 (scale_2.position)" in refused.reason
     assert "read only once" in refused.reason
 
 
 def test_a_silent_gauge_is_held_where_it_was_carried_to():
-    live = quick(machine())
+    live = quick(unlimited())
     first = moving(live, horizon_s=0.1)
     tips = []
     for _ in range(40):
@@ -162,33 +167,33 @@ def later(live, elsewhere_mm, lost=False):
 
 
 def test_the_bound_grows_while_a_set_of_comparators_is_held():
-    live = with_noise(machine(on_stale="hold"), 0.1)
+    live = with_noise(unlimited(on_stale="hold"), 0.1)
     live.change_mm = dict.fromkeys(live.change_mm, 0.0)
     standing(live)
     at_rest_um = standing(live).values.u_tip_um
     bounds_um = [held(live).values.u_tip_um for _ in range(3)]
     assert at_rest_um < bounds_um[0] < bounds_um[1] < bounds_um[2]
-    assert bounds_um[2] < 20.0, "nothing moves but by what the last readings leave open"
+    assert bounds_um[2] < 100.0, "nothing moves but by what the last readings leave open"
 
 
 def test_what_joints_and_frame_may_do_counts_while_a_set_is_held_and_the_machine_moves():
-    live = with_noise(machine(on_stale="hold"), 0.1)
+    live = with_noise(unlimited(on_stale="hold"), 0.1)
     standing(live)
     still_um = held(live).values.u_tip_um
-    live = with_noise(machine(on_stale="hold"), 0.1)
+    live = with_noise(unlimited(on_stale="hold"), 0.1)
     standing(live)
     moved_um = held(live, elsewhere_mm=5.0).values.u_tip_um
     assert moved_um > still_um + 100.0
 
 
 def test_a_set_held_before_its_motion_is_known_leaves_the_bound_unknown():
-    live = with_noise(machine(on_stale="hold"), 0.1)
+    live = with_noise(unlimited(on_stale="hold"), 0.1)
     moving(live, u=float("nan"))
     assert json.loads(held(live).to_json())["u_tip_um"] is None
 
 
 def test_a_held_set_replays_bit_for_bit(tmp_path):
-    run = Run(with_noise(machine(on_stale="hold"), 0.1))
+    run = Run(with_noise(unlimited(on_stale="hold"), 0.1))
     sent = []
     with run.recorder(tmp_path / "run") as recorder:
         for k in range(4):
@@ -201,7 +206,7 @@ def test_a_held_set_replays_bit_for_bit(tmp_path):
 
 
 def test_a_run_on_the_move_replays_bit_for_bit_and_says_how_each_length_moves(tmp_path):
-    run = Run(with_noise(machine(), 0.1))
+    run = Run(with_noise(unlimited(), 0.1))
     sent = []
     with run.recorder(tmp_path / "run") as recorder:
         for k in range(30):
@@ -226,9 +231,9 @@ def former_um(live):
 
 
 def test_a_recording_of_a_release_without_motion_replays_as_it_was(tmp_path):
-    """As 0.2.0 wrote them: no motion with the readings, no skew, and the tip's standard uncertainty by noise along x, y, z
-    in setpoint and state."""
-    run = Run(with_noise(machine(), 0.1, tip_error_um=100.0))
+    """As 0.2.0 wrote them: no motion with the readings, no skew, the tip's standard uncertainty along x, y, z in setpoint
+    and state."""
+    run = Run(with_noise(unlimited(), 0.1, tip_error_um=100.0))
     with run.recorder(tmp_path / "run") as recorder:
         for line, message, _ in run.quiet(20):
             recorder.put(line, message)
@@ -254,7 +259,7 @@ def test_a_recording_of_a_release_without_motion_replays_as_it_was(tmp_path):
 
 
 def test_a_gauge_that_fails_on_the_move_costs_what_it_always_did():
-    live = quick(machine())
+    live = quick(unlimited())
     moving(live, cycles=3)
     live.faults["scale_2.position"] = Quality.LINE_LOST
     assert "scale 2" in live.step().reason
