@@ -231,8 +231,7 @@ def former_um(live):
 
 
 def test_a_recording_of_a_release_without_motion_replays_as_it_was(tmp_path):
-    """As 0.2.0 wrote them: no motion with the readings, no skew, the tip's standard uncertainty along x, y, z in setpoint
-    and state."""
+    """As 0.2.0 wrote them: no motion, no skew, the tip's standard uncertainty along x, y, z in setpoint and state."""
     run = Run(with_noise(unlimited(), 0.1, tip_error_um=100.0))
     with run.recorder(tmp_path / "run") as recorder:
         for line, message, _ in run.quiet(20):
