@@ -108,7 +108,7 @@ def names_of(configuration: Configuration) -> tuple[str, ...]:
 
 @cache
 def track(name: str) -> Track:
-    """Stand, drive, stand. All links arrive at once, the one with the longest way at the usual speed of the simulation."""
+    """Stand, drive, stand. All links arrive at once, the one with the longest way at the simulation's usual speed."""
     configuration = load(CONFIG / name)
     world = World(configuration.geometry, configuration.wiring, 3, strengths=FULLY_MEASURED_WITHOUT_NOISE)
     names, states = names_of(configuration), []

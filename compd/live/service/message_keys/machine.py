@@ -37,6 +37,9 @@ class MachineLimitKeys(Keys):
     correction_mm: float = Field(description="largest, to either side, mm")
     slew_mm_per_s: float = Field(description="fastest change, mm/s")
     on_limit: Literal["clamp", "refuse"] = Field(description="what happens beyond them")
+    tip_error_um: float | None = Field(
+        default=None, description="largest bound of the tip's error that is valid, um; absent: none"
+    )
 
 
 class MachineKeys(SentMessage):
