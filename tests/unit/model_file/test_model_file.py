@@ -101,7 +101,7 @@ def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
     ("edit", "said"),
     [
         (lambda data: data.update(machine="hexapod"), "belongs to another machine"),
-        (lambda data: data.update(format=9), "was written by a later release(.|\n)*format: 1 to 2(.|\n)*next: install"),
+        (lambda data: data.update(format=9), "was written by a later release(.|\n)*format: 1 to 3(.|\n)*next: install"),
         (lambda data: data.update(format=0), "format: "),
         (lambda data: data.update(colour="red"), "m.yaml, colour: is no key that belongs here"),
         (lambda data: data["effects"][0].update(effect="link_elastisity"), "no such effect"),
@@ -131,9 +131,15 @@ def test_files_of_release_0_1_0_are_read(tmp_path: Path, format_: int | None) ->
     path = tmp_path / "m.yaml"
     example().write(path)
     data = yaml.safe_load(path.read_text())
-    assert data.pop("format") == 2
+    assert data.pop("format") == 3
+    counted = [effect.pop("counts_from") for effect in data["effects"]]
+    assert set(counted) == {"machine zero"}
     path.write_text(yaml.safe_dump(data if format_ is None else {"format": format_, **data}))
-    assert read_model_file(path, "tripod-cmm", 3).declared == example().declared
+    read = read_model_file(path, "tripod-cmm", 3)
+    assert read.declared == example().declared
+    assert {fitted.effect.counts_from for fitted in read.fitted} == {"20 degC"}, "as they were fitted then"
+    read.write(path)
+    assert [effect["counts_from"] for effect in yaml.safe_load(path.read_text())["effects"]] == ["20 degC"] * 2
 
 
 def test_every_mistake_in_the_structure_is_in_one_message(tmp_path: Path) -> None:
