@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -47,8 +47,8 @@ def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wante
     quantities = np.empty((count, len(names) + len(references)))
     for place, name in enumerate(names):
         quantities[:, place] = _quantity(values.quantities, name)
-    for place, (name, value) in enumerate(references, start=len(names)):
-        quantities[:, place] = _at_zero(values.quantities_at_zero, name) if value is None else value
+    if references:
+        quantities[:, len(names) :] = _references(references, values.quantities_at_zero)
     wanted_mm, attitude_M_P = np.empty((count, 6)), np.empty((count, 3, 3))
     if wanted:
         wanted_mm[:, :3] = _row_copy(wanted.tip_M_mm, lead, 1)
@@ -79,18 +79,20 @@ def _row_copy(values: FloatArray, lead: tuple[int, ...], core: int) -> FloatArra
     return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64).reshape(math.prod(lead), *shape)
 
 
-def _at_zero(quantities: Mapping[str, float], name: str) -> float:
-    if name not in quantities:
+def _references(references: Sequence[tuple[str, float | None]], at_zero: Mapping[str, float]) -> list[float]:
+    """From which values effects count. Raises CompdError for a quantity that was not measured at machine zero."""
+    try:
+        return [at_zero[name] if value is None else value for name, value in references]
+    except KeyError as error:
         raise CompdError(
             Problem(
                 where="rows for effects",
                 what="this quantity was not measured at machine zero, from where effects count",
-                value=name,
-                allowed=", ".join(sorted(quantities)) or "nothing was",
+                value=str(error.args[0]),
+                allowed=", ".join(sorted(at_zero)) or "nothing was",
                 next_step="take machine zero again: `compd zero`",
             )
-        )
-    return quantities[name]
+        ) from error
 
 
 def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:

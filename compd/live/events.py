@@ -125,7 +125,7 @@ EVENTS: tuple[Event, ...] = (
           "at the end of the daemon"),
     Event("zero_refused", "machine zero refused", "warning", ("reason",), "`compd zero` has failed"),
     Event("model_loaded", "model", "info", ("file", "hash", "effects"), "at the start, with `state.model_file`"),
-    Event("model_from_20_degC", "effects count from 20 degC and not from machine zero", "warning", ("file", "effects"),
+    Event("model_of_old_datum", "effects count from 20 degC and not from machine zero", "warning", ("file", "effects"),
           "a model was fitted without the quantities at machine zero: fit it again, on a recording with them"),
     Event("zero_incomplete", "machine zero is without quantities that could not be read", "warning", ("quantities",),
           "`compd zero`: models with effects of these quantities are refused until zero is taken with them"),

@@ -150,6 +150,8 @@ def test_files_of_earlier_releases_are_read_and_warned_of(tmp_path: Path, format
     data = yaml.safe_load(path.read_text())
     assert data.pop("format") == 3
     del data["checksum"]
+    counted = [effect.pop("counts_from") for effect in data["effects"]]
+    assert set(counted) == {"machine zero"}
     path.write_text(yaml.safe_dump(data if format_ is None else {"format": format_, **data}))
     found = read_model_file(path, "tripod-cmm", 3)
     assert found.declared == example().declared
@@ -157,6 +159,9 @@ def test_files_of_earlier_releases_are_read_and_warned_of(tmp_path: Path, format
     assert "has no checksum" in no_checksum.what
     assert "does not say in which range it was fitted" in no_range.what
     assert "temperature_link_3_degC" in no_range.value
+    assert {fitted.effect.counts_from for fitted in found.fitted} == {"20 degC"}, "as they were fitted then"
+    found.write(path)
+    assert [effect["counts_from"] for effect in yaml.safe_load(path.read_text())["effects"]] == ["20 degC"] * 2
 
 
 def test_what_a_person_means_and_where_it_was_fitted_are_kept(tmp_path: Path) -> None:

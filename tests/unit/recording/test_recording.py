@@ -366,7 +366,7 @@ def test_the_sidecar_says_from_which_quantities_effects_count(tmp_path: Path) ->
     known = read_recording(write_recording_files(tmp_path, csv_text(), SIDECAR + at_zero))
     assert known.sidecar.quantities_at_zero == {"temperature_room_degC": 23.0, "pressure_hPa": 987.5}
     assert known.sidecar.counts_from == "machine zero"
-    contents = sidecar_contents("tripod-cmm", {"quantity": "tool_position"}, quantities_at_zero={})
+    contents = sidecar_contents("tripod-cmm", {"quantity": "tool_position", "frame": "machine"}, quantities_at_zero={})
     write_recording(tmp_path / "again.csv", plain.columns, contents)
     assert read_recording(tmp_path / "again.csv").sidecar.quantities_at_zero == {}, "which is not the same as no key"
 

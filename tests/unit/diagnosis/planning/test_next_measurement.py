@@ -6,7 +6,6 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -27,7 +26,7 @@ from compd.diagnosis.planning.next_measurement import (
     plan_measurement,
 )
 from compd.errors import CompdError, RecordingError
-from compd.model.effect import Effect, FittedEffect
+from compd.model.effect import FittedEffect
 from tests.support.hidden_effects import LIBRARY, NOISE_UM, record_with_effects
 
 SIGMA_UM = np.full(3, NOISE_UM)
@@ -206,21 +205,10 @@ def test_the_plan_command_writes_csv(tmp_path: Path) -> None:
     assert shown.stdout.startswith("row,purpose,time_s")
 
 
-class NamedLike:
-    """An effect under another name: nothing parts the two."""
-
-    def __init__(self, effect: Any, name: str) -> None:
-        self._effect = effect
-        self.id = name
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._effect, name)
-
-
 def test_of_three_rivals_the_rows_part_those_that_can_be_and_the_others_are_named(tmp_path: Path) -> None:
     aligned = record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)}, visits=60)
     spring, contact = fit_rivals(aligned, "link_elasticity", "joint_contact")
-    twin = replace(spring, effect=cast("Effect", NamedLike(spring.effect, "twin")))
+    twin = replace(spring, effect=replace(spring.effect, id="twin"))  # nothing parts the two
     limits = recorded_limits(aligned)._replace(force_N=100.0)
     plan = plan_measurement(aligned, (), (spring, contact, twin), SIGMA_UM, limits, 20)
     assert plan.rivals == ("link_elasticity", "joint_contact", "twin")
