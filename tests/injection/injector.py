@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import multiprocessing
 import select
+import sys
 import time
 from collections import deque
 from collections.abc import Mapping
@@ -151,6 +152,9 @@ class _Wires:
         device.replies += device.device.read(fd)
         while length := device.protocol.reply_length(device.replies):
             reply, device.replies = device.replies[:length], device.replies[length:]
+            if not device.pending:  # of a request from before this process began, or twice: it belongs to none
+                print(f"{device.name}: a reply that nobody has asked for: {reply!r}", file=sys.stderr, flush=True)
+                continue
             pending = device.pending.popleft()
             if pending.asker is not None:
                 self._reply(self._lines[pending.asker], pending.request, reply, now_s)

@@ -21,6 +21,8 @@ from tests.support.simulated import run_directory
 
 LOOK_EVERY_S = 1.0
 TRIES = 3
+# In a row: it is the computer then, and not a cell.
+MOST_FAILURES = 3
 
 
 class Tried(NamedTuple):
@@ -83,15 +85,18 @@ def _work(todo: Queue[str | None], done: Queue[Tried]) -> None:
     pauses = Pauses()
     with pauses.watched(), ExitStack() as running:
         machine: InjectedMachine | None = None
-        while (name := _next(todo)) is not None:
+        failures = 0
+        while failures < MOST_FAILURES and (name := _next(todo)) is not None:
             cell = by_name[name]
             try:
                 if machine is None or machine.expands is not cell.expands:
                     running.close()
                     machine = running.enter_context(_machine(cell.expands, running))
                 done.put(Tried(name, _result(machine, cell, pauses)))
+                failures = 0
             except Exception:  # noqa: BLE001 (whatever it is, the other cells go on)
                 machine = None
+                failures += 1
                 done.put(Tried(name, None, traceback.format_exc()))
 
 
