@@ -31,7 +31,7 @@ from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import UsableComparators
 from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_bound import refused_bound, tip_bound, with_place
-from compd.live.loop.tip_uncertainty import TipUncertainty, tip_uncertainty
+from compd.live.loop.tip_uncertainty import TipUncertainty, noise_now, tip_uncertainty
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
@@ -159,7 +159,7 @@ def _compute(
         return _Outcome(State.REFUSED, refusal), state
 
     u_tip = _uncertainty(tick, state, settings) or tip_uncertainty(
-        machine, settings.noise, values, compensation.scale_setpoint_mm, warm_start.effects
+        machine, noise_now(settings.noise, wires, snapshot, usable.beyond), values, compensation.scale_setpoint_mm, warm_start.effects
     )
     shadow, shadow_memory = None, state.shadow_memory
     if models.shadow is not None:
@@ -204,7 +204,7 @@ def _compute(
 
 def _reported(usable: UsableComparators, scales: Scales, limited: LimitedCorrection) -> tuple[State, str]:
     """State and reason of a valid setpoint: of what concerns it the worst state, and all reasons."""
-    beyond = f"effects stay at the edge of their range: {usable.beyond}" if usable.beyond else ""
+    beyond = f"effects stay at the edge of their range: {usable.beyond.text}" if usable.beyond else ""
     at_edge = State.CLAMPED if beyond else State.OK
     state = max(limited.state, usable.state, scales.state or State.OK, at_edge, key=lambda state: state.rank)
     return state, "; ".join(filter(None, (usable.reason, scales.reason, limited.reason, beyond)))

@@ -34,7 +34,7 @@ def read_comparators(
     lengths = wires.comparators.read(snapshot, zero_mm, extrapolate)
     lost, oldest_s = lengths.lost, lengths.oldest_s
     quantities: Mapping[str, FloatArray] = {}
-    beyond = ""
+    beyond = None
     if applied.quantities:
         needed = applied.read(snapshot)
         lost = lost.and_also(needed.lost)

@@ -19,7 +19,7 @@ from compd.configuration.yaml_reader import LARGEST_BYTES
 from compd.errors import Problem, StateError
 from compd.files.atomic_files import read_small_file
 from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.wiring import MachineWires, WiredValues, Wires
+from compd.live.loop.wiring import Beyond, MachineWires, WiredValues, Wires
 from compd.live.memory.latest import Snapshot
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities, unmet_needs
@@ -81,11 +81,12 @@ class FittedRanges(NamedTuple):
         within = np.minimum(np.maximum(values, self.low), self.high)
         if (within == values).all() or read.lost:
             return read._replace(values=within)
-        beyond = ", ".join(
-            f"{names[k]} is {values[k]:.6g}, fitted from {self.low[k]:.6g} to {self.high[k]:.6g}"
-            for k in np.flatnonzero(within != values).tolist()
+        places = np.flatnonzero(within != values).tolist()
+        text = ", ".join(
+            f"{names[k]} is {values[k]:.6g}, fitted from {self.low[k]:.6g} to {self.high[k]:.6g}" for k in places
         )
-        return read._replace(values=within, beyond=beyond)
+        by = {names[k]: abs(float(values[k] - within[k])) for k in places}
+        return read._replace(values=within, beyond=Beyond(text, by))
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from compd.arrays import FloatArray
 from compd.configuration.operation import LoopSettings
 from compd.live.loop.reasons import Lost
 from compd.live.loop.states import State
+from compd.live.loop.wiring import Beyond
 
 # How long the correction is held, at most, while the daemon ends.
 _LONGEST_END_S = 1.0
@@ -59,7 +60,7 @@ class UsableComparators(NamedTuple):
     held_s : (k + 9), for how long each comparator that is taken from the last good set has not been read; 0 for one
         that is live. None where all are.
     absent_mm : (k + 9), what the comparators showed and is not used; None for nothing.
-    beyond : which quantities are beyond the range in which the effects were fitted; "" for none.
+    beyond : which quantities are beyond the range in which the effects were fitted; None for none.
     """
 
     comparators: ComparatorSet | None
@@ -69,7 +70,7 @@ class UsableComparators(NamedTuple):
     weight: float = 1.0
     held_s: FloatArray | None = None
     absent_mm: FloatArray | None = None
-    beyond: str = ""
+    beyond: Beyond | None = None
 
 
 def usable_comparators(

@@ -1,8 +1,10 @@
-"""The live tip's standard uncertainty: from the stated noise of its gauges, and the errors of the fitted numbers."""
+"""The live tip's standard uncertainty: from the noise of its gauges, as stated or measured, and from the errors of the
+fitted numbers."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +12,8 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation.values import GaugeValues
 from compd.configuration import Configuration
-from compd.live.loop.wiring import MachineWires
+from compd.live.loop.wiring import Beyond, MachineWires
+from compd.live.memory.latest import Snapshot
 from compd.model.effect_memory import EffectMemory
 from compd.model.machine import MachineModel
 from compd.model.tip_derivatives import tip_derivatives
@@ -18,7 +21,11 @@ from compd.model.uncertainty import GaugeNoise, parameter_variance
 from compd.units import UM_PER_MM
 
 
-def stated_noise(configuration: Configuration, wires: MachineWires, readings: int = 2) -> GaugeNoise | None:
+# A length is the difference of so many: now and at machine zero.
+_READINGS = 2
+
+
+def stated_noise(configuration: Configuration, wires: MachineWires, readings: int = _READINGS) -> GaugeNoise | None:
     """Of the lengths, which are each the difference of two readings: now and at machine zero.
 
     At zero many readings are averaged, which makes them no better than one where the last digit stands still. None
@@ -29,10 +36,31 @@ def stated_noise(configuration: Configuration, wires: MachineWires, readings: in
     lengths_mm = np.array([wire.noise.um * math.sqrt(readings) for wire in wires.length_wires]) / UM_PER_MM
     if not np.isfinite(lengths_mm).all():
         return None
-    links, joints = len(wires.scale.wires), wires.joints
     quantities = {quantity.name: quantity.noise for quantity in configuration.wiring.quantities if quantity.noise}
+    return _noise(lengths_mm, wires, quantities, "stated")
+
+
+def noise_now(
+    noise: GaugeNoise | None, wires: MachineWires, snapshot: Snapshot, beyond: Beyond | None
+) -> GaugeNoise | None:
+    """The stated noise; of a length that scatters more at rest, its scatter, now and at machine zero.
+
+    beyond : quantities that are taken as the end of the range in which the effects were fitted: by as much they are off.
+    """
+    if noise is None:
+        return None
+    stated_mm = np.concatenate([noise.scale_mm, noise.joint_mm, noise.frame_mm])
+    scatter_mm = wires.lengths.scatter_mm(snapshot) * math.sqrt(_READINGS)
+    quantities = noise.quantities
+    if beyond is not None:
+        quantities = {name: math.hypot(sigma, beyond.by.get(name, 0.0)) for name, sigma in quantities.items()}
+    return _noise(np.fmax(stated_mm, scatter_mm), wires, quantities, "stated, or measured")
+
+
+def _noise(lengths_mm: FloatArray, wires: MachineWires, quantities: Mapping[str, float], how: str) -> GaugeNoise:
+    links, joints = len(wires.scale.wires), wires.joints
     return GaugeNoise(
-        lengths_mm[:links], lengths_mm[links : links + joints], lengths_mm[links + joints :], quantities, "stated"
+        lengths_mm[:links], lengths_mm[links : links + joints], lengths_mm[links + joints :], quantities, how
     )
 
 

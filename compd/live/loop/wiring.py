@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,14 @@ from compd.live.memory.latest import Latest, Snapshot
 ALL_GOOD = Lost()
 
 
+class Beyond(NamedTuple):
+    """Quantities that are taken as the nearer end of their range. text : which, for people. by : how far each is beyond
+    it, by name, in its unit."""
+
+    text: str
+    by: Mapping[str, float]
+
+
 class WiredValues(NamedTuple):
     """The values of k wires in one snapshot.
 
@@ -29,14 +37,14 @@ class WiredValues(NamedTuple):
         for temperatures and other quantities, whose zero is 0. nan where the reading cannot be used.
     oldest_s, newest_s : monotonic times of the oldest and of the newest reading; inf and -inf without wires.
     lost : which readings cannot be used, and why.
-    beyond : which values were beyond the range that they are limited to; "" for none.
+    beyond : what was beyond the range that the values are limited to; None for nothing.
     """
 
     values: FloatArray
     oldest_s: float
     newest_s: float
     lost: Lost
-    beyond: str = ""
+    beyond: Beyond | None = None
 
 
 class Wire(NamedTuple):
@@ -95,6 +103,11 @@ class Wires:
         speeds = np.empty(len(self.wires))
         speed_bounds_mm_per_s(snapshot.readings.slots, self._wired, speeds)
         return speeds
+
+    def scatter_mm(self, snapshot: Snapshot) -> FloatArray:
+        """(k) standard deviation of one reading of each length, as measured at rest, mm; nan before it is known."""
+        scatter_mm: FloatArray = snapshot.readings.slots["scatter_mm"][self._wired]
+        return scatter_mm
 
     def age_bound_mm(
         self, snapshot: Snapshot, scales: int, extrapolate: bool, largest_mm: float
