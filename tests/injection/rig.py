@@ -34,9 +34,7 @@ from tests.support.watching import PATIENCE_S, Rules, Seen, Watcher, until
 
 TRIPOD = "tripod-cmm.yaml"
 RATE_HZ = 100.0
-# What an owner adds to the shipped configuration, so that the gauges are compared with each other. Of the frame's
-# comparators the noise is larger than the last digit.
-NOISE_UM = {"frame_u": 0.02, "cabinet": 0.02}
+# What an owner adds to the shipped configuration, so that the gauges are compared with each other.
 VOTES = {
     "joint_pair_um": 30.0,
     "tip_mm_per_s": 200.0,
@@ -261,8 +259,6 @@ class InjectedMachine:
 
 def add_votes(configuration: dict[str, Any]) -> None:
     """Let the gauges of a configuration document be compared with each other, as far as they can."""
-    for gauge, noise_um in NOISE_UM.items():
-        configuration["gauges"][gauge]["noise_um"] = noise_um
     configuration["votes"] = VOTES
 
 

@@ -16,8 +16,6 @@ from tests.support.watching import Message, Seen
 
 # Of the cycles of a cell so many may have a setpoint beyond its bound, which is one of 95 %; none beyond twice.
 BEYOND_SHARE, BEYOND_MOST = 0.05, 2.0
-# Of a normal distribution, 95 % on both sides.
-COVERAGE = 1.96
 # A target that was made so long before is old: longer than the time between the bursts of `clients`.
 TARGET_LATE_S = 0.5
 
@@ -25,9 +23,7 @@ TARGET_LATE_S = 0.5
 def tip_bound_um(setpoint: Message) -> float:
     """The 95 % bound of the tip's error that a setpoint states; nan where it states none."""
     stated = setpoint.get("u_tip_um")
-    if stated is None:
-        return math.nan
-    return COVERAGE * float(np.linalg.norm(stated)) if isinstance(stated, list) else float(stated)
+    return math.nan if stated is None else float(stated)
 
 
 @dataclass
