@@ -16,7 +16,7 @@ help:
 	@echo "make demo-linuxcnc  LinuxCNC corrected, a hidden effect probed, diagnosed, adopted (ten minutes; Debian's linuxcnc-uspace)"
 	@echo "make live    the same machine live in the browser, until Ctrl-C"
 	@echo "make test    the tests; a hidden cause is found on wires among them (9 min)"
-	@echo "make sample  some of the longer ones: the page in a real browser, LinuxCNC, the fault matrix, fuzzers (12 min)"
+	@echo "make sample  some of the longer ones: the page in a real browser, LinuxCNC, the fault matrix, fuzzers (10 min)"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"

@@ -159,7 +159,11 @@ def _compute(
         return _Outcome(State.REFUSED, refusal), state
 
     u_tip = _uncertainty(tick, state, settings) or tip_uncertainty(
-        machine, noise_now(settings.noise, wires, snapshot, usable.beyond), values, compensation.scale_setpoint_mm, warm_start.effects
+        machine,
+        noise_now(settings.noise, wires, snapshot, usable.beyond),
+        values,
+        compensation.scale_setpoint_mm,
+        warm_start.effects,
     )
     shadow, shadow_memory = None, state.shadow_memory
     if models.shadow is not None:

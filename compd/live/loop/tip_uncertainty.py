@@ -20,7 +20,6 @@ from compd.model.tip_derivatives import tip_derivatives
 from compd.model.uncertainty import GaugeNoise, parameter_variance
 from compd.units import UM_PER_MM
 
-
 # A length is the difference of so many: now and at machine zero.
 _READINGS = 2
 
@@ -45,7 +44,7 @@ def noise_now(
 ) -> GaugeNoise | None:
     """The stated noise; of a length that scatters more at rest, its scatter, now and at machine zero.
 
-    beyond : quantities that are taken as the end of the range in which the effects were fitted: by as much they are off.
+    beyond : quantities that are taken as the end of the range of the fit: by as much they are off.
     """
     if noise is None:
         return None

@@ -7,6 +7,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
+from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 from typing import TYPE_CHECKING, Any
@@ -128,12 +129,14 @@ class Worker:
         while (asked := self._next()) is not None:
             # a question that was cancelled while it waited is not begun
             if asked.answer.set_running_or_notify_cancel():
+                tell: Callable[[], None]
                 try:
-                    answer = self._answer(asked)
+                    tell = partial(asked.answer.set_result, self._answer(asked))
                 except Exception as error:  # noqa: BLE001  whoever waits hears of it
-                    asked.answer.set_exception(error)
-                else:
-                    asked.answer.set_result(answer)
+                    tell = partial(asked.answer.set_exception, error)
+                with self._changed:  # whoever has the answer may let the process rest
+                    self._current = None
+                tell()
 
     def _next(self) -> Asked | None:
         with self._changed:
