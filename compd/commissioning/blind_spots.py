@@ -21,8 +21,9 @@ from compd.compensation.compensation import compensate_cmm, compensate_machine_t
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
+from compd.configuration.stated_noise import tolerance_mm
 from compd.errors import KinematicsError
-from compd.live.acquisition.reading_trust import LEAST_MOTION, tolerance_mm
+from compd.live.acquisition.reading_trust import LEAST_MOTION
 from compd.live.acquisition.votes.measured_scatter import RATIO
 from compd.live.acquisition.way_evidence import LEAST_WAY_MM, WAY_SHARE
 from compd.live.quantity_limits import UNIT_LIMITS
@@ -301,12 +302,13 @@ def _gap(figures: Figures) -> str:
 
 def _at_rest(figures: Figures) -> str:
     """What a gauge may lose in a gap at rest, by the kind of the gauge."""
-    gauges = figures.configuration.gauges
     parts = []
     for kind in ("scale", "joint", "frame"):
         names = {j.gauge.partition(".")[0] for j in figures.jumps if any(x.startswith(kind) for x in j.measures)}
         if names:
-            lost_um = LEAST_MOTION * max(tolerance_mm(gauges[name].noise_um) for name in names) * UM_PER_MM
+            lost_um = (
+                LEAST_MOTION * max(tolerance_mm(figures.configuration.noise_of(name).um) for name in names) * UM_PER_MM
+            )
             parts.append(f"{kind} {lost_um:.3g} um, {lost_um * figures.leverage(kind):.3g} um at the tip")
     return "; ".join(parts)
 

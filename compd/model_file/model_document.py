@@ -89,7 +89,8 @@ def _covariance(rows: list[list[float]]) -> list[list[float]]:
         if row[i] < 0:
             raise ValueError(f"has a negative variance, {row[i]:g}: number {i + 1} of its diagonal")
         for k, value in enumerate(row[:i]):
-            if math.isinf(value) or (value != rows[k][i] and not math.isnan(value)):
+            rounding = _ROUNDING * math.sqrt(row[i] * rows[k][k])
+            if math.isinf(value) or abs(value - rows[k][i]) > rounding:
                 raise ValueError(f"is not symmetric: {value:g} and {rows[k][i]:g} at {i + 1}, {k + 1}")
             if abs(value) > (1 + _ROUNDING) * math.sqrt(row[i] * rows[k][k]):
                 raise ValueError(f"has a correlation beyond 1: {value:g} at {i + 1}, {k + 1}")

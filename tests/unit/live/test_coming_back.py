@@ -54,7 +54,8 @@ class Shop:
 
     def replace_acquisition(self, gone_s: float = 0.0) -> None:
         self.clock.now_s += gone_s
-        self.trust = wired_trust(self.configuration, self.wires, self.memory)
+        judges = wired_trust(self.configuration, self.wires, self.memory)
+        self.trust = {channel: judges[channel] for channel in self.shows_mm}
 
     def restart(self, gone_s: float) -> None:
         self._last._write_if_changed()

@@ -17,10 +17,11 @@ from compd.commissioning.conformance.faults import Piece
 from compd.commissioning.conformance.virtual import VirtualWire
 from compd.commissioning.line_budget import USUAL_TURNAROUND_S, character_bits, line_budgets
 from compd.configuration import load
+from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Reading
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.acquisition.possible_motion import MotionLimits
-from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings, tolerance_mm
+from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
 from compd.plugins import SIMULATED_GAUGES

@@ -12,6 +12,7 @@ import pytest
 
 from compd.configuration import load
 from compd.errors import Problem, StateError
+from compd.files.checksum import checksum_of
 from compd.gauge import Quality, bad, good
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import FILE_NAME, OLD_FILE_NAME, MachineZero, load_zero
@@ -227,7 +228,9 @@ def test_the_file_keeps_the_ports_and_a_recording_does_not(tmp_path):
 
 
 def test_a_file_without_ports_is_used(tmp_path):
-    (tmp_path / FILE_NAME).write_text(json.dumps({"format": 2, **ZERO.to_json(), "checksum": ZERO.checksum}))
+    (tmp_path / FILE_NAME).write_text(
+        json.dumps({"format": 2, **ZERO.to_json(), "checksum": checksum_of(ZERO.to_json())})
+    )
     assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
 
 
