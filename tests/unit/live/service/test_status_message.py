@@ -28,7 +28,7 @@ def test_scatter_and_warning_stand_beside_their_channel() -> None:
     commands: Any = SimpleNamespace(target=None, zero=NO_ZERO)
     wires: Any = SimpleNamespace(length_wires=[], all_wires=[])
     adopted: Any = SimpleNamespace(summary={})
-    report = StatusReport({}, latest, wires, commands, adopted, nothing, control, nothing, None, dict, trust, clock)
+    report = StatusReport({}, latest, wires, commands, adopted, nothing, control, nothing, None, dict, trust, clock, {})
     first, second = report.message()["gauges"]
     assert first["scatter_um"] == 3.54
     assert first["warning"].startswith("scatters by 3.5 um")
