@@ -227,7 +227,7 @@ def _lost_periods(figures: Figures) -> str:
         return "no `geometry.scale_signal_period_mm`, so that steps are not summed"
     period_um = period_mm * UM_PER_MM
     one = f"each period of {period_um:g} um that is lost: {period_um * figures.leverage('scale'):.3g} um at the tip"
-    jumps = [j.jump_mm for j in figures.jumps if any(length.startswith("scale") for length in j.measures)]
+    jumps = [j.quiet.jump_mm for j in figures.jumps if any(length.startswith("scale") for length in j.measures)]
     largest_mm = max((jump for jump in jumps if math.isfinite(jump)), default=math.nan)
     if math.isnan(largest_mm):
         return one
