@@ -11,7 +11,7 @@ from docs.generate.fault_cells import Document, figures, introduction, measured,
 from docs.generate.markdown import codes, escape, fence, heading, join, link, table, target
 from tests.injection.case import Case, Way
 from tests.injection.matrix import FAULTS
-from tests.injection.rig import NOISE_UM, VOTES
+from tests.injection.rig import VOTES
 
 HEADER = ["what fails", "what must happen, and the way out", "largest error, valid", "shown, `ok` again after"]
 
@@ -41,7 +41,7 @@ tripod of `config/tripod-cmm.yaml` and the daemon does it to whole replies on re
 `valid` is compared with the true tip of the simulated machine. The machine stands still, unless a row says that it
 drives. Its owner has added to the configuration:
 
-{fence(yaml.safe_dump({"gauges": {name: {"noise_um": um} for name, um in NOISE_UM.items()}, "votes": VOTES}), "yaml")}
+{fence(yaml.safe_dump({"votes": VOTES}), "yaml")}
 The columns on the right are from one run of
 `{document["command"]}` on {document["date"]}:
 

@@ -108,6 +108,7 @@ class ReplayedLine:
     """A line that carries exactly one poll's bytes at a time."""
 
     unexpected_bytes = 0
+    rest_timeout_s = 0.1
 
     def __init__(self) -> None:
         self._coming: deque[Exchange] = deque()
