@@ -390,9 +390,7 @@ def test_a_browser_with_a_token_sees_arms_and_orders_and_the_page_records(page: 
     assert [status for status, _ in said["answers"]] == [403, 200, 200, 200], said
     recordings = page.service.container.path(OF_THE_PAGE / "recordings")
     wait_until(lambda: list(recordings.glob(f"{name}*")), "a recording", PATIENCE_S)
-    opening = ("/workbench/open", {"recording": name, "model": "none.model.yaml"})
-    opened = page.asked(("/recordings", {"stop": True}), opening)
-    assert [status for status, _ in opened["answers"]] == [200, 200], f"a process of its own reads it: {opened}"
+    page.asked(("/recordings", {"stop": True}))
     assert all(file.stat().st_mode & 0o077 == 0 for file in recordings.glob(f"{name}*"))
     assert page.token not in page_log(page.service) + page.service.log()
 

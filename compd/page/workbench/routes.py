@@ -107,27 +107,29 @@ class WorkbenchRoutes:
 
         Raises CompdError with every problem of the recording, its machine, the model and the libraries.
         """
-        workbench = self._open.get(key)
+        workbench, closed = self._open.get(key), None
         if workbench is None:
-            await self._make_room()
+            closed = self._close_oldest()
             workbench = OpenWorkbench(self._workers, self._diagnoses, path, model_path, self._machine)
-            self._open[key] = workbench
+            self._open[key] = workbench  # before anything is awaited: the next request finds it
         try:
+            if closed is not None:
+                await asyncio.to_thread(closed.rest)
             return plain(await workbench.ask("open_again", key, libraries))
         finally:
             if workbench.worker.kept is None:  # it could not be opened
                 self._open.pop(key, None)
                 await asyncio.to_thread(workbench.rest)
 
-    async def _make_room(self) -> None:
-        """Close what was used longest ago, where as many are open as may be. Raises StateError where all are busy."""
+    def _close_oldest(self) -> OpenWorkbench | None:
+        """What was used longest ago, open no more, where as many are open as may be. Raises StateError where all are
+        busy."""
         if len(self._open) < MOST_OPEN:
-            return
+            return None
         idle = [key for key, workbench in self._open.items() if not workbench.is_busy]
         if not idle:
             raise too_many("the workbench", MOST_OPEN)
-        oldest = self._open.pop(min(idle, key=lambda key: self._open[key].worker.used_s))
-        await asyncio.to_thread(oldest.rest)
+        return self._open.pop(min(idle, key=lambda key: self._open[key].worker.used_s))
 
     def _of_open(self, handler: Handler) -> Callable[[Request], Awaitable[Response]]:
         """The handler with the workbench that the address names."""

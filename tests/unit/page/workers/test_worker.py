@@ -253,7 +253,7 @@ def test_whoever_wants_a_new_one_does_not_wait_for_the_end_of_another(monkeypatc
     ending, go_on = threading.Event(), threading.Event()
     try:
         ask(first, "count", 1)
-        monkeypatch.setattr(process_of(first), "join", lambda timeout: (ending.set(), go_on.wait(PATIENCE_S)))
+        monkeypatch.setattr(process_of(first), "join", lambda timeout: (ending.set(), go_on.wait()))
         asked = second.submit(f"{COUNTER}.count", 1, seconds=PATIENCE_S)
         assert ending.wait(PATIENCE_S)
         workers.worker("number 3", COUNTER, (), LIMITS)
