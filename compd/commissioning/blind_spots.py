@@ -208,6 +208,24 @@ def _late(figures: Figures) -> str:
     return f"{jump.gauge}, {poll_s * 1e3:.3g} ms late at {late_mm / poll_s:g} mm/s: {error_mm:.2f} mm at the tip"
 
 
+def _departure(figures: Figures) -> str:
+    gauges = figures.configuration.gauges
+    ways = [
+        (0.5 * acceleration * jump.quiet.poll_s**2, jump)
+        for jump in figures.jumps
+        if any(length.startswith("scale") for length in jump.measures) and math.isfinite(jump.quiet.poll_s)
+        if (acceleration := gauges[jump.gauge].acceleration_mm_per_s2) is not None
+    ]
+    if not ways:
+        return "no `acceleration_mm_per_s2` of a scale, so that nothing limits it"
+    way_mm, jump = max(ways, key=lambda way: way[0])
+    factor = figures.leverage("scale")
+    return (
+        f"{jump.gauge}, in {jump.quiet.poll_s * 1e3:.3g} ms at {gauges[jump.gauge].acceleration_mm_per_s2:g} mm/s2: "
+        f"{way_mm * UM_PER_MM:.3g} um, {way_mm * UM_PER_MM * factor:.3g} um at the tip"
+    )
+
+
 def _small_jump(figures: Figures) -> str:
     parts = []
     for kind in ("scale", "joint", "frame"):
@@ -378,6 +396,14 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "",
         "nothing shows a display that is late by itself; at rest it does no harm",
         _late,
+    ),
+    BlindSpot(
+        "departure_from_rest",
+        "the machine leaves from rest",
+        "the next reading of its scales",
+        "",
+        "until then the machine is taken to rest, and `u_tip_um` is that of rest",
+        _departure,
     ),
     BlindSpot(
         "small_jump",

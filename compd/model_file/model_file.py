@@ -272,8 +272,8 @@ def read_model_file(
             )
         )
     with_covariance = () if problems else _with_own_covariance(fitted, covariance)
-    for effect, (_, entry, where) in zip(with_covariance, found, strict=False):
-        problems += _error_problems(effect, entry, links, where)
+    for fitted_effect, (_, entry, where) in zip(with_covariance, found, strict=False):
+        problems += _error_problems(fitted_effect, entry, links, where)
     if problems:
         raise StateError(problems)
     return ModelFile(

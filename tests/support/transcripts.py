@@ -115,6 +115,10 @@ class ReplayedLine:
         self._waiting = b""
         self._time_s = 100.0
 
+    @property
+    def received(self) -> bytes:
+        return self._waiting
+
     def begin(self, poll: Poll) -> None:
         assert not self._waiting, f"left over before line {poll.line}: {self._waiting!r}"
         self._coming = deque(poll.exchanges)

@@ -220,7 +220,7 @@ def _json_values(values: SetpointValues) -> dict[str, Any]:
     # rounding one long array costs as much as rounding one of three elements
     lengths = _rounded(np.concatenate(vectors), _DECIMALS_MM)
     n = len(values.correction_mm)
-    message = {
+    message: dict[str, Any] = {
         "tip_M_mm": lengths[:3],
         "tip_B0_mm": lengths[3:6],
         "link_length_mm": lengths[12 : 12 + n],

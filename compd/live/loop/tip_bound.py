@@ -161,8 +161,9 @@ def _unknown(bound: TipBound | None, needed: tuple[str, ...], settings: CycleSet
         return f"{_named(wires, unlimited)} is silent; how far it moves, `acceleration_mm_per_s2` of its gauge limits"
     if math.isnan(bound.absent_um):
         return "the correction of effects is absent, as a gauge that they need is lost"
-    if unstated := [name for name in needed if name not in (settings.noise.quantities if settings.noise else {})]:
-        return f"nobody states how much {_listed(unstated)} scatters; give `noise` of it under `wiring: quantities:`"
+    stated = settings.noise.quantities if settings.noise else {}
+    if silent := [name for name in needed if name not in stated]:
+        return f"nobody states how much {_listed(silent)} scatters; give `noise` of it under `wiring: quantities:`"
     return "the model file does not have the errors of its fitted numbers; fit it again"
 
 

@@ -257,10 +257,10 @@ def test_what_is_not_known_is_nan(diagnosis: Diagnosis) -> None:
     untried = table[table["status"] == "not_testable"]
     assert len(untried)
     assert untried["explained_fraction"].isna().all()
+    assert table[table["found"]]["effect"].tolist() == ["link_expansion"]
     table = compd.load_machine("tripod-cmm").to_dataframe().set_index("column")["noise_um"]
     assert table["scale_1_mm"] == 0.03
     assert table[[name for name in table.index if name.endswith("_degC")]].isna().all()
-    assert table[table["found"]]["effect"].tolist() == ["link_expansion"]
 
 
 def test_a_searched_constant_has_no_standard_error(recording: AlignedRecording) -> None:

@@ -64,7 +64,7 @@ CASES: list[tuple[Edit, str, str]] = [
     (lambda t: t.replace("line: frame_u", "line: joints"), "needs a line that carries registers", "modbus_rtu"),
     (lambda t: t.replace("heads: 9", "heads: 99"), "gauges.joints.heads", "15"),
     (lambda t: t.replace("gauge: joints.9}", "gauge: joints.10}"), "no such single channel", "joints.9"),
-    (lambda t: t.replace("gauge: cabinet.room}", "gauge: cabinet.t1}"), "needs a gauge in degC", "mm"),
+    (lambda t: t.replace("gauge: cabinet.room,", "gauge: cabinet.t1,"), "needs a gauge in degC", "mm"),
     (lambda t: t.replace("usb-scale-2", "usb-scale-1"), "line `scale_1` has the same port", "one line per port"),
     (
         lambda t: t.replace("/dev/serial/by-id/usb-rs485", "socket://GATEWAY:502").replace("192.168.10.20", "gateway"),

@@ -82,7 +82,7 @@ def test_symmetrical_places_are_refused() -> None:
         (lambda rng, place_mm: measured(rng, place_mm) * [1, 1, -1], "mirror image"),
         (lambda rng, place_mm: measured(rng, place_mm) / 25.4, "no choice of dwells"),
         (lambda rng, place_mm: measured(rng, place_mm[: LEAST_POINTS - 1]), "too few different places"),
-        (lambda rng, place_mm: np.linspace(0, 1, 9)[:, None] * [10.0, 20.0, 30.0], "too few different places"),
+        (lambda rng, place_mm: np.linspace(0, 1, 9)[:, None] * [10.0, 20.0, 30.0], "on one line"),
         (
             lambda rng, place_mm: np.vstack([measured(rng, place_mm[:20]), in_own_frame(random_places(rng, 10))]),
             "at no dwell",

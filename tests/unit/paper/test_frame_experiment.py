@@ -90,7 +90,7 @@ def test_noise_of_the_tip_is_that_of_random_readings(configuration: Configuratio
     """Drawn instead of differentiated: each gauge reads with its noise, the exact frame carries it to the tip."""
     model = model_of(configuration)
     noise_mm, source = frame_experiment.frame_noise_mm(configuration)
-    assert "as simulated" in source
+    assert source == "declared in the configuration"
     drawn_mm = np.random.default_rng(6).normal(size=(4000, 9)) * noise_mm
     supports = solve_frame(model.frame, model.zero.distances_mm + drawn_mm)
     tips_mm = frame_experiment._tip_mm(model, supports.base_joints_M_mm)
@@ -100,7 +100,7 @@ def test_noise_of_the_tip_is_that_of_random_readings(configuration: Configuratio
 def test_a_declared_noise_is_taken_once_every_frame_gauge_has_one(configuration: Configuration) -> None:
     def with_noise(names: set[str]) -> Configuration:
         gauges = {
-            name: gauge.model_copy(update={"noise_um": 0.3}) if name in names else gauge
+            name: gauge.model_copy(update={"noise_um": 0.3 if name in names else None})
             for name, gauge in configuration.gauges.items()
         }
         return replace(configuration, gauges=gauges)

@@ -151,7 +151,7 @@ def test_what_is_written_has_units_and_is_read_back(tmp_path: Path) -> None:
     )
     assert_same(read_recording(path), csv)
     schema = pq.read_schema(path)
-    assert schema.metadata == {b"compd.format": b"2"}
+    assert schema.metadata == {b"compd.format": b"3"}
     assert [schema.field(name).metadata for name in ("scale_1_mm", "session", "pressure_hPa")] == [
         {b"unit": b"mm"},
         {b"unit": b""},

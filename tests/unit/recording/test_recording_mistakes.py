@@ -145,7 +145,7 @@ SIDECARS: dict[str, tuple[str, list[str]]] = {
     "no such row": (SIDECAR + "excluded_rows: [{row: 99, reason: door}]\n", ["row 99", "no such row", "rows 2 to 21"]),
     "all rows": (SIDECAR + "excluded_rows: [{rows: 2-21, reason: door}]\n", ["no row of 20", "20 excluded"]),
     "external": (SIDECAR.replace("tripod-cmm", "external"), ["missing: model_x_mm, model_y_mm, model_z_mm"]),
-    "format 0": ("format: 0\n" + SIDECAR, ["run.yaml:1 format: is no format number", "1 to 2"]),
+    "format 0": ("format: 0\n" + SIDECAR, ["run.yaml:1 format: is no format number", "1 to 3"]),
     "row 1": (
         SIDECAR + "excluded_rows: [{row: 1, reason: door}]\n",
         ["run.yaml:6 excluded_rows[1].row", "names no row"],
@@ -180,7 +180,7 @@ def test_every_mistake_of_a_sidecar_comes_at_once_with_its_line(tmp_path: Path) 
 
 def test_a_newer_format_is_refused_and_nothing_else_judged(tmp_path: Path) -> None:
     (problem,) = problems_of(
-        write_recording_files(tmp_path, "no table\n", "format: 3\nmachine: tripod-cmm\nsomething_new: 5\n")
+        write_recording_files(tmp_path, "no table\n", "format: 4\nmachine: tripod-cmm\nsomething_new: 5\n")
     )
     assert "run.yaml:1 format: was written by a newer release" in problem
     assert "update compd" in problem
