@@ -49,6 +49,8 @@ class ReadingMotion(NamedTuple):
     window_s : how long before the reading the first one is that counts for `mean_mm_per_s`, s.
     due_s : so long after a reading, s, the next one is there at the latest, unless the gauge is silent.
     scatter_mm : standard deviation of one reading at rest, as the last ones show it, mm; nan before it is known.
+    rest_s : for so long, s, no reading has shown motion; of the last readings, so that it ends somewhere.
+    late_s : by how much later than the reading's time the device may have sampled, s.
     """
 
     speed_mm_per_s: float
@@ -59,6 +61,8 @@ class ReadingMotion(NamedTuple):
     window_s: float = 0.0
     due_s: float = 0.0
     scatter_mm: float = math.nan
+    rest_s: float = 0.0
+    late_s: float = 0.0
 
 
 class Reading(NamedTuple):

@@ -26,6 +26,7 @@ from compd.errors import KinematicsError
 from compd.live.acquisition.reading_trust import LEAST_MOTION
 from compd.live.acquisition.votes.measured_scatter import RATIO
 from compd.live.acquisition.way_evidence import LEAST_WAY_MM, WAY_SHARE
+from compd.live.loop.wired_readings import RESTED
 from compd.live.quantity_limits import UNIT_LIMITS
 from compd.machine_builder import build_model
 from compd.model.machine import MachineModel
@@ -399,10 +400,10 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
     ),
     BlindSpot(
         "departure_from_rest",
-        "the machine leaves from rest",
-        "the next reading of its scales",
+        "the machine leaves after a rest",
+        "the next reading of its scales; after a short rest, `u_tip_um` allows for it",
         "",
-        "until then the machine is taken to rest, and `u_tip_um` is that of rest",
+        f"a machine that has rested for {RESTED:g} times as long as its readings are old is taken to rest until then",
         _departure,
     ),
     BlindSpot(
@@ -427,7 +428,8 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
         "the readings of a length scatter more than its noise: hum, a bad contact, coarse digits",
         f"a warning, where the scatter at rest is over {RATIO:g} times `noise_um`, or less than 1 / {RATIO:g} of it",
         "",
-        "less than that; what comes in motion alone; hum that the polls alias to less than three periods a second",
+        "less than that; what comes in motion alone; hum that the polls alias to less than three periods a second; "
+        "coarser digits, while the machine stands",
         _scatter,
     ),
     BlindSpot(

@@ -75,6 +75,7 @@ NUMBERS: tuple[Case, ...] = (
         "scale 1",
         bound_um=3.0,
         sample=True,
+        unseen="stuck_scale",
         drives=True,
     ),
     Case(

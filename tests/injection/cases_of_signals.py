@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tests.injection.beginnings import on
+from tests.injection.beginnings import AWAY_MM, on
 from tests.injection.case import Case, Way
 from tests.injection.faults import Fault
 from tests.injection.signal_faults import Coarse, Hum, Noisy, Scaled, Steps
@@ -96,6 +96,7 @@ SIGNALS: tuple[Case, ...] = (
         "scale_1",
         Coarse(("position",), 0.01),
         watched_s=4.0,
+        unseen="scatter",
     ),
     _signal(
         "joints-coarse",
@@ -104,6 +105,7 @@ SIGNALS: tuple[Case, ...] = (
         "joints",
         Coarse(HEADS, 0.001),
         watched_s=4.0,
+        unseen="scatter",
     ),
     _signal(
         "scale-gain-drifts",
@@ -113,5 +115,16 @@ SIGNALS: tuple[Case, ...] = (
         Scaled(("position",), per_s=0.001),
         watched_s=4.0,
         unseen="drift_of_a_scale",
+    ),
+    Case(
+        "machine-departs",
+        SIGNAL,
+        "no fault: the machine leaves after a long rest",
+        "all links drive 7 mm",
+        lambda machine: machine.truth.drive(AWAY_MM),
+        Way.UNDISTURBED,
+        bound_um=math.inf,
+        unseen="departure_from_rest",
+        drives=True,
     ),
 )

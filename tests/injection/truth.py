@@ -85,6 +85,11 @@ class Truth:
         finally:
             self._places = None
 
+    def wait_for_motion(self) -> None:
+        """Until the machine has left its rest, and every gauge has been read since."""
+        until("the machine moves", lambda: self._seen[-1].moving)
+        self.rest_for(SETTLED_S)
+
     def rest_for(self, duration_s: float) -> None:
         """Let the machine stand for so long."""
         end_s = time.monotonic() + duration_s

@@ -33,7 +33,7 @@ from tests.support.paths import CONFIG
 
 GRID_S = 1e-3
 PERIOD_S = 0.01
-BEGIN_S, DEPARTS_S, END_S = 0.7, 1.5, 2.7  # of the run, and when the machine departs; it has arrived after 2.1 s
+BEGIN_S, DEPARTS_S, END_S = 0.7, 1.5, 4.6  # of the run, and when the machine departs; it has arrived after 2.1 s
 # Drives of the links, mm since machine zero: the tip goes at up to 140 mm/s.
 _NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)
 # Where the links drive, mm since machine zero: the tip goes at up to 130 mm/s.

@@ -171,7 +171,9 @@ def test_a_lost_scale_leaves_a_cmm_without_a_tip_and_other_lines_go_on(chain: Ch
     with connect(chain.directory / "compd.sock", PATIENCE_S) as observer:
         before = observer.status()
         chain.machine.ask("DRIVE", scale_mm=[3.0, 4.0, 5.0])  # at zero a person would be asked for
-        chain.until("at rest", lambda s: s["state"] == "ok" and not chain.machine.ask("TRUTH")["moving"])
+        chain.until("at rest", lambda _: not chain.machine.ask("TRUTH")["moving"])
+        rests_s = time.monotonic()
+        chain.until("all are read at rest", lambda s: s["state"] == "ok" and s["time_s"] - s["age_s"] > rests_s)
         chain.machine.ask("FAULT", line="scale_2", fault="unplugged")
         try:
             lost = chain.until("invalid", lambda s: not s["valid"])

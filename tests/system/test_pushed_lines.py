@@ -42,6 +42,7 @@ def with_scales(directory: Path, line: dict[str, Any], driver: str, address: dic
             "driver": driver,
             "line": "scales",
             "acceleration_mm_per_s2": 300,
+            "noise_um": 0.03,
             "channels": [{"name": "position", "unit": "mm", **placed}],
         }
     data["lines"]["scales"] = {"timeout_s": 2.0, "back_off_s": BACK_OFF_S, **line}

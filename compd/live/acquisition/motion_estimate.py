@@ -12,14 +12,16 @@ The slopes of the windows before, each as long, say more:
 - Where the slope falls from window to window, the part brakes: it is carried on to its standstill, and not beyond. One
   that becomes faster is carried on with the speed that it has, since it may stop to do so at any time.
 - What the slope has changed by from one window to the next, within a second, it may change by again: that is its
-  uncertainty.
+  uncertainty, with what the delays of the first and the last reading of the window make of it.
 
-It also says until when the next reading is due: a gauge that is silent for longer may have begun to move.
+It also says until when the next reading is due: a gauge that is silent for longer may have begun to move. `Rest` says
+for how long there was no motion: a part that has come to rest just now may leave again before anybody sees it.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
@@ -43,10 +45,14 @@ _CALM_ROUNDS = 2
 LONGEST_HORIZON_S = 0.15
 # A tolerance is six standard deviations of the difference between two readings.
 SIGMAS = 6.0
+# Width of a uniform distribution over its standard deviation (GUM, 4.3.7).
+_UNIFORM = math.sqrt(12.0)
 # Windows are as long as the last one but for the scatter of polls.
 _AS_LONG = 0.9
 # A recording has each of them as text: 1 pm/s and 1 us are less than anybody knows of them.
 _DECIMALS_MM, _DECIMALS_S = 9, 6
+# `Rest` keeps every fourth reading, and so looks back on 128 of them: some 2 s of a scale, 6 s of a slow line.
+_KEPT_EVERY, _KEPT = 4, 32
 UNKNOWN = ReadingMotion(0.0, 0.0, math.nan, 0.0)
 
 
@@ -75,7 +81,8 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
     if abs(history[last].value - history[start].value) <= tolerance_mm:
         return _rounded(0.0, 0.0, abs(now), horizon_s, 0.0, rounds[-1], due_s)
     changes = [abs(later - earlier) for later, earlier in pairwise(slopes)]
-    u = math.hypot(max(changes, default=abs(now)), tolerance_mm / SIGMAS / duration_s)
+    late_s = math.hypot(history[start].window_s, history[last].window_s) / _UNIFORM
+    u = math.hypot(max(changes, default=abs(now)), tolerance_mm / SIGMAS / duration_s, abs(now) * late_s / duration_s)
     if recent < math.inf:  # how fast it was before that says nothing any more
         u = min(u, max(recent, abs(now)))
     before = slopes[1] if len(slopes) > 1 else 0.0
@@ -157,3 +164,24 @@ def _rounded(
     speed, braking, u, mean = (round(value, _DECIMALS_MM) for value in (speed, braking, u, mean))
     horizon_s, window_s, due_s = (round(value, _DECIMALS_S) for value in (horizon_s, window_s, due_s))
     return ReadingMotion(speed, braking, u, horizon_s, mean, window_s, due_s)
+
+
+class Rest:
+    """For how long a length has stood."""
+
+    def __init__(self, tolerance_mm: float) -> None:
+        """`tolerance_mm`: by which two readings of the same value may differ."""
+        self._tolerance_mm = tolerance_mm
+        self._kept: deque[GaugeSample] = deque(maxlen=_KEPT)
+        self._count = 0
+
+    def note(self, sample: GaugeSample) -> float:
+        """A reading, in the order of time; since when it has been near, s. Slow drifts are no motion."""
+        kept = self._kept
+        while kept and abs(sample.value - kept[0].value) > self._tolerance_mm:
+            kept.popleft()
+        if not kept or self._count >= _KEPT_EVERY:
+            kept.append(sample)
+            self._count = 0
+        self._count += 1
+        return round(sample.time_s - kept[0].time_s, _DECIMALS_S)

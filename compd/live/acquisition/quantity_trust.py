@@ -2,7 +2,8 @@
 
 A quantity is plausible where it lies in its range, near its neighbours (the other quantities of the same unit), and
 where it has not changed faster than it can. What it can have become is followed from reading to reading: by no more
-than its fastest change. So a jump shows at once, a ramp that is too fast after a moment, and noise by its size.
+than its fastest change. So a jump shows at once, a ramp that is too fast after a moment, and noise by its size. That
+is published, and not the reading: scatter that the quantity itself cannot have does not reach the correction.
 
 Quantities move slowly beside lengths, so that there is time: an implausible reading is not published, and the last one
 stays as long as it is not stale. A quantity that was implausible for a second, less what it was plausible since, is
@@ -24,8 +25,10 @@ from compd.live.memory.trust_memory import Doubt, TrustMemory
 LASTING_S = 1.0
 # One reading counts as at most so much of it, s, however seldom the gauge is asked.
 _LONGEST_SHARE_S = LASTING_S / 5
-# Until neighbours have been read for the first time, s; what a neighbour showed longer ago than `_OLD_S` says nothing.
-_WAIT_FOR_NEIGHBOURS_S = 1.0
+# A quantity begins at the median of so many readings, or of those that come within this time, s: so that one of them
+# does not count for all that follow. So long its neighbours are waited for, too.
+_FEWEST_FIRST, _LONGEST_START_S = 5, 1.0
+# What a neighbour showed longer ago, s, says nothing.
 _OLD_S = 60.0
 _FEWEST_NEIGHBOURS = 2
 
@@ -67,6 +70,7 @@ class QuantityTrust:
         self._implausible_s = 0.0
         self._judged_s = math.nan
         self._begun_s = math.nan
+        self._first: list[Reading] = []  # the last ones since `_begun_s`
 
     def surprises(self, sample: GaugeSample) -> bool:
         """Whether a second answer is needed: a good reading is not plausible, or follows none."""
@@ -123,29 +127,52 @@ class QuantityTrust:
         self._expected, self._implausible_s = math.nan, 0.0
         if fault := self._fault(reading.value, reading.time_s):
             return self._distrusted(reading, fault)
-        return self._begin(reading, (reading, first))
+        return self._unconfirmed((reading, first)) or self._from(reading.value, reading)
 
     def _begin(self, reading: Reading, answers: tuple[Reading, ...]) -> Reading:
-        """The first reading: two answers agree, and the neighbours, if there are any, have been read."""
+        """The first readings: two answers agree, and the neighbours, if there are any, have been read."""
+        if unconfirmed := self._unconfirmed(answers):
+            return unconfirmed
+        if not self._first:
+            self._begun_s = min(answer.time_s for answer in answers)
+        self._first = [*self._first[1 - _FEWEST_FIRST :], reading]
+        passed_s = reading.time_s - self._begun_s
+        values = [each.value for each in self._first]
+        if math.isfinite(self._limits.fastest_per_s):
+            if len(values) < _FEWEST_FIRST and passed_s < _LONGEST_START_S:
+                return bad(reading.time_s, Quality.MISMATCH, "has been read too few times yet")
+            scatter, possible = max(values) - min(values), self._possible_change(reading.time_s, self._first[0].time_s)
+            if scatter > 2 * self._limits.tolerance + possible:
+                return bad(
+                    reading.time_s, Quality.MISMATCH, f"its first readings scatter by {scatter:.3g} {self._unit}"
+                )
+        unread = np.isnan(self._memory.shown[self._neighbours]).any() and math.isfinite(self._limits.apart)
+        if unread and passed_s < _LONGEST_START_S:
+            return bad(reading.time_s, Quality.MISMATCH, "its neighbours have not been read yet")
+        return self._from(float(np.median(values)), reading)
+
+    def _unconfirmed(self, answers: tuple[Reading, ...]) -> Reading | None:
+        """Why two answers, the last one first, do not confirm each other; None where they do."""
+        reading = answers[0]
         if len(answers) < 2:
             return bad(reading.time_s, Quality.MISMATCH, f"{reading.value:g} is not confirmed by a second answer")
         one, other = answers
         if abs(one.value - other.value) > self._limits.tolerance + self._possible_change(one.time_s, other.time_s):
             return bad(reading.time_s, Quality.MISMATCH, f"two answers disagree: {other.value:g}, {one.value:g}")
-        if math.isnan(self._begun_s):
-            self._begun_s = reading.time_s
-        unread = np.isnan(self._memory.shown[self._neighbours]).any() and math.isfinite(self._limits.apart)
-        if unread and reading.time_s - self._begun_s < _WAIT_FOR_NEIGHBOURS_S:
-            return bad(reading.time_s, Quality.MISMATCH, "its neighbours have not been read yet")
-        self._expected, self._expected_s = reading.value, reading.time_s
+        return None
+
+    def _from(self, value: float, reading: Reading) -> Reading:
+        """Follow the readings from this value on."""
+        self._first.clear()
+        self._expected, self._expected_s = value, reading.time_s
         return self._believed(reading)
 
     def _believed(self, reading: Reading) -> Reading:
         change = self._possible_change(reading.time_s, self._expected_s)
         self._expected = min(max(reading.value, self._expected - change), self._expected + change)
         self._expected_s = reading.time_s
-        self._memory.believe(self._i, reading.value, reading.time_s)
-        return reading
+        self._memory.believe(self._i, self._expected, reading.time_s)
+        return reading._replace(value=self._expected)
 
     def _distrusted(self, reading: Reading, fault: _Fault) -> Reading:
         self._implausible_s = 0.0

@@ -22,13 +22,14 @@ from compd.live.memory.readings import OK_NUMBER, SLOTS
 from compd.model.kernels.jit import COUNT, FLAG, INDICES, NUMBERS, SCALAR, helper, loop
 from compd.units import UM_PER_MM
 
-# A device samples up to so long after the request or the trigger has left, s; a reading has the earliest time possible.
-SAMPLED_LATER_S = 1e-3
 # Coverage factor for 95 % of a normal distribution (GUM, table G.1).
 COVERAGE = 1.96
 # Links move at speeds of one size, but near a singular pose: of two, one is up to so many times as fast as the other.
 LINK_SPEED_RATIO = 10.0
 
+# A machine that has rested for so many times as long as a reading is old has left since with 5 %: Laplace's rule of
+# succession, for a time of which nothing else is known.
+RESTED = 19.0
 # The next reading is due after so many rounds (`compd.live.acquisition.motion_estimate`).
 ROUNDS_UNTIL_DUE = 2.5
 
@@ -126,6 +127,19 @@ def _machine_speed(
 
 
 @helper
+def _unwatched(slots: NDArray[Any], wired: IntArray, scales: int, now_s: float) -> float:
+    """For how long (s) the machine may have been in motion, though its scales stand: since the oldest reading of those
+    that answer, where it has not rested for long before that."""
+    rested, unwatched = math.inf, 0.0
+    for i in range(scales):
+        slot = slots[wired[i]]
+        age_s = now_s - slot.time_s
+        if slot.quality == OK_NUMBER and age_s <= slot.due_s:
+            rested, unwatched = min(rested, slot.rest_s), max(unwatched, age_s)
+    return unwatched if rested < RESTED * unwatched else 0.0
+
+
+@helper
 def _age_bound(
     slot: Any,
     age_s: float,
@@ -134,6 +148,7 @@ def _age_bound(
     acceleration: float,
     tolerance_mm: float,
     machine_mm_per_s: float,
+    unwatched_s: float,
 ) -> float:
     """By how much a length (mm) may have left the place to which it is carried on; see `age_bounds_mm`."""
     if math.isnan(slot.u_mm_per_s):
@@ -148,7 +163,9 @@ def _age_bound(
     speed = _speed_bound(slot) + machine_mm_per_s
     if _shows_motion(slot, tolerance_mm):
         speed += _unseen_speed(slot, acceleration)
-    return float(min(by_limit, speed * age_s) + SAMPLED_LATER_S * abs(slot.speed_mm_per_s))
+    left_s = min(age_s, unwatched_s)
+    left_mm = 0.5 * acceleration * left_s * left_s if left_s > 0.0 else 0.0
+    return float(min(by_limit, speed * age_s + left_mm) + slot.late_s * _speed_bound(slot))
 
 
 @loop([SLOTS, INDICES, COUNT, SCALAR, FLAG, NUMBERS, NUMBERS, NUMBERS, SCALAR, NUMBERS])
@@ -169,8 +186,9 @@ def age_bounds_mm(
 
     Since its reading a length has changed its speed by no more than `acceleration` (k,) allows, in mm/s2, nor has it
     been faster than `fastest` (k,), mm/s. Nor has a scale been more than LINK_SPEED_RATIO times as fast as the fastest
-    scale, nor joints and frame faster than the links: while all scales that answer stand, all stands. So a machine at
-    rest is taken to rest until the next reading of its scales is due, and one whose scales are silent is not.
+    scale, nor joints and frame faster than the links: while all scales that answer stand, all stands. So a machine that
+    has rested for RESTED times as long is taken to rest until the next reading of its scales is due. One that has come
+    to rest just now may have left again, and one whose scales are silent is not taken to rest.
 
     nan where it is not known how a length moves, inf where nothing limits it; 0 for a reading without motion.
     extrapolate : whether readings are carried on, and not used as they were read.
@@ -178,13 +196,15 @@ def age_bounds_mm(
     largest_mm : of lengths that are no scales, none is further off.
     """
     machine = _machine_speed(slots, wired, scales, now_s, acceleration, tolerance_mm)
+    unwatched = _unwatched(slots, wired, scales, now_s)
     for i in range(len(wired)):
         slot = slots[wired[i]]
         if math.isnan(slot.horizon_s):
             bounds_mm[i] = 0.0
             continue
         links = LINK_SPEED_RATIO * machine if i < scales else machine
-        bound = _age_bound(slot, now_s - slot.time_s, extrapolate, fastest[i], acceleration[i], tolerance_mm[i], links)
+        age = now_s - slot.time_s
+        bound = _age_bound(slot, age, extrapolate, fastest[i], acceleration[i], tolerance_mm[i], links, unwatched)
         bounds_mm[i] = bound if i < scales or math.isnan(bound) else min(bound, largest_mm)
     return machine
 

@@ -2,12 +2,12 @@
 
 value      8 bytes, float64, in the channel's unit; nan where there is none
 time_s     8 bytes, float64, monotonic
-motion     64 bytes, eight float64, a `ReadingMotion`; nan where there is none
+motion     80 bytes, ten float64, a `ReadingMotion`; nan where there is none
 quality    1 byte, number of the Quality
 length     1 byte, of the detail
 (unused)   2 bytes
 checksum   4 bytes, CRC-32 of all that is before and after it in the slot
-detail     168 bytes, UTF-8
+detail     152 bytes, UTF-8
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from numpy.typing import NDArray
 from compd.gauge import Quality, Reading, ReadingMotion
 from compd.model.kernels.jit import INDICES, helper, loop
 
-_SLOT = struct.Struct("=10dBBxxI168s")
-_HEAD = struct.Struct("=10dBBxxI")
-_CHECKED = struct.Struct("=10dBBxx")
+_SLOT = struct.Struct("=12dBBxxI152s")
+_HEAD = struct.Struct("=12dBBxxI")
+_CHECKED = struct.Struct("=12dBBxx")
 _CHECKED_BYTES = _CHECKED.size
-_LENGTH_PLACE = 81
+_LENGTH_PLACE = 97
 _HEAD_BYTES = _HEAD.size
 SLOT_BYTES = _SLOT.size
 LONGEST_DETAIL = SLOT_BYTES - _HEAD_BYTES
-_NO_MOTION = (math.nan,) * 8
+_NO_MOTION = (math.nan,) * 10
 
 _QUALITIES = tuple(Quality)
 _NUMBERS = {quality: number for number, quality in enumerate(_QUALITIES)}
@@ -53,6 +53,8 @@ SLOT = np.dtype(
         ("window_s", np.float64),
         ("due_s", np.float64),
         ("scatter_mm", np.float64),
+        ("rest_s", np.float64),
+        ("late_s", np.float64),
         ("quality", np.uint8),
         ("length", np.uint8),
         ("unused", np.uint16),

@@ -1,5 +1,5 @@
-// What has moved the tip: one bar for each axis, stacked by cause, with the uncertainty as a whisker, and the shadow
-// model's sum as an outline.
+// What has moved the tip: one bar for each axis, stacked by cause, with the bound of the tip's error as a whisker where
+// it is no longer than the bar, and the shadow model's sum as an outline.
 import { keptScale, outline, stack, whisker } from "./bar.js";
 import { causeColour, element, isKnown, signed } from "./format.js";
 
@@ -24,10 +24,12 @@ export class Budget {
 
   show({ budget, shadow_budget, setpoint }) {
     const causes = budget ? Object.keys(budget) : [];
-    this.drawLegend(causes, setpoint);
     const vectors = causes.map((cause) => budget[cause]);
     const ends = [0, 1, 2].map((axis) => Math.max(vectors.reduce((sum, vector) => sum + Math.abs(vector[axis]), 0), Math.abs(shadow_budget?.[axis] ?? 0)));
     this.scale_um = keptScale(this.scale_um, Math.max(...ends));
+    const u_tip_um = setpoint.u_tip_um;
+    const bounded = isKnown(u_tip_um) && u_tip_um <= this.scale_um;
+    this.drawLegend(causes, bounded, setpoint);
     this.scale.textContent = vectors.length ? `bars end at ±${this.scale_um} µm` : "";
     this.rows.forEach(({ bar, number, shadow }, axis) => {
       shadow.textContent = vectors.length && shadow_budget ? `shadow ${signed(shadow_budget[axis])} µm` : "";
@@ -38,17 +40,17 @@ export class Budget {
       }
       const parts = vectors.map((vector) => vector[axis]);
       const sum = parts.reduce((a, b) => a + b, 0);
-      const u = setpoint.u_tip_um;
       stack(bar, parts, this.scale_um);
-      if (isKnown(u)) whisker(bar, sum, u, this.scale_um);
+      if (bounded) whisker(bar, sum, u_tip_um, this.scale_um);
       if (shadow_budget) outline(bar, shadow_budget[axis], this.scale_um);
-      number.textContent = `${signed(sum)}${isKnown(u) ? ` ± ${u.toFixed(1)}` : ""} µm`;
+      number.textContent = `${signed(sum)} µm`;
     });
   }
 
-  drawLegend(causes, { u_tip_um, shadow }) {
+  drawLegend(causes, bounded, setpoint) {
+    const { shadow } = setpoint;
     const why = shadow?.reason ?? "";
-    const key = [...causes, isKnown(u_tip_um), Boolean(shadow), why].join();
+    const key = [...causes, bounded, Boolean(shadow), why].join();
     if (key === this.key) return;
     this.key = key;
     const patch = (name, text, colour) => {
@@ -57,10 +59,8 @@ export class Budget {
       return element("span", {}, sample, text);
     };
     const entries = causes.map((cause, k) => patch("", cause.replaceAll("_", " "), causeColour(k)));
-    if (causes.length) {
-      entries.push(patch("sum", "sum"));
-      entries.push(isKnown(u_tip_um) ? patch("whisker", "bound of the tip's error, 95 %") : element("span", {}, "bound of the tip's error not known: see noise_um"));
-    }
+    if (causes.length) entries.push(patch("sum", "sum"));
+    if (bounded) entries.push(patch("whisker", "bound of the tip's error, 95 %"));
     if (shadow) entries.push(patch("shadow", why ? `shadow model, not applied: ${why}` : "shadow model, not applied"));
     this.legend.replaceChildren(...entries);
   }

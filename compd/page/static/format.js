@@ -9,7 +9,7 @@ export function signed(value, digits = 1) {
 // metre.
 export function tipText(tip_M_mm, u_tip_um) {
   const axes = ["x", "y", "z"].map((axis, k) => `${axis} ${signed(tip_M_mm[k], 4)}`.padStart(k ? 11 : 0, "\u2007"));
-  return `${axes.join("  ")} mm${isKnown(u_tip_um) ? `, within ${u_tip_um.toFixed(1)} µm` : ""}`;
+  return `${axes.join("  ")} mm${isKnown(u_tip_um) ? `, within ${u_tip_um.toFixed(u_tip_um < 100 ? 1 : 0)} µm` : ""}`;
 }
 
 // Whether a bound of the tip's error is told: it is null where it is not known, and absent in an invalid setpoint.

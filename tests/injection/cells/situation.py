@@ -42,6 +42,7 @@ class Situation(Enum):
         match self:
             case Situation.MOTION:
                 with machine.truth.shuttling(PLACES_MM):
+                    machine.truth.wait_for_motion()
                     yield
             case Situation.LOAD:
                 with machine.busy(BUSY_PROCESSES):

@@ -19,7 +19,7 @@ def text(tab, selector):
 def test_the_banner_has_state_tip_and_who_looks(tab, live):
     until(tab, "document.getElementById('state').textContent === 'OK'")
     assert text(tab, "#machine-name") == "tripod-cmm"
-    until(tab, r"/^x .\d.* mm$/.test(document.getElementById('tip').textContent)")
+    until(tab, r"/^x .\d.* mm, within [\d.]+ µm$/.test(document.getElementById('tip').textContent)")
     assert "oldest gauge" in text(tab, "#age")
     until(tab, "document.getElementById('connected').textContent.includes('looking')")
 

@@ -70,7 +70,7 @@ def test_a_lost_acquisition_is_a_lost_scale_and_comes_back(apart: Daemon, sent: 
         print(f"{sent.name}: ok from new readings after {again['time_s'] - sent_s:.2f} s")
         # how old a reading may be is among the rules for every setpoint
         between = watcher.seen[since : watcher.seen.index(again)]
-        assert {seen["state"] for seen in between} <= {State.OK, State.SLEWING, State.HOLD, State.STOP}
+        assert {seen["state"] for seen in between} <= {State.OK, State.SLEWING, State.HOLD, State.STOP, State.REFUSED}
     assert until("a new process", lambda: started_again(apart, "acquisition", before))["starts"] == before + 1
     assert {**apart.pids(), "acquisition": 0} == {**pids, "acquisition": 0}, "the others are the same"
 

@@ -85,7 +85,7 @@ def test_beyond_its_range_an_effect_stays_at_the_edge_and_says_so(tmp_path, name
         live.cabinet.shows[channel] = lambda time_s: 24.9 + 0.15 * (time_s - start_s)
     outside = live.run(8.0)[-1]
     assert outside.state is State.CLAMPED
-    assert "effects stay at the edge of their range: temperature_link_1_degC is 26.1" in outside.reason
+    assert "effects stay at the edge of their range: temperature_link_1_degC is 26" in outside.reason
     assert "fitted from 19 to 25" in outside.reason
     # 0.1 K to the edge, of 600 mm at most: not 1.2 K
     asked_um = np.abs(outside.values.correction_mm - inside.values.correction_mm).max() * 1e3

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.gauge import Quality, Reading, bad, good
-from compd.live.acquisition.motion_estimate import estimated_motion
+from compd.live.acquisition.motion_estimate import Rest, estimated_motion
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.loop.wiring import Wire, Wires
 from compd.live.memory.latest import Snapshot
@@ -129,23 +129,53 @@ def test_readings_at_the_same_time_have_no_speed():
 
 
 def test_the_bound_is_what_a_limited_acceleration_allows():
-    shown = motion([50.0 * ROUND_S * k for k in range(12)])
+    shown = motion([50.0 * ROUND_S * k for k in range(12)])._replace(late_s=1e-3)
+    late_mm = 1e-3 * (50.0 + 1.96 * shown.u_mm_per_s)
     reading = Reading(1.0, 10.0, Quality.OK, "", shown)
     for age_s in (0.02, 0.05, 0.08, 0.4):
         not_carried_mm = 50.0 * max(age_s - shown.horizon_s, 0.0)
         by_limit_mm = 0.5 * A_MM_PER_S2 * age_s * (age_s + ROUND_S)
-        assert age_bound_mm(reading, 10.0 + age_s) == pytest.approx(by_limit_mm + not_carried_mm + 0.05, rel=1e-6)
+        assert age_bound_mm(reading, 10.0 + age_s) == pytest.approx(by_limit_mm + not_carried_mm + late_mm, rel=1e-6)
     assert age_bound_mm(reading, 10.05, extrapolate=False) == pytest.approx(
-        0.05 * 50.0 + 0.5 * A_MM_PER_S2 * 0.05 * (0.05 + ROUND_S) + 0.05, rel=1e-6
+        0.05 * 50.0 + 0.5 * A_MM_PER_S2 * 0.05 * (0.05 + ROUND_S) + late_mm, rel=1e-6
     )
 
 
 def test_a_length_at_rest_is_taken_to_rest_until_its_next_reading_is_due():
     rng = np.random.default_rng(4)
-    reading = Reading(1.0, 10.0, Quality.OK, "", motion(rng.normal(0.0, 1e-5, 30).tolist()))
+    rested_s = 20 * 2 * ROUND_S
+    reading = Reading(1.0, 10.0, Quality.OK, "", motion(rng.normal(0.0, 1e-5, 30).tolist())._replace(rest_s=rested_s))
     assert age_bound_mm(reading, 10.0 + 2 * ROUND_S) < 1e-4
     silent_s = 3 * ROUND_S
     assert age_bound_mm(reading, 10.0 + silent_s) >= 0.5 * A_MM_PER_S2 * silent_s**2
+
+
+def test_a_length_that_has_just_come_to_rest_may_have_left_again():
+    shown = motion([0.0] * 12)
+    age_s = ROUND_S / 2
+    for rest_s, departs in ((15 * age_s, True), (20 * age_s, False)):
+        reading = Reading(1.0, 10.0, Quality.OK, "", shown._replace(rest_s=rest_s))
+        assert (age_bound_mm(reading, 10.0 + age_s) > 0.49 * A_MM_PER_S2 * age_s**2) == departs
+
+
+def test_a_late_sample_makes_the_speed_uncertain_and_the_place():
+    """The first and the last reading of a window, each late by up to 10 ms: uniformly distributed delays."""
+    rng, at_s = np.random.default_rng(6), np.arange(2) * ROUND_S
+    shown = estimated_motion([GaugeSample(50.0 * t, t, 0.01) for t in ROUND_S * np.arange(12)], TOLERANCE_MM)
+    late_s = rng.uniform(0.0, 0.01, (4000, 2))
+    speeds = 50.0 * np.diff(at_s + late_s, axis=1)[:, 0] / ROUND_S
+    assert shown.u_mm_per_s == pytest.approx(speeds.std(), rel=0.05)
+
+
+def test_a_rest_begins_with_the_last_motion_and_a_drift_is_none():
+    rest = Rest(TOLERANCE_MM)
+    moved = [rest.note(GaugeSample(0.01 * k, ROUND_S * k, 1e-3)) for k in range(10)]
+    assert moved == [0.0] * 10
+    stood = [rest.note(GaugeSample(0.09 + 1e-6 * k, ROUND_S * (10 + k), 1e-3)) for k in range(60)]
+    assert stood[49] == pytest.approx(50 * ROUND_S, abs=4 * ROUND_S)
+    drifts = [rest.note(GaugeSample(0.0901 + 2e-5 * k, ROUND_S * (70 + k), 1e-3)) for k in range(200)]
+    assert min(drifts) > 40 * ROUND_S
+    assert rest.note(GaugeSample(0.2, ROUND_S * 271, 1e-3)) == 0.0
 
 
 def test_without_a_limit_of_its_motion_a_silent_gauge_may_be_anywhere():
@@ -162,7 +192,8 @@ def test_a_silent_scale_stands_while_all_others_stand_and_moves_with_them():
             for k in (1, 2)
         ]
     )
-    standing, driven = motion([0.0] * 12), motion([50.0 * ROUND_S * k for k in range(12)])
+    standing = motion([0.0] * 12)._replace(rest_s=1.0)
+    driven = motion([50.0 * ROUND_S * k for k in range(12)])
     silent = Reading(1.0, 10.0, Quality.OK, "", standing)
     for other, lowest_mm, highest_mm in ((standing, 0.0, 1e-6), (driven, 6.0, 8.0)):
         readings = Readings.of([silent, Reading(1.0, 10.18, Quality.OK, "", other)])

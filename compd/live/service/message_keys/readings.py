@@ -28,6 +28,12 @@ class MotionKeys(Keys):
         default=None,
         description="standard deviation of one reading at rest, as the last ones show it; absent while it is not known",
     )
+    rest_s: float | None = Field(
+        default=None, description="for so long no reading has shown motion, s, up to some seconds"
+    )
+    late_s: float | None = Field(
+        default=None, description="by how much later than the reading's time the device may have sampled, s"
+    )
 
 
 class ReadingKeys(Keys):
