@@ -21,10 +21,9 @@ from compd.compensation.compensation import compensate_cmm, compensate_machine_t
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
-from compd.configuration.stated_noise import tolerance_mm
+from compd.configuration.stated_noise import SCATTER_RATIO, tolerance_mm
 from compd.errors import KinematicsError
 from compd.live.acquisition.reading_trust import LEAST_MOTION
-from compd.live.acquisition.votes.measured_scatter import RATIO
 from compd.live.acquisition.way_evidence import LEAST_WAY_MM, WAY_SHARE
 from compd.live.loop.wired_readings import RESTED
 from compd.live.quantity_limits import UNIT_LIMITS
@@ -210,21 +209,24 @@ def _late(figures: Figures) -> str:
 
 
 def _departure(figures: Figures) -> str:
+    """Until the next reading has come, which is asked for one poll after the last one, all links may have left."""
     gauges = figures.configuration.gauges
-    ways = [
-        (0.5 * acceleration * jump.quiet.poll_s**2, jump)
-        for jump in figures.jumps
-        if any(length.startswith("scale") for length in jump.measures) and math.isfinite(jump.quiet.poll_s)
-        if (acceleration := gauges[jump.gauge].acceleration_mm_per_s2) is not None
+    rounds_s = {budget.name: budget.usual_s for budget in figures.budgets if budget.known}
+    scales = [
+        j for j in figures.jumps if any(x.startswith("scale") for x in j.measures) and math.isfinite(j.quiet.poll_s)
     ]
+    ways = []
+    for gauge, poll_s in ((jump.gauge, jump.quiet.poll_s) for jump in scales):
+        acceleration = gauges[gauge].acceleration_mm_per_s2
+        if acceleration is None:
+            return f"no `acceleration_mm_per_s2` of {gauge}, so that nothing limits it"
+        unseen_s = poll_s + rounds_s.get(gauges[gauge].line, 0.0)
+        ways.append((0.5 * acceleration * unseen_s**2 * UM_PER_MM, unseen_s, gauge))
     if not ways:
-        return "no `acceleration_mm_per_s2` of a scale, so that nothing limits it"
-    way_mm, jump = max(ways, key=lambda way: way[0])
-    factor = figures.leverage("scale")
-    return (
-        f"{jump.gauge}, in {jump.quiet.poll_s * 1e3:.3g} ms at {gauges[jump.gauge].acceleration_mm_per_s2:g} mm/s2: "
-        f"{way_mm * UM_PER_MM:.3g} um, {way_mm * UM_PER_MM * factor:.3g} um at the tip"
-    )
+        return ""
+    way_um, unseen_s, gauge = max(ways)
+    tip_um = way_um / DRIFT_UM * sum(d.cmm_um for d in figures.drifts if d.length.startswith("scale"))
+    return f"{gauge} in {unseen_s * 1e3:.3g} ms: {way_um:.3g} um; all links at once: up to {tip_um:.3g} um at the tip"
 
 
 def _small_jump(figures: Figures) -> str:
@@ -259,8 +261,8 @@ def _scatter(figures: Figures) -> str:
     kinds = {d.gauge: d.length.partition(" ")[0] for d in figures.drifts}
     declared = {gauge: noise_um for gauge in kinds if (noise_um := gauges[gauge].noise_um) is not None}
     parts = [
-        f"{gauge}: {RATIO * noise_um:.3g} um, {RATIO * noise_um * figures.leverage(kinds[gauge]):.3g} um at the tip"
-        for gauge, noise_um in declared.items()
+        f"{gauge}: {most_um:.3g} um, {most_um * figures.leverage(kinds[gauge]):.3g} um at the tip"
+        for gauge, most_um in ((gauge, SCATTER_RATIO * noise_um) for gauge, noise_um in declared.items())
     ]
     silent = [gauge for gauge in kinds if gauge not in declared]
     if silent:
@@ -426,7 +428,8 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
     BlindSpot(
         "scatter",
         "the readings of a length scatter more than its noise: hum, a bad contact, coarse digits",
-        f"a warning, where the scatter at rest is over {RATIO:g} times `noise_um`, or less than 1 / {RATIO:g} of it",
+        f"a warning, where the scatter at rest is over {SCATTER_RATIO:g} times `noise_um`, or less than "
+        f"1 / {SCATTER_RATIO:g} of it",
         "",
         "less than that; what comes in motion alone; hum that the polls alias to less than three periods a second; "
         "coarser digits, while the machine stands",

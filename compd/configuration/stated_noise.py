@@ -19,6 +19,9 @@ class StatedNoise(NamedTuple):
 UNREST_MM = 0.001
 # Two readings of the same value differ by less than this many standard deviations of one: 6 sigma of a difference.
 SAME_VALUE_SIGMAS = 6 * math.sqrt(2)
+# A scatter that differs from the stated noise by this factor either way is another one. A last digit that goes to and
+# fro makes 1.7 times what it makes on average.
+SCATTER_RATIO = 2.0
 
 
 def tolerance_mm(noise_um: float | None) -> float:

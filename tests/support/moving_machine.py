@@ -16,7 +16,7 @@ import numpy as np
 from compd.configuration import Configuration, load
 from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Quality, Reading, bad, good
-from compd.live.acquisition.motion_estimate import estimated_motion
+from compd.live.acquisition.motion_estimate import MotionEstimate
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
@@ -158,7 +158,9 @@ class _Lines:
         channels = dict(zip(self._names, pipeline.wires.length_channels, strict=True))
         self._slots = {name: pipeline.latest.index[channel] for name, channel in channels.items()}
         noise_um = {name: configuration.noise_of(channel).um for name, channel in channels.items()}
-        self._tolerance_mm = {name: tolerance_mm(um if np.isfinite(um) else None) for name, um in noise_um.items()}
+        self._motions = {
+            name: MotionEstimate(tolerance_mm(um if np.isfinite(um) else None)) for name, um in noise_um.items()
+        }
         self._histories = {name: deque[GaugeSample](maxlen=32) for name in self._names}
         self.readings: list[Reading] = [bad(0.0, Quality.NEVER_READ)] * len(pipeline.latest.channels)
         self.zero_mm = {
@@ -208,7 +210,7 @@ class _Lines:
         for name, value in zip(line.names, values, strict=True):
             history = self._histories[name]
             history.append(GaugeSample(value, stamp_s, WINDOW_S))
-            motion = estimated_motion(history, self._tolerance_mm[name])
+            motion = self._motions[name].note(history)
             self.readings[self._slots[name]] = good(value, stamp_s)._replace(motion=motion)
 
 

@@ -14,8 +14,8 @@ The slopes of the windows before, each as long, say more:
 - What the slope has changed by from one window to the next, within a second, it may change by again: that is its
   uncertainty, with what the delays of the first and the last reading of the window make of it.
 
-It also says until when the next reading is due: a gauge that is silent for longer may have begun to move. `Rest` says
-for how long there was no motion: a part that has come to rest just now may leave again before anybody sees it.
+It also says until when the next reading is due: a gauge that is silent for longer may have begun to move. And for how
+long there was no motion: a part that has come to rest just now may leave again before anybody sees it.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _UNIFORM = math.sqrt(12.0)
 _AS_LONG = 0.9
 # A recording has each of them as text: 1 pm/s and 1 us are less than anybody knows of them.
 _DECIMALS_MM, _DECIMALS_S = 9, 6
-# `Rest` keeps every fourth reading, and so looks back on 128 of them: some 2 s of a scale, 6 s of a slow line.
+# To see a rest every fourth reading is kept, which looks back on 128 of them: some 2 s of a scale, 6 s of a slow line.
 _KEPT_EVERY, _KEPT = 4, 32
 UNKNOWN = ReadingMotion(0.0, 0.0, math.nan, 0.0)
 
@@ -166,8 +166,8 @@ def _rounded(
     return ReadingMotion(speed, braking, u, horizon_s, mean, window_s, due_s)
 
 
-class Rest:
-    """For how long a length has stood."""
+class MotionEstimate:
+    """The motion of one length: how it goes on, for how long it has stood, and how late its last sample may be."""
 
     def __init__(self, tolerance_mm: float) -> None:
         """`tolerance_mm`: by which two readings of the same value may differ."""
@@ -175,8 +175,14 @@ class Rest:
         self._kept: deque[GaugeSample] = deque(maxlen=_KEPT)
         self._count = 0
 
-    def note(self, sample: GaugeSample) -> float:
-        """A reading, in the order of time; since when it has been near, s. Slow drifts are no motion."""
+    def note(self, history: Sequence[GaugeSample]) -> ReadingMotion:
+        """The motion at the last of these readings, of which the others have been noted before."""
+        sample = history[-1]
+        motion = estimated_motion(history, self._tolerance_mm)
+        return motion._replace(rest_s=self._rest_s(sample), late_s=round(sample.window_s, _DECIMALS_S))
+
+    def _rest_s(self, sample: GaugeSample) -> float:
+        """Since when readings have been near this one, s. Slow drifts are no motion."""
         kept = self._kept
         while kept and abs(sample.value - kept[0].value) > self._tolerance_mm:
             kept.popleft()

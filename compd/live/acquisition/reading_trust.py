@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from compd.gauge import Quality, Reading, bad
-from compd.live.acquisition.motion_estimate import Rest, estimated_motion
+from compd.live.acquisition.motion_estimate import MotionEstimate
 from compd.live.acquisition.possible_motion import (
     BASE_S,
     WINDOW_S,
@@ -86,7 +86,7 @@ class ReadingTrust:
         self._missed = False  # whether a poll has failed since its last reading
         self._after: list[GaugeSample] = []  # what it shows since a gap, and waits for evidence
         self._scatter = Scatter(self._tolerance_mm)
-        self._rest = Rest(self._tolerance_mm)
+        self._motion = MotionEstimate(self._tolerance_mm)
         period_mm = settings.signal_period_mm
         least_mm = LEAST_PERIODS * period_mm - self._tolerance_mm
         self._steps = None if math.isnan(period_mm) else Steps(least_mm, self._tolerance_mm)
@@ -174,12 +174,10 @@ class ReadingTrust:
         self._after.clear()
         self._remember(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
-        rest_s = self._rest.note(sample)
+        motion = self._motion.note(self._history)
         if self._memory.suspected[self._i]:
             return bad(reading.time_s, Quality.STALE, "stands while all others move")
-        motion = estimated_motion(self._history, self._tolerance_mm)
-        late_s = round(sample.window_s, 6)
-        return reading._replace(motion=motion._replace(scatter_mm=self._scatter.mm, rest_s=rest_s, late_s=late_s))
+        return reading._replace(motion=motion._replace(scatter_mm=self._scatter.mm))
 
     def _remember(self, sample: GaugeSample) -> None:
         """Keep a sample of motion, and count the step that it completes."""

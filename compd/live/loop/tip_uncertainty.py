@@ -12,6 +12,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation.values import GaugeValues
 from compd.configuration import Configuration
+from compd.configuration.stated_noise import SCATTER_RATIO
 from compd.live.loop.wiring import Beyond, MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.model.effect_memory import EffectMemory
@@ -42,7 +43,7 @@ def stated_noise(configuration: Configuration, wires: MachineWires, readings: in
 def noise_now(
     noise: GaugeNoise | None, wires: MachineWires, snapshot: Snapshot, beyond: Beyond | None
 ) -> GaugeNoise | None:
-    """The stated noise; of a length that scatters more at rest, its scatter, now and at machine zero.
+    """The stated noise; of a length that scatters by far more at rest, its scatter, now and at machine zero.
 
     beyond : quantities that are taken as the end of the range of the fit: by as much they are off.
     """
@@ -50,6 +51,7 @@ def noise_now(
         return None
     stated_mm = np.concatenate([noise.scale_mm, noise.joint_mm, noise.frame_mm])
     scatter_mm = wires.lengths.scatter_mm(snapshot) * math.sqrt(_READINGS)
+    scatter_mm[~(scatter_mm > SCATTER_RATIO * stated_mm)] = math.nan
     quantities = noise.quantities
     if beyond is not None:
         quantities = {name: math.hypot(sigma, beyond.by.get(name, 0.0)) for name, sigma in quantities.items()}

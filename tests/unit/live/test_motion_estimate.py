@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.gauge import Quality, Reading, bad, good
-from compd.live.acquisition.motion_estimate import Rest, estimated_motion
+from compd.live.acquisition.motion_estimate import MotionEstimate, estimated_motion
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.loop.wiring import Wire, Wires
 from compd.live.memory.latest import Snapshot
@@ -168,14 +168,18 @@ def test_a_late_sample_makes_the_speed_uncertain_and_the_place():
 
 
 def test_a_rest_begins_with_the_last_motion_and_a_drift_is_none():
-    rest = Rest(TOLERANCE_MM)
-    moved = [rest.note(GaugeSample(0.01 * k, ROUND_S * k, 1e-3)) for k in range(10)]
-    assert moved == [0.0] * 10
-    stood = [rest.note(GaugeSample(0.09 + 1e-6 * k, ROUND_S * (10 + k), 1e-3)) for k in range(60)]
-    assert stood[49] == pytest.approx(50 * ROUND_S, abs=4 * ROUND_S)
-    drifts = [rest.note(GaugeSample(0.0901 + 2e-5 * k, ROUND_S * (70 + k), 1e-3)) for k in range(200)]
-    assert min(drifts) > 40 * ROUND_S
-    assert rest.note(GaugeSample(0.2, ROUND_S * 271, 1e-3)) == 0.0
+    estimate, history = MotionEstimate(TOLERANCE_MM), []
+
+    def rests_s(values):
+        for value in values:
+            history.append(GaugeSample(value, ROUND_S * len(history), 1e-3))
+            yield estimate.note(history[-32:]).rest_s
+
+    assert list(rests_s(0.01 * np.arange(10))) == [0.0] * 10
+    stood_s = list(rests_s(0.09 + 1e-6 * np.arange(60)))
+    assert stood_s[49] == pytest.approx(50 * ROUND_S, abs=4 * ROUND_S)
+    assert min(rests_s(0.0901 + 2e-5 * np.arange(200))) > 40 * ROUND_S
+    assert list(rests_s([0.2])) == [0.0]
 
 
 def test_without_a_limit_of_its_motion_a_silent_gauge_may_be_anywhere():

@@ -19,7 +19,7 @@ UNSEEN_S = 0.05
 KNOWN_S = 0.9  # from here on every gauge has been read often enough
 ARRIVED_S = 2.3
 # After an arrival the bound allows for another departure for so long.
-RESTS_S = 2.0
+RESTS_S = 1.5
 FAULTS = {
     "stalls for 0.2 s": Fault(stalled=(1.7, 1.9)),
     "stalls for 0.4 s": Fault(stalled=(1.6, 2.0)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from compd.compensation.compensation import compensate_cmm
 from compd.compensation.values import GaugeValues, WarmStart
 from compd.configuration import load
+from compd.gauge import ReadingMotion
 from compd.live.loop.model_loader import Models
 from compd.live.loop.states import State
 from compd.live.loop.tip_uncertainty import radius_95
@@ -43,6 +45,30 @@ def test_without_stated_noise_the_bound_is_null_and_with_a_limit_refused_by_name
     assert (refused.valid, refused.state) == (False, State.REFUSED)
     assert "nobody states how much scale_1, scale_2, scale_3 and" in refused.reason
     assert "`noise_um`" in refused.reason
+
+
+@BOTH
+def test_a_length_that_scatters_by_far_more_than_is_stated_counts_as_it_scatters(name):
+    stated, scatters = machine(name), machine(name)
+    wanted = with_noise(machine(name), 0.3)  # all scales, joints and frame, ten times as much
+    put = scatters.latest.put
+    shown_mm = dict.fromkeys(scatters.wires.length_channels, 0.3e-3)
+
+    def with_scatter(slot, reading):
+        still = ReadingMotion(0.0, 0.0, 0.0, 0.1, due_s=1.0, rest_s=10.0, scatter_mm=math.nan)
+        channel = next(name for name, number in scatters.latest.index.items() if number == slot)
+        if reading.ok and channel in shown_mm:
+            reading = reading._replace(motion=still._replace(scatter_mm=shown_mm[channel]))
+        put(slot, reading)
+
+    scatters.latest.put = with_scatter
+    assert told(scatters.settle()) == pytest.approx(told(wanted.settle()), rel=1e-3)
+    shown_mm = {
+        channel: 1.5 * wire.noise.um * 1e-3 for channel, wire in zip(shown_mm, scatters.wires.length_wires, strict=True)
+    }
+    for _ in range(300):  # until the noise is looked at again
+        setpoint = scatters.step()
+    assert told(setpoint) == pytest.approx(told(stated.settle()), rel=1e-3)
 
 
 def test_noise_moves_no_machine_zero():

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from compd.configuration.stated_noise import SCATTER_RATIO
 from compd.live.acquisition.votes.machine_view import MachineView, Remark
 from compd.units import UM_PER_MM
 
-# The measured scatter is outside of what is declared by this factor either way.
-RATIO = 2.0
-# It goes away inside of this one, so that it does not come and go.
+# The warning of SCATTER_RATIO goes away inside of this one, so that it does not come and go.
 _NEAR = 1.8
 
 
@@ -31,7 +30,7 @@ class MeasuredScatter:
             if not math.isfinite(scatter_um) or not math.isfinite(declared_um):
                 self._outside.discard(i)
                 continue
-            ratio = _NEAR if i in self._outside else RATIO
+            ratio = _NEAR if i in self._outside else SCATTER_RATIO
             step_um = float(view.memory.step_mm[i]) * UM_PER_MM
             # the standard deviation of what lies anywhere between two digits is 0.29 of their distance
             at_most_um = math.hypot(scatter_um, step_um / math.sqrt(12))
