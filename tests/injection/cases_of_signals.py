@@ -31,7 +31,7 @@ SIGNALS: tuple[Case, ...] = (
         "scale 1 + 20 um from now on",
         "scale_1",
         Steps(("position",), PERIOD_MM, every_s=0.3, count=1),
-        unseen="small_jump",
+        unseen="lost_signal_periods",
     ),
     _signal(
         "scale-loses-periods",
@@ -40,6 +40,7 @@ SIGNALS: tuple[Case, ...] = (
         "scale_1",
         Steps(("position",), PERIOD_MM, every_s=0.3, count=10),
         watched_s=4.0,
+        unseen="lost_signal_periods",
     ),
     _signal(
         "scale-noisy",

@@ -23,7 +23,7 @@ FEWEST = 32
 WINDOW_S = 1.0
 # Windows of which the median counts, and how many of them there must be.
 _WINDOWS = 5
-_FEWEST_WINDOWS = 3
+_FEWEST_WINDOWS = 2
 # How often readings go from one side of the line to the other, each time by half a standard deviation beyond it: three
 # periods. The residual of a move with one reversal has three or four such changes, that of noise 0.3 for each reading.
 _FEWEST_CHANGES = 6

@@ -158,12 +158,16 @@ def _compute(
         state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
         return _Outcome(State.REFUSED, refusal), state
 
-    u_tip = _uncertainty(tick, state, settings) or tip_uncertainty(
-        machine,
-        noise_now(settings.noise, wires, snapshot, usable.beyond),
-        values,
-        compensation.scale_setpoint_mm,
-        warm_start.effects,
+    u_tip = _uncertainty(tick, state, settings) or _not_below_held(
+        tip_uncertainty(
+            machine,
+            noise_now(settings.noise, wires, snapshot, usable.beyond),
+            values,
+            compensation.scale_setpoint_mm,
+            warm_start.effects,
+        ),
+        state.tip_noise_um,
+        usable,
     )
     shadow, shadow_memory = None, state.shadow_memory
     if models.shadow is not None:
@@ -258,6 +262,13 @@ def _uncertainty(tick: int, state: CycleState, settings: CycleSettings) -> TipUn
     if state.tip_noise_um is None or state.tip_by_gauge is None or tick % settings.uncertainty_every == 0:
         return None
     return TipUncertainty(state.tip_noise_um, state.tip_by_gauge)
+
+
+def _not_below_held(u_tip: TipUncertainty, former_um: FloatArray | None, usable: UsableComparators) -> TipUncertainty:
+    """Of comparators that are held nobody measures the scatter: what they had when they were read stays."""
+    if usable.held_s is None or u_tip.by_noise_um is None or former_um is None:
+        return u_tip
+    return u_tip if u_tip.by_noise_um[-1] >= former_um[-1] else u_tip._replace(by_noise_um=former_um)
 
 
 def _tip_correction(
