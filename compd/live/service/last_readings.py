@@ -2,6 +2,7 @@
 
 When the daemon starts, a gauge must show what it showed last, as after any loss of its line, and at the same port; one
 that was not believed is not believed. Where the computer was started anew, the gauges may have been without power.
+A temperature goes on from what it was, by no more than it can have changed meanwhile.
 """
 
 from __future__ import annotations
@@ -105,6 +106,10 @@ class LastReadings:
         for i, last in known.items():
             if last.doubt > Doubt.LOST:
                 memory.distrust(i, Doubt(min(last.doubt, max(Doubt))), math.nan if last.amount is None else last.amount)
+            elif i >= memory.lengths and file.boot_id == boot_id():
+                memory.believe(
+                    i, values[memory.channels[i]], file.time_s
+                )  # since then it changes no faster than it can
             else:
                 memory.lose(i, now_s, power=last.power_lost or file.boot_id != boot_id())
         memory.tell({memory.channels[i]: last.evidence for i, last in known.items() if last.evidence})
@@ -144,6 +149,7 @@ class LastReadings:
     def _run(self) -> None:
         while not self._clock.wait(self._stop, _LOOK_EVERY_S):
             self._write_if_changed()
+        self._written = None  # at the end in any case: its time says for how long the daemon was away
         self._write_if_changed()
 
     def _write_if_changed(self) -> None:

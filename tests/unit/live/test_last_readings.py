@@ -8,9 +8,11 @@ import threading
 
 import pytest
 
+from compd.gauge import good
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 from compd.live.service import last_readings
 from compd.live.service.last_readings import FILE_NAME, LastReadings
+from tests.unit.live.test_quantity_trust import judged
 
 CHANNELS = ("scale_1.position", "joints.1", "joints.2")
 HASH = "0123456789abcdef"
@@ -168,3 +170,23 @@ def test_a_file_that_was_changed_is_damaged_and_one_without_a_checksum_is_warned
     path.write_text(json.dumps(content))
     assert recalled(tmp_path).value[0] == 12.5
     assert "have no checksum" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("away_s", "shows_degC", "believed"), [(2.0, 20.3, True), (2.0, 28.0, False), (60.0, 28.0, True)]
+)
+def test_after_a_restart_a_temperature_has_changed_by_no_more_than_it_can(tmp_path, away_s, shows_degC, believed):
+    judge, memory = judged("temperature_hall_degC")
+    for k in range(10):
+        judge.judge(good(20.0, 1000.0 + 0.1 * k), 0.0, good(20.0, 1000.0 + 0.1 * k))
+    stops = LastReadings(tmp_path, "hash", memory, Clock(now_s=1001.0))
+    stops.start()
+    stops.stop()
+    judge, memory = judged("temperature_hall_degC")
+    now_s = 1001.0 + away_s
+    LastReadings(tmp_path, "hash", memory, Clock(now_s=now_s)).recall()
+    answers = [good(shows_degC, now_s + 0.03 * k) for k in range(50)]
+    readings = [judge.judge(reading, 0.0, reading) for reading in answers]
+    assert readings[0].ok is readings[-1].ok is believed
+    if not believed:
+        assert "jumped by +8" in readings[-1].detail or "jumped by 8" in readings[-1].detail
