@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from tests.injection.case import Case
 from tests.injection.cases_of_numbers import STUCK
+from tests.injection.cases_of_thermometers import THERMOMETER
 from tests.injection.cells.situation import Situation
 from tests.injection.matrix import FAULTS
 
@@ -33,10 +34,13 @@ class Cell:
     def unseen(self) -> bool:
         """Whether nothing shows one of its faults, or not at once.
 
-        Nor is it seen where one fault repeats what another has made wrong before the daemon has read anything else.
+        Where the daemon was away, a temperature may have become another one; and a fault that repeats what another has
+        made wrong repeats it before the daemon has read anything else.
         """
-        repeated = self.situation is Situation.RESTART and len(self.cases) > 1
-        return any(case.unseen or (repeated and case.group == STUCK) for case in self.cases)
+        if any(case.unseen for case in self.cases):
+            return True
+        groups = {case.group for case in self.cases} if self.situation is Situation.RESTART else set()
+        return THERMOMETER in groups or (STUCK in groups and len(self.cases) > 1)
 
     @property
     def expands(self) -> bool:
