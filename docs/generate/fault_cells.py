@@ -45,7 +45,7 @@ def figures(result: Result) -> str:
     situation = Situation[result["situation"].upper()].value
     if result["worst_um"] is None:
         return f"{situation}: none valid"
-    return f"{situation}: {number(result['worst_um'], 'um', 2)} of {number(result['worst_bound_um'], 'um', 2)}"
+    return f"{situation}: {_um(result['worst_um'])} of {_um(result['worst_bound_um'])}"
 
 
 def introduction(document: Document) -> str:
@@ -80,6 +80,10 @@ def overview(document: Document) -> str:
         "valid setpoint was within its bound." + (" The others:" if rows else ""),
         table(["faults", "error of bound", "beyond", "setpoints"], rows) if rows else "",
     )
+
+
+def _um(value: float | None) -> str:
+    return number(value, "um", 2 if value is None or value < 10.0 else 0)
 
 
 def number(value: float | None, unit: str, decimals: int) -> str:
