@@ -80,7 +80,7 @@ def _spot(case: Case) -> str:
 
 
 def _worst_um(case: Case, document: Document) -> float | None:
-    """Of all situations but motion, where most of the error is by the readings' age; of a fault that drives, of that."""
+    """Of all situations but motion, where most of the error is by the readings' age; if it drives, of that."""
     tried = [r for r in results_of(document, case) if case.drives or r["situation"] != Situation.MOTION.name.lower()]
     found = [result["worst_um"] for result in [_outcome(case, document), *tried]]
     return max((um for um in found if um is not None), default=None)
