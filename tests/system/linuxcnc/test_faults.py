@@ -88,8 +88,15 @@ def test_a_daemon_that_is_killed(moving: CorrectedLinuxCnc) -> None:
     print(f"daemon killed: inhibited after {stands_inhibited(moving, fault_s):.3f} s")
     moving.restart_daemon()
     moving.controller.wait_for("compd.connected", True)
-    with moving.daemon.connected() as client:
-        next(setpoint for setpoint in client.watch(20) if setpoint["valid"])
+
+    def a_person_accepts() -> bool:
+        """It moved on until the feed was inhibited, and nobody has seen how far."""
+        with moving.daemon.connected() as client:
+            client.accept("all")
+            return bool(next(iter(client.watch(20)))["valid"])
+
+    until("a person is asked for", lambda: moving.daemon.quality("scale_4.position") in ("distrusted", "ok"))
+    until("the setpoints are valid", a_person_accepts)
     assert moving.controller.value("compd.reason") in (2, 4)
     arms_only_when_asked(moving, moving.controller.value("compd.reason"))
 
