@@ -13,7 +13,7 @@ from tests.injection.cases_of_signals import SIGNALS
 from tests.injection.cells.verdict import judge
 from tests.injection.matrix import MATRIX
 from tests.injection.rig import InjectedMachine
-from tests.injection.trial import accept
+from tests.injection.trial import BACK_WITHIN_S, accept
 from tests.soak.resources import resources_by_process
 from tests.soak.summary import Summary
 from tests.support.pauses import MATTERS_S, Pauses
@@ -118,7 +118,10 @@ def _episode(
         summary.missed += max(0, after["missed_cycles"] - before["missed_cycles"])
     if restarted or ended:
         with machine.watched() as again:
-            assert machine.until_ok(again), again.seen[-1].setpoint
+            if not _settles(machine, again, BACK_WITHIN_S):
+                # gauges are written once a second: of one that has moved since, a person is asked
+                fault.accepted += accept(machine)
+                assert machine.until_ok(again), again.seen[-1].setpoint
 
 
 def _explains(case: Case, doubts: str) -> bool:
