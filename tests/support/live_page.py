@@ -59,15 +59,24 @@ def served(*options: str, name: str = "tripod-cmm.yaml", simulate: Sequence[str]
             yield LivePage(address, pid, directory, recordings, machine)
 
 
+# A browser that starts keeps simulated gauges from answering for as long as this; at zero a person would be asked then.
+HASTY = "stale_after_s: 0.5"
+
+
 @contextmanager
 def running_machine(
     name: str = "tripod-cmm.yaml", simulate: Sequence[str] = AT_REST
 ) -> Iterator[tuple[Path, ControlClient]]:
     """A simulated machine and its daemon, zero taken; their directory, and the simulation's control."""
     with run_directory() as directory:
+        patient = directory / "patient" / name
+        patient.parent.mkdir()
+        text = (CONFIG / name).read_text()
+        assert HASTY in text
+        patient.write_text(text.replace(HASTY, "stale_after_s: 3.0"))
         commands = [
             Command(
-                ["simulate", str(CONFIG / name), "--directory", str(directory), *simulate],
+                ["simulate", str(patient), "--directory", str(directory), *simulate],
                 ready=directory / "control.sock",
             ),
             Command(["run", str(directory / name)], ready=directory / "compd.sock"),

@@ -32,7 +32,7 @@ def check_goodbye(seen: list[Seen], reason: str) -> None:
     assert seen[announced]["state"] == State.HOLD
     assert is_valid(seen[announced])
     states = [s["state"] for s in seen[announced:]]
-    assert set(states) == {State.HOLD, State.STOP}
+    assert set(states) <= {State.HOLD, State.STOP, State.REFUSED}
     assert states[-1] == State.STOP, "the last setpoint is invalid"
 
 
