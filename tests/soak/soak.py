@@ -85,6 +85,7 @@ def _episode(
     paused_before_s = pauses.lost_s
     with machine.watched() as watcher:
         machine.truth.drive(place_mm)
+        arrived = watcher.now  # that a machine leaves after a rest, no bound says
         for case in cases:
             case.begin(machine)
         machine.truth.rest_for(lasts_s)
@@ -96,7 +97,7 @@ def _episode(
             accepted = accept(machine)
             restarted = not _settles(machine, watcher, AFTER_ACCEPTANCE_S)
         verdict = machine.judge(watcher.seen)
-        bounds = judge(machine.truth, watcher.seen)
+        bounds = judge(machine.truth, watcher.seen[arrived:])
         ended = bool(watcher.ended)
         summary.broken += [f"{[case.id for case in cases]}: {broken}" for broken in watcher.broken[:1]]
     fault = summary.add(cases, verdict)
