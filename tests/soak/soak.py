@@ -22,8 +22,10 @@ from tests.support.watching import Watcher
 # How often two faults come together, and how often none does.
 TOGETHER_SHARE = 0.2
 QUIET_SHARE = 0.1
-# Stroke in which the machine visits places, mm.
+# Stroke in which the machine visits places, mm; every link goes some way, since one that stays while all others go is
+# taken for stuck.
 STROKE_MM = 12.0
+LEAST_WAY_MM = 0.2
 # A fault lasts between these times, s.
 LASTS_S = (0.5, 4.0)
 # How long a fault's end is given before a person accepts all gauges, and then before the daemon is started anew.
@@ -44,11 +46,14 @@ def soak(
     pauses = Pauses()
     start_s = told_s = time.monotonic()
     episode = 0
+    place_mm = [0.0] * 3
     with pauses.watched():
         while time.monotonic() < start_s + 60 * minutes:
             if episode == WARM_EPISODES:
                 summary.before = resources_by_process(machine.daemon.pids())
-            _episode(machine, _drawn(chance, together_share), chance, summary, pauses)
+            cases = _drawn(chance, together_share)
+            place_mm = [_other_mm(length_mm, chance) for length_mm in place_mm]
+            _episode(machine, cases, place_mm, chance.uniform(*LASTS_S), summary, pauses)
             episode += 1
             if time.monotonic() > told_s + 60:
                 told_s = time.monotonic()
@@ -74,12 +79,21 @@ def _drawn(chance: random.Random, together_share: float) -> list[Case]:
     return [one, chance.choice([case for case in DRAWN if not case.lost and case.id != one.id])]
 
 
+def _other_mm(length_mm: float, chance: random.Random) -> float:
+    while abs((other_mm := chance.uniform(-STROKE_MM, STROKE_MM)) - length_mm) < LEAST_WAY_MM:
+        pass
+    return other_mm
+
+
 def _episode(
-    machine: InjectedMachine, cases: Sequence[Case], chance: random.Random, summary: Summary, pauses: Pauses
+    machine: InjectedMachine,
+    cases: Sequence[Case],
+    place_mm: Sequence[float],
+    lasts_s: float,
+    summary: Summary,
+    pauses: Pauses,
 ) -> None:
-    """To a place, the faults, and out of them again."""
-    place_mm = [chance.uniform(-STROKE_MM, STROKE_MM) for _ in range(3)]
-    lasts_s = chance.uniform(*LASTS_S)
+    """To a place, the faults for `lasts_s`, and out of them again."""
     machine.truth.forget()
     before = _counts(machine)
     paused_before_s = pauses.lost_s

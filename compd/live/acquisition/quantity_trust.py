@@ -83,6 +83,8 @@ class QuantityTrust:
 
     def fail(self, quality: Quality, now_s: float) -> None:
         """Note a poll without a value: what the quantity has become meanwhile, its fastest change limits."""
+        if quality is Quality.LINE_LOST:
+            self._memory.end_order(self._i)
 
     def judge(self, reading: Reading, window_s: float, first: Reading | None = None) -> Reading:
         """The reading as it may be published; parameters as of `ReadingTrust.judge`."""

@@ -108,6 +108,8 @@ class ReadingTrust:
         memory, i = self._memory, self._i
         if quality is Quality.LINE_LOST or now_s - memory.time_s[i] > self._settings.stale_after_s:
             memory.lose(i, now_s, power=True)
+        if quality is Quality.LINE_LOST or now_s - memory.shown_s[i] > self._settings.stale_after_s:
+            memory.end_order(i)
         self._missed = True
         self._after.clear()
 

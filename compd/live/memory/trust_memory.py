@@ -137,6 +137,10 @@ class TrustMemory:
         if power:
             self.power_lost[i] = 1.0
 
+    def end_order(self, i: int) -> None:
+        """Forget an order to believe channel `i`: a person has accepted what it showed before it was away."""
+        self.obeyed[i] = self.accepted[i]
+
     def distrust(self, i: int, doubt: Doubt, amount: float) -> None:
         """Believe channel `i` no more until a person accepts it."""
         self.amount[i] = amount

@@ -379,6 +379,23 @@ def test_a_gauge_that_is_accepted_between_a_poll_and_its_judgement_is_believed_a
     assert shop.reading("scale_1").ok
 
 
+@pytest.mark.parametrize("comes_back_mm", [0.0, 5.0], ids=["at zero", "elsewhere"])
+@pytest.mark.parametrize("doubted", [False, True], ids=["believed", "distrusted"])
+def test_an_order_that_is_older_than_a_loss_says_nothing_of_what_comes_back(shop, doubted, comes_back_mm):
+    shop.poll(20)
+    if doubted:
+        shop.shows["scale_1"] = lambda _: 2.0
+        shop.poll(2)
+    shop.memory.accept("scale_1")
+    shop.away_s(2.0, "scale_1")
+    shop.shows["scale_1"] = lambda _: comes_back_mm
+    shop.poll(20)
+    assert shop.reading("scale_1").quality is Quality.DISTRUSTED
+    shop.memory.accept("scale_1")
+    shop.poll(2)
+    assert shop.reading("scale_1").ok
+
+
 def test_an_absolute_gauge_needs_no_acceptance():
     shop = Shop(returns_by_itself=True)
     shop.poll(20)
