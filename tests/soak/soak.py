@@ -13,6 +13,7 @@ from tests.injection.cases_of_signals import SIGNALS
 from tests.injection.cells.verdict import judge
 from tests.injection.matrix import MATRIX
 from tests.injection.rig import InjectedMachine
+from tests.injection.truth import SETTLED_S
 from tests.injection.trial import BACK_WITHIN_S, accept
 from tests.soak.resources import resources_by_process
 from tests.soak.summary import Summary
@@ -104,6 +105,8 @@ def _episode(
             case.begin(machine)
         machine.truth.rest_for(lasts_s)
         machine.repair()
+        if not watcher.ended:
+            machine.truth.rest_for(SETTLED_S)  # a fault's end is a jump, too, and shows at the next poll
         accepted = restarted = False
         doubts = ""
         if not watcher.ended and not _settles(machine, watcher, BY_ITSELF_S):

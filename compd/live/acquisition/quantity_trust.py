@@ -107,7 +107,9 @@ class QuantityTrust:
             if fault is None:
                 if not any(faults):  # one of two answers that is plausible says nothing of the next poll
                     self._implausible_s = max(0.0, self._implausible_s - share_s)
-                return self._believed(each) if known else self._begin(each, candidates)
+                if not known:
+                    return self._begin(each, candidates)
+                return self._held(each) if any(faults) or self._implausible_s > 0.0 else self._believed(each)
         assert faults[0] is not None
         self._implausible_s += share_s
         if self._implausible_s < LASTING_S:
@@ -172,6 +174,12 @@ class QuantityTrust:
     def _believed(self, reading: Reading) -> Reading:
         change = self._possible_change(reading.time_s, self._expected_s)
         self._expected = min(max(reading.value, self._expected - change), self._expected + change)
+        self._expected_s = reading.time_s
+        self._memory.believe(self._i, self._expected, reading.time_s)
+        return reading._replace(value=self._expected)
+
+    def _held(self, reading: Reading) -> Reading:
+        """A plausible reading among others that are not: of a quantity that is noisy or runs away, it is chance."""
         self._expected_s = reading.time_s
         self._memory.believe(self._i, self._expected, reading.time_s)
         return reading._replace(value=self._expected)

@@ -29,7 +29,7 @@ from compd.live.acquisition.possible_motion import (
     mean_speed,
     rest_to_rest_mm,
 )
-from compd.live.acquisition.scatter import Scatter
+from compd.live.acquisition.scatter import Scatter, Turns
 from compd.live.acquisition.steps import Steps
 from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
 from compd.live.acquisition.witnesses import all_back, moved_while_away, stood_still
@@ -86,6 +86,7 @@ class ReadingTrust:
         self._missed = False  # whether a poll has failed since its last reading
         self._after: list[GaugeSample] = []  # what it shows since a gap, and waits for evidence
         self._scatter = Scatter(self._tolerance_mm)
+        self._turns = Turns(self._tolerance_mm)
         self._motion = MotionEstimate(self._tolerance_mm)
         period_mm = settings.signal_period_mm
         least_mm = LEAST_PERIODS * period_mm - self._tolerance_mm
@@ -179,7 +180,12 @@ class ReadingTrust:
         motion = self._motion.note(self._history)
         if self._memory.suspected[self._i]:
             return bad(reading.time_s, Quality.STALE, "stands while all others move")
-        return reading._replace(motion=motion._replace(scatter_mm=self._scatter.mm))
+        return reading._replace(motion=motion._replace(scatter_mm=self._scatter_mm(sample)))
+
+    def _scatter_mm(self, sample: GaugeSample) -> float:
+        """The larger one of what windows of readings and the last few show; nan where neither does."""
+        known = [mm for mm in (self._scatter.mm, self._turns.note(sample.value)) if not math.isnan(mm)]
+        return max(known, default=math.nan)
 
     def _remember(self, sample: GaugeSample) -> None:
         """Keep a sample of motion, and count the step that it completes."""

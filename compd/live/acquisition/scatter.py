@@ -6,6 +6,9 @@ the same place: motion from one place to another crosses the line two or three t
 median of the last windows counts, so that one in which the machine has moved all the same does no harm.
 
 A hum that the polls alias to less than three periods in a window looks like motion, and does not count.
+
+Windows take seconds. Until they tell, readings that turn round from one to the next do: a machine does so at the end of
+a way, noise and hum again and again.
 """
 
 from __future__ import annotations
@@ -32,6 +35,9 @@ _BEYOND = 0.5
 _STAYS = 2.0
 # A reading so many medians of the deviations from the middle is damaged: of noise 7 is 5 sigma, of hum 1.4 is the most.
 _DAMAGED = 7.0
+# Turns among so many of the last readings count, and so many of them are no machine's.
+_LAST = 32
+_FEWEST_TURNS = 2
 # A recording has it as text: 1 pm is less than anybody knows of it.
 _DECIMALS_MM = 9
 
@@ -74,6 +80,32 @@ class Scatter:
             self._windows.append(deviation_mm)
             if len(self._windows) >= _FEWEST_WINDOWS:
                 self.mm = round(float(np.median(self._windows)), _DECIMALS_MM)
+
+
+class Turns:
+    """Of the readings of one length, where they turn round from one to the next by more than their tolerance."""
+
+    def __init__(self, tolerance_mm: float) -> None:
+        self._tolerance_mm = tolerance_mm
+        self._value = self._change = math.nan
+        self._count = 0
+        self._sizes: deque[tuple[int, float]] = deque()  # of each turn: the number of its reading, and how far, mm
+
+    def note(self, value: float) -> float:
+        """The scatter (mm) that a reading and the last ones show; nan where they do not turn round.
+
+        The mean size of the turns is 1.0 standard deviations of noise, and 1.06 of hum.
+        """
+        change, before = value - self._value, self._change
+        self._value, self._change = value, change
+        self._count += 1
+        if change * before < 0.0 and (least := min(abs(change), abs(before))) > self._tolerance_mm:
+            self._sizes.append((self._count, least))
+        while self._sizes and self._sizes[0][0] <= self._count - _LAST:
+            self._sizes.popleft()
+        if len(self._sizes) < _FEWEST_TURNS:
+            return math.nan
+        return round(sum(size for _, size in self._sizes) / len(self._sizes), _DECIMALS_MM)
 
 
 def _off_line(time_s: FloatArray, value_mm: FloatArray) -> tuple[FloatArray, float]:

@@ -78,7 +78,7 @@ def test_noise_moves_the_tip_by_what_is_no_noise_and_is_found(each):
     right_mm = warm.step().values.tip_M_mm
     warm.cabinet.noise_K["link_1"] = 1.0
     setpoints = warm.run(5.0)
-    assert worst_um(warm, setpoints, right_mm) < 4.0
+    assert worst_um(warm, setpoints, right_mm) < 0.5
     assert setpoints[-1].state is State.FAULT
 
 

@@ -227,6 +227,20 @@ def test_hum_is_told_and_measured(machine: Machine, amplitude_um: float) -> None
     assert motion.scatter_mm == pytest.approx(amplitude_um * 1e-3 / math.sqrt(2), rel=0.2)
 
 
+@pytest.mark.parametrize("disturbance", ["noise", "hum"])
+def test_noise_that_begins_counts_before_it_is_measured(machine: Machine, disturbance: str) -> None:
+    """The machine has rested for long: windows of seconds say that nothing scatters."""
+    scale, random = machine.scales[0], np.random.default_rng(4)
+    machine.run(7.0)
+    quiet = machine.published[scale].motion
+    machine.true_mm[scale] = hum(0.005) if disturbance == "hum" else lambda _: 0.004 * random.standard_normal()
+    machine.run(0.2)
+    motion = machine.published[scale].motion
+    assert quiet is not None and quiet.scatter_mm < 0.0002
+    assert motion is not None
+    assert 0.002 < motion.scatter_mm < 0.008
+
+
 @pytest.mark.parametrize(("noise_um", "is_told"), [(0.3, True), (0.14, False), (0.08, False), (0.03, True)])
 def test_the_declared_noise_is_compared_with_the_scatter(machine: Machine, noise_um: float, is_told: bool) -> None:
     machine.noise_um = dict.fromkeys(machine.channels, noise_um)
