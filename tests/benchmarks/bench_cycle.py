@@ -106,7 +106,10 @@ def _with_effects(measured: Machine, count: int) -> Models:
         for effect in effects
     )
     names = tuple(dict.fromkeys(name for effect in effects for name in needed_quantities(effect, links)))
-    applied = LiveModel(replace(measured.model, effects=fitted), names, measured.wires.quantity_wires(names))
+    covariance = 1e-8 * np.eye(sum(len(each.theta) for each in fitted))
+    applied = LiveModel(
+        replace(measured.model, effects=fitted, covariance=covariance), names, measured.wires.quantity_wires(names)
+    )
     return Models(applied)
 
 

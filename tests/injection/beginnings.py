@@ -65,7 +65,7 @@ def back_with(line: str, channel: str, mm: float, s: float = 2.0) -> Begin:
 def while_driving(begin: Begin) -> Begin:
     def both(machine: InjectedMachine) -> None:
         begin(machine)
-        machine.truth.drive(AWAY_MM)
+        machine.truth.drive_away()
 
     return both
 
@@ -76,7 +76,7 @@ def before_driving(begin: Begin) -> Begin:
     def both(machine: InjectedMachine) -> None:
         begin(machine)
         machine.truth.rest_for(0.3)
-        machine.truth.drive(AWAY_MM)
+        machine.truth.drive_away()
 
     return both
 
@@ -96,7 +96,7 @@ def unplugged_driving(line: str) -> Begin:
 
     def begin(machine: InjectedMachine) -> None:
         machine.injector.unplug(line)
-        machine.truth.drive(AWAY_MM)
+        machine.truth.drive_away()
         machine.injector.plug(line)
 
     return begin
@@ -151,7 +151,7 @@ def at_zero(begin: Begin) -> Begin:
     def both(machine: InjectedMachine) -> None:
         machine.truth.drive((0.0, 0.0, 0.0))
         begin(machine)
-        machine.truth.drive(AWAY_MM)
+        machine.truth.drive_away()
 
     return both
 

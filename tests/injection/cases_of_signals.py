@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tests.injection.beginnings import AWAY_MM, on
+from tests.injection.beginnings import on
 from tests.injection.case import Case, Way
 from tests.injection.faults import Fault
 from tests.injection.signal_faults import Coarse, Hum, Noisy, Scaled, Steps
@@ -122,7 +122,7 @@ SIGNALS: tuple[Case, ...] = (
         SIGNAL,
         "no fault: the machine leaves after a long rest",
         "all links drive 7 mm",
-        lambda machine: machine.truth.drive(AWAY_MM),
+        lambda machine: machine.truth.drive_away(),
         Way.UNDISTURBED,
         bound_um=math.inf,
         unseen="departure_from_rest",

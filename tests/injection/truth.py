@@ -31,6 +31,8 @@ MOVING_GAP_S = 0.03
 RESTING_GAP_S = 0.3
 # Priority of what stands for devices.
 PREFERRED = -10
+# How far links go in a drive away, mm; from further out than TURNS_MM, back.
+WAY_MM, TURNS_MM = 7.0, 7.5
 # Between two motions of a machine that measures.
 DWELL_S = 0.15
 
@@ -54,6 +56,7 @@ class Truth:
         self._end = threading.Event()
         self._seen: list[Asked] = []
         self._every_s = every_s
+        self._place_mm: Sequence[float] = ()
         self._places: Iterator[Sequence[float]] | None = None
         self._stands_since_s = -math.inf
         self._ask()
@@ -73,8 +76,13 @@ class Truth:
         """Drive there, and return when the machine has come to rest and every gauge has been read again."""
         with self._lock:
             self._client.ask("DRIVE", scale_mm=list(scale_mm))
+        self._place_mm = tuple(scale_mm)
         until("the machine rests", lambda: not self._ask()["moving"], patience_s)
         self.rest_for(SETTLED_S)
+
+    def drive_away(self) -> None:
+        """Drive so that every link goes the same way: less far, a scale that is stuck cannot be told."""
+        self.drive([mm + WAY_MM if mm < TURNS_MM else mm - WAY_MM for mm in self._place_mm])
 
     @contextmanager
     def shuttling(self, places_mm: Sequence[Sequence[float]]) -> Iterator[None]:

@@ -13,8 +13,8 @@ from tests.injection.cases_of_signals import SIGNALS
 from tests.injection.cells.verdict import judge
 from tests.injection.matrix import MATRIX
 from tests.injection.rig import InjectedMachine
-from tests.injection.truth import SETTLED_S
 from tests.injection.trial import BACK_WITHIN_S, accept
+from tests.injection.truth import SETTLED_S
 from tests.soak.resources import resources_by_process
 from tests.soak.summary import Summary
 from tests.support.pauses import MATTERS_S, Pauses

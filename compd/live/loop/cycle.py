@@ -31,7 +31,7 @@ from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import UsableComparators
 from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_bound import refused_bound, tip_bound, with_place
-from compd.live.loop.tip_uncertainty import TipUncertainty, noise_now, tip_uncertainty
+from compd.live.loop.tip_uncertainty import TipUncertainty, noise_now, scatters, tip_uncertainty
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
@@ -158,7 +158,7 @@ def _compute(
         state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
         return _Outcome(State.REFUSED, refusal), state
 
-    u_tip = _uncertainty(tick, state, settings) or _not_below_held(
+    u_tip = _uncertainty(tick, state, settings, snapshot) or _not_below_held(
         tip_uncertainty(
             machine,
             noise_now(settings.noise, wires, snapshot, usable.beyond),
@@ -255,11 +255,13 @@ def _with_zero(state: CycleState, zero: MachineZero, zero_vectors: ZeroVectors, 
     )
 
 
-def _uncertainty(tick: int, state: CycleState, settings: CycleSettings) -> TipUncertainty | None:
+def _uncertainty(tick: int, state: CycleState, settings: CycleSettings, snapshot: Snapshot) -> TipUncertainty | None:
     """The tip's uncertainty of the cycle before, since it changes slowly; None where it is to be computed anew."""
     if settings.noise is None:
         return TipUncertainty(None, None)
     if state.tip_noise_um is None or state.tip_by_gauge is None or tick % settings.uncertainty_every == 0:
+        return None
+    if tick % settings.scattering_every == 0 and scatters(settings.noise, settings.wires, snapshot):
         return None
     return TipUncertainty(state.tip_noise_um, state.tip_by_gauge)
 

@@ -25,6 +25,8 @@ from compd.model.uncertainty import GaugeNoise
 
 # The uncertainty of the tip changes over seconds, as the machine warms up or crosses its workspace.
 _UNCERTAINTY_EVERY_S = 1.0
+# Over tenths of a second where a gauge begins to scatter.
+_SCATTERING_EVERY_S = 0.2
 
 
 class ZeroVectors(NamedTuple):
@@ -132,6 +134,11 @@ class CycleSettings:
     def uncertainty_every(self) -> int:
         """Cycles from one computation of the tip's uncertainty to the next."""
         return max(1, round(_UNCERTAINTY_EVERY_S * self.loop.rate_hz))
+
+    @cached_property
+    def scattering_every(self) -> int:
+        """The same while a length scatters by far more than is stated."""
+        return max(1, round(_SCATTERING_EVERY_S * self.loop.rate_hz))
 
     @cached_property
     def unread_scales_mm(self) -> FloatArray:

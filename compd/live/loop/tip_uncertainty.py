@@ -49,13 +49,27 @@ def noise_now(
     """
     if noise is None:
         return None
-    stated_mm = np.concatenate([noise.scale_mm, noise.joint_mm, noise.frame_mm])
-    scatter_mm = wires.lengths.scatter_mm(snapshot) * math.sqrt(_READINGS)
-    scatter_mm[~(scatter_mm > SCATTER_RATIO * stated_mm)] = math.nan
+    stated_mm, scatter_mm = _lengths_mm(noise), _scatter_mm(noise, wires, snapshot)
     quantities = noise.quantities
     if beyond is not None:
         quantities = {name: math.hypot(sigma, beyond.by.get(name, 0.0)) for name, sigma in quantities.items()}
     return _noise(np.fmax(stated_mm, scatter_mm), wires, quantities, "stated, or measured")
+
+
+def scatters(noise: GaugeNoise, wires: MachineWires, snapshot: Snapshot) -> bool:
+    """Whether a length scatters at rest by far more than is stated."""
+    return not bool(np.isnan(_scatter_mm(noise, wires, snapshot)).all())
+
+
+def _lengths_mm(noise: GaugeNoise) -> FloatArray:
+    return np.concatenate([noise.scale_mm, noise.joint_mm, noise.frame_mm])
+
+
+def _scatter_mm(noise: GaugeNoise, wires: MachineWires, snapshot: Snapshot) -> FloatArray:
+    """(n + k + 9) of a length that scatters by far more than is stated, mm; nan of the others."""
+    scatter_mm = wires.lengths.scatter_mm(snapshot) * math.sqrt(_READINGS)
+    scatter_mm[~(scatter_mm > SCATTER_RATIO * _lengths_mm(noise))] = math.nan
+    return scatter_mm
 
 
 def _noise(lengths_mm: FloatArray, wires: MachineWires, quantities: Mapping[str, float], how: str) -> GaugeNoise:
@@ -116,7 +130,7 @@ def tip_uncertainty(
         time_s=float(values.time_s),
         effects=effects,
     )
-    by_gauge_mm = derivatives.by_gauge * np.concatenate([noise.scale_mm, noise.joint_mm, noise.frame_mm])
+    by_gauge_mm = derivatives.by_gauge * _lengths_mm(noise)
     variance = (by_gauge_mm * by_gauge_mm).sum(axis=1) + (derivatives.by_quantity**2).sum(axis=1)
     covariance = by_gauge_mm @ by_gauge_mm.T + derivatives.by_quantity @ derivatives.by_quantity.T
     if machine.live_effects:
