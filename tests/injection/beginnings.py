@@ -12,8 +12,6 @@ from tests.injection.rig import InjectedMachine
 # Where the scales stand when a fault begins: different for each, so that exchanged ones differ, and with more digits
 # than a display that has been set to fewer.
 REST_MM = (2.0034, 4.0047, 7.0061)
-# Where a case drives them.
-AWAY_MM = (9.0, 11.0, 14.0)
 # How long a gauge that was without power is watched then, s: its line is opened again within this time.
 REOPENED_S = 3.0
 

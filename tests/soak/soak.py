@@ -138,6 +138,8 @@ def _episode(
         with machine.watched() as again:
             if not _settles(machine, again, BACK_WITHIN_S):
                 # gauges are written once a second: of one that has moved since, a person is asked
+                if "came back" not in (why := again.seen[-1]["reason"]) and not any(_explains(c, why) for c in cases):
+                    summary.false_alarms.append(f"{[case.id for case in cases]}: after the restart: {why}")
                 fault.accepted += accept(machine)
                 assert machine.until_ok(again), again.seen[-1].setpoint
 

@@ -18,7 +18,6 @@ from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import MotionEstimate
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
-from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.machine_zero import MachineZero
@@ -34,7 +33,7 @@ from tests.support.paths import CONFIG
 GRID_S = 1e-3
 PERIOD_S = 0.01
 BEGIN_S, DEPARTS_S, END_S = 0.7, 1.5, 4.6  # of the run, and when the machine departs; it has arrived after 2.1 s
-# Drives of the links, mm since machine zero: the tip goes at up to 140 mm/s.
+# Where a way is computed, from 0 to 1: Chebyshev's nodes.
 _NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)
 # Where the links drive, mm since machine zero: the tip goes at up to 130 mm/s.
 PLACES_MM = {3: (20.0, -14.0, 6.0), 6: (14.0, -11.0, 6.0, 15.0, -7.0, 4.0)}
@@ -137,23 +136,22 @@ def lines_of(names: tuple[str, ...]) -> list[Line]:
     ]
 
 
-def configured(name: str, tip_error_um: float | str | None = "shipped", **loop) -> Configuration:
+def configured(name: str, tip_error_um: float | str | None = "shipped") -> Configuration:
     """A shipped machine; its limit of the tip's error may be another one, or none."""
     configuration = load(CONFIG / name)
     limits = configuration.limits
     if tip_error_um != "shipped":
         limits = limits.model_copy(update={"tip_error_um": tip_error_um})
-    return replace(
-        configuration, limits=limits, loop=configuration.loop.model_copy(update={"rate_hz": 1 / PERIOD_S, **loop})
-    )
+    loop = configuration.loop.model_copy(update={"rate_hz": 1 / PERIOD_S})
+    return replace(configuration, limits=limits, loop=loop)
 
 
 class _Lines:
     """Polls the track, and has the readings as they are at a time."""
 
-    def __init__(self, configuration: Configuration, pipeline, zero_at_s: float, fault: Fault, seed: int) -> None:
+    def __init__(self, configuration: Configuration, pipeline, zero_at_s: float, fault: Fault) -> None:
         self._track, self._fault = track(configuration.path.name), fault
-        self._random = np.random.default_rng(seed)
+        self._random = np.random.default_rng(1)
         self._names = names_of(configuration)
         channels = dict(zip(self._names, pipeline.wires.length_channels, strict=True))
         self._slots = {name: pipeline.latest.index[channel] for name, channel in channels.items()}
@@ -214,10 +212,10 @@ class _Lines:
             self.readings[self._slots[name]] = good(value, stamp_s)._replace(motion=motion)
 
 
-def told(configuration: Configuration, fault: Fault = NONE, target: Target | None = None, seed: int = 1) -> list[Told]:
-    """Every setpoint from BEGIN_S to END_S, in mode cmm unless there is a target."""
+def told(configuration: Configuration, fault: Fault = NONE) -> list[Told]:
+    """Every setpoint from BEGIN_S to END_S, in mode cmm."""
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
-    lines = _Lines(configuration, pipeline, 0.2, fault, seed)
+    lines = _Lines(configuration, pipeline, 0.2, fault)
     lengths = {pipeline.latest.index[channel] for channel in pipeline.wires.length_channels}
     zero = MachineZero(configuration.zero_hash, "2026-01-01T00:00:00+00:00", lines.zero_mm)
     state, truth, setpoints = CycleState.at_start(pipeline.settings.model), track(configuration.path.name), []
@@ -227,7 +225,7 @@ def told(configuration: Configuration, fault: Fault = NONE, target: Target | Non
         readings = [
             reading if slot in lengths else good(ROOM_DEGC, now_s) for slot, reading in enumerate(lines.readings)
         ]
-        inputs = CycleInputs(tick, Snapshot(now_s, Readings.of(readings)), zero, target)
+        inputs = CycleInputs(tick, Snapshot(now_s, Readings.of(readings)), zero, None)
         setpoint, state = step(state, inputs, pipeline.settings)
         bound_um, error_um = np.nan, np.nan
         if setpoint.values is not None:

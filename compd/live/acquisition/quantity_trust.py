@@ -147,13 +147,18 @@ class QuantityTrust:
                 return bad(reading.time_s, Quality.MISMATCH, "has been read too few times yet")
             scatter, possible = max(values) - min(values), self._possible_change(reading.time_s, self._first[0].time_s)
             if scatter > 2 * self._limits.tolerance + possible:
-                return bad(
-                    reading.time_s, Quality.MISMATCH, f"its first readings scatter by {scatter:.3g} {self._unit}"
-                )
+                return self._scattering(reading, scatter)
         unread = np.isnan(self._memory.shown[self._neighbours]).any() and math.isfinite(self._limits.apart)
         if unread and passed_s < _LONGEST_START_S:
             return bad(reading.time_s, Quality.MISMATCH, "its neighbours have not been read yet")
         return self._from(float(np.median(values)), reading)
+
+    def _scattering(self, reading: Reading, scatter: float) -> Reading:
+        """Readings that scatter from the start on: those that agree after a while do so by chance."""
+        self._implausible_s += min(reading.time_s - self._first[-2].time_s, _LONGEST_SHARE_S)
+        if self._implausible_s >= LASTING_S:
+            return self._distrusted(reading, _Fault(Doubt.JUMPED, scatter, ""))
+        return bad(reading.time_s, Quality.MISMATCH, f"its first readings scatter by {scatter:.3g} {self._unit}")
 
     def _unconfirmed(self, answers: tuple[Reading, ...]) -> Reading | None:
         """Why two answers, the last one first, do not confirm each other; None where they do."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from tests.injection.case import Case
 from tests.injection.cases_of_numbers import STUCK
-from tests.injection.cases_of_thermometers import THERMOMETER
 from tests.injection.cells.situation import Situation
 from tests.injection.matrix import FAULTS
 
@@ -34,13 +33,13 @@ class Cell:
     def unseen(self) -> bool:
         """Whether nothing shows one of its faults, or not at once.
 
-        Where the daemon was away, a temperature may have become another one; and a fault that repeats what another has
-        made wrong repeats it before the daemon has read anything else.
+        Where the daemon was away, a fault that repeats what another has made wrong repeats it before anything else has
+        been read.
         """
-        if any(case.unseen for case in self.cases):
-            return True
-        groups = {case.group for case in self.cases} if self.situation is Situation.RESTART else set()
-        return THERMOMETER in groups or (STUCK in groups and len(self.cases) > 1)
+        restarted_pair = self.situation is Situation.RESTART and len(self.cases) > 1
+        return any(case.unseen for case in self.cases) or (
+            restarted_pair and any(case.group == STUCK for case in self.cases)
+        )
 
     @property
     def expands(self) -> bool:

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum
 
-from tests.injection.beginnings import AWAY_MM, REST_MM
+from tests.injection.beginnings import REST_MM
 from tests.injection.case import Case
 from tests.injection.cases_of_processes import CLIENTS, PROCESSES
 from tests.injection.rig import InjectedMachine
 
 # Where a machine in motion drives, one after the other: no link always the same way.
-PLACES_MM = (AWAY_MM, (-6.0, 9.0, 3.0), (8.0, -7.0, 12.0), REST_MM)
+PLACES_MM = ((9.0, 11.0, 14.0), (-6.0, 9.0, 3.0), (8.0, -7.0, 12.0), REST_MM)
 # Cases whose controllers command the place where the machine stands: one that drives does not follow them.
 COMMANDING = "client-target"
 # More than there are processors, so that the daemon has to wait for one.

@@ -14,6 +14,7 @@ from tests.injection.cells.situation import PLACES_MM, Situation
 from tests.injection.cells.verdict import Verdict, judge
 from tests.injection.rig import InjectedMachine
 from tests.injection.trial import accept, settle
+from tests.injection.truth import SETTLED_S
 from tests.support.watching import Seen, Watcher
 
 # How long a fault's end is given before a person accepts all gauges, and then before the daemon is started anew.
@@ -52,6 +53,8 @@ class CellResult:
             problems.append("no setpoint answers a target: the controller has done nothing")
         if self.unseen:
             return problems
+        if not self.faults and (self.way_out != "itself" or not verdict.held):
+            problems.append(f"without a fault: {verdict.held} setpoints to judge, ok again: {self.way_out}")
         # at rest without a fault
         if not self.faults and self.situation == Situation.REST.name.lower():
             fit = verdict.bound_um / verdict.error_95_um
@@ -129,6 +132,8 @@ def _leave(machine: InjectedMachine, seen: list[Seen], broken: list[str]) -> str
     """The faults have gone: by itself, by a person, or not at all."""
     with machine.watched() as watcher:
         way_out = "restarted"
+        if not watcher.ended:
+            machine.truth.rest_for(SETTLED_S)  # a fault's end is a jump, too, and shows at the next poll
         if _ok_by_itself(machine, watcher):
             way_out = "itself"
         elif accept(machine) and machine.until_ok(watcher, AFTER_ACCEPTANCE_S):

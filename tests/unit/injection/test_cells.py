@@ -175,12 +175,26 @@ def test_a_fault_that_nothing_shows_may_be_wrong_and_must_be_left() -> None:
 
 @pytest.mark.parametrize(("bound_um", "right"), [(0.29, False), (0.31, True), (0.59, True), (0.61, False)])
 def test_without_a_fault_at_rest_the_bound_fits_the_error(bound_um: float, right: bool) -> None:
-    verdict = Verdict(setpoints=100, bound_um=bound_um, error_95_um=0.3)
+    verdict = Verdict(setpoints=100, held=90, bound_um=bound_um, error_95_um=0.3)
     assert bool(result(cell("no-fault@rest"), verdict).problems) is not right
     assert not result(cell("no-fault@load"), verdict).problems
 
 
+@pytest.mark.parametrize(("held", "way_out"), [(0, "itself"), (90, "accepted")])
+def test_without_a_fault_there_is_something_to_judge_and_nothing_to_accept(held: int, way_out: str) -> None:
+    assert result(cell("no-fault@motion"), Verdict(setpoints=100, held=held), way_out=way_out).problems
+
+
 # --- the run
+
+
+@pytest.mark.parametrize(("tries", "wrong"), [("wrr", False), ("wwr", True), ("wrw", True), ("r", False)])
+def test_of_a_cell_that_was_tried_again_most_tries_count(tmp_path: Path, tries: str, wrong: bool) -> None:
+    one, out = cell("scale-jumps@rest"), tmp_path / "results.jsonl"
+    lines = [{"cell": one.name, "problems": ["a problem"] if each == "w" else []} for each in tries]
+    out.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    (found,) = __main__._results(out, [one])
+    assert bool(found["problems"]) is wrong
 
 
 @pytest.fixture

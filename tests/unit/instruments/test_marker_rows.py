@@ -54,7 +54,7 @@ def test_a_lost_beam_is_left_out_of_a_frame_in_the_machine_too(tmp_path: Path) -
 
 @pytest.mark.parametrize("row", ["0,0,0", "9.99,9.99,9.99", "99.9,0,0"])
 def test_what_lies_among_the_others_is_measured(tmp_path: Path, row: str) -> None:
-    places_mm = RNG.normal(0.0, 60.0, (20, 3))
+    places_mm = np.random.default_rng(5).normal(0.0, 60.0, (20, 3))
     assert len(read(tmp_path, points([row, row], places_mm)).values) == 22
 
 

@@ -12,12 +12,11 @@ from compd.recording.tables.problem_list import ProblemList
 from compd.recording.tables.table import FIRST_ROW, Table
 
 N = 60
-RNG = np.random.default_rng(8)
-PLACES_MM = np.repeat(RNG.uniform(-100.0, 100.0, (N // 3, 3)), 3, axis=0)  # three rows at each
+PLACES_MM = np.repeat(np.random.default_rng(8).uniform(-100.0, 100.0, (N // 3, 3)), 3, axis=0)  # three rows at each
 
 
 def table(frozen: slice, machine: str = "model", digits: int = 6) -> Table:
-    measured = np.round(PLACES_MM + RNG.normal(0.0, 1e-3, PLACES_MM.shape), digits)
+    measured = np.round(PLACES_MM + np.random.default_rng(9).normal(0.0, 1e-3, PLACES_MM.shape), digits)
     measured[frozen] = measured[frozen][:1]
     names = ["scale_1_mm", "scale_2_mm", "scale_3_mm"] if machine == "scales" else [f"model_{a}_mm" for a in "xyz"]
     columns = dict(zip(names, PLACES_MM.T, strict=True))
