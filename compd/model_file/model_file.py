@@ -347,7 +347,7 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
             what="is in another unit than the effect has" if units[column.name] else "has no unit",
             value=f"unit: {units[column.name]}" if units[column.name] else "",
             allowed=f"unit: {column.parameter.unit}",
-            next_step=f"write the value in {column.parameter.unit}, or fit it again with `compd effect fit`",
+            next_step=f"write the value in {column.parameter.unit}, and `unit: {column.parameter.unit}`",
         )
         for column in columns
         if units[column.name] != column.parameter.unit
@@ -390,7 +390,7 @@ def _error_problems(fitted: FittedEffect, entry: EffectEntry, links: int, where:
             what="has a standard error that is not the one of the covariance",
             value=f"std: {std:g}",
             allowed=f"std: {of_covariance:g}",
-            next_step="fit it again with `compd effect fit`",
+            next_step="write that one, or mend the covariance",
         )
 
 

@@ -193,7 +193,7 @@ def test_of_a_cell_that_was_tried_again_most_tries_count(tmp_path: Path, tries: 
     one, out = cell("scale-jumps@rest"), tmp_path / "results.jsonl"
     lines = [{"cell": one.name, "problems": ["a problem"] if each == "w" else []} for each in tries]
     out.write_text("".join(json.dumps(line) + "\n" for line in lines))
-    (found,) = __main__._results(out, [one])
+    (found,) = run._results(out, [one])
     assert bool(found["problems"]) is wrong
 
 
