@@ -36,6 +36,10 @@ class Quality(StrEnum):
     DISTRUSTED = "distrusted", "there is a value, which is not believed before a person has accepted it: `compd accept`"
 
 
+# Of a gauge that is read every so often, the next reading is due after so many of these intervals.
+ROUNDS_UNTIL_DUE = 2.5
+
+
 class ReadingMotion(NamedTuple):
     """How what a length gauge measures moves, by its own last readings. compd finds it; a driver leaves it out.
 

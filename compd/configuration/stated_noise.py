@@ -17,8 +17,9 @@ class StatedNoise(NamedTuple):
 
 # Last digit of a display that stands still, mm, where no noise is stated.
 UNREST_MM = 0.001
-# Two readings of the same value differ by less than this many standard deviations of one: 6 sigma of a difference.
-SAME_VALUE_SIGMAS = 6 * math.sqrt(2)
+# Two readings of the same value differ by less than this many standard deviations of their difference, and of one.
+DIFFERENCE_SIGMAS = 6.0
+SAME_VALUE_SIGMAS = DIFFERENCE_SIGMAS * math.sqrt(2)
 # A scatter that differs from the stated noise by this factor either way is another one. A last digit that goes to and
 # fro makes 1.7 times what it makes on average.
 SCATTER_RATIO = 2.0

@@ -31,6 +31,7 @@ KEYS: Mapping[str, str] = {
     "changed_mm": "by how much the gauges differ from the machine zero before",
     "channels": "channels that are believed again",
     "not_believed": "channels that are not believed after it either, each with the reason",
+    "change": "what has changed",
     "check": "how the process that checked the configuration has ended",
     "channel": "`gauge.channel`",
     "client": "address of the client, or `unix` and the number of its user",

@@ -26,8 +26,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
+from compd.configuration.stated_noise import DIFFERENCE_SIGMAS
 from compd.gauge import ReadingMotion
 from compd.live.acquisition.possible_motion import GaugeSample
+from compd.reading import ROUNDS_UNTIL_DUE
 
 # Over longer, s, no speed is measured: a drift that is older says little of now.
 LONGEST_WINDOW_S = 1.0
@@ -36,15 +38,12 @@ LONGEST_WINDOW_S = 1.0
 LARGEST_GROWTH = 2.0
 # A reading is replaced one round after it was made, and one that waits for the end of its round after two.
 HORIZON_ROUNDS = 2.0
-# By then the next reading is there, by what the duration of rounds scatters; of the last ones the median is the usual.
-DUE_ROUNDS = 2.5
+# Of the last rounds the median is the usual one.
 _USUAL_ROUNDS = 5
 # A part that turns round shows one round without motion, and not two.
 _CALM_ROUNDS = 2
 # Drives come to rest from their full speed within 0.1 to 0.3 s: for longer than this, s, no motion is taken to go on.
 LONGEST_HORIZON_S = 0.15
-# A tolerance is six standard deviations of the difference between two readings.
-SIGMAS = 6.0
 # Width of a uniform distribution over its standard deviation (GUM, 4.3.7).
 _UNIFORM = math.sqrt(12.0)
 # Windows are as long as the last one but for the scatter of polls.
@@ -68,7 +67,7 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
         return UNKNOWN
     rounds = [history[k].time_s - history[k - 1].time_s for k in range(max(1, last - 1), last + 1)]
     horizon_s = min(HORIZON_ROUNDS * max(rounds), LONGEST_HORIZON_S)
-    due_s = DUE_ROUNDS * median(
+    due_s = ROUNDS_UNTIL_DUE * median(
         history[k].time_s - history[k - 1].time_s for k in range(max(1, last - _USUAL_ROUNDS + 1), last + 1)
     )
     recent = _recent_speed(history, tolerance_mm)
@@ -82,7 +81,9 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
         return _rounded(0.0, 0.0, abs(now), horizon_s, 0.0, rounds[-1], due_s)
     changes = [abs(later - earlier) for later, earlier in pairwise(slopes)]
     late_s = math.hypot(history[start].window_s, history[last].window_s) / _UNIFORM
-    u = math.hypot(max(changes, default=abs(now)), tolerance_mm / SIGMAS / duration_s, abs(now) * late_s / duration_s)
+    u = math.hypot(
+        max(changes, default=abs(now)), tolerance_mm / DIFFERENCE_SIGMAS / duration_s, abs(now) * late_s / duration_s
+    )
     if recent < math.inf:  # how fast it was before that says nothing any more
         u = min(u, max(recent, abs(now)))
     before = slopes[1] if len(slopes) > 1 else 0.0
@@ -119,7 +120,8 @@ def _recent_speed(history: Sequence[GaugeSample], tolerance_mm: float) -> float:
     if any(abs(newest.value - history[-1 - k].value) > tolerance_mm for k in range(1, _CALM_ROUNDS + 1)):
         return math.inf
     since = history[-1 - _CALM_ROUNDS]
-    return abs(newest.value - since.value) / (newest.time_s - since.time_s)
+    passed_s = newest.time_s - since.time_s
+    return abs(newest.value - since.value) / passed_s if passed_s > 0.0 else math.inf
 
 
 def _stands(history: Sequence[GaugeSample], start: int, recent: float, tolerance_mm: float) -> bool:

@@ -21,7 +21,8 @@ log = structlog.get_logger()
 _NO_TRUST: Mapping[str, Judge] = {}
 # Faults of the wire: the next poll may well be answered, and the last good reading says what it said.
 MAY_PASS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
-# Faults of a reply that came. Asking again soon delays nobody: the line is silent again.
+# Faults of a reply that came. The line is silent again soon; so many in a row are no interference.
+MOST_DAMAGED = 10
 DAMAGED = (Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
 # A gauge on a line that is open rests at most so long, s: what a fault has cost is known again within a second.
 LONGEST_REST_S = 0.9
@@ -160,9 +161,9 @@ class PolledGauge:
         """Count a poll that failed as a whole, at the monotonic time `now_s` (s).
 
         A reading that is still good stays after a fault that may pass (`MAY_PASS`); every other channel takes
-        `quality`. After a missing reply, or the second fault in a row that is no damage, the gauge rests for one
-        timeout of the line, then for twice as long each time: a late reply has time to come and go, and the others are
-        not slowed.
+        `quality`. After a missing reply, more than MOST_DAMAGED damaged ones in a row, or the second other fault, the
+        gauge rests for one timeout of the line, then for twice as long each time: a late reply has time to come and go,
+        and the others are not slowed.
         """
         self.polls += 1
         self.faults[quality] += 1
@@ -173,7 +174,7 @@ class PolledGauge:
         if not kept:
             self._log_change()
         self.failures += 1
-        if quality not in DAMAGED and (quality is Quality.TIMEOUT or self.failures > 1):
+        if self.failures > (MOST_DAMAGED if quality in DAMAGED else 0 if quality is Quality.TIMEOUT else 1):
             self.rests_until_s = now_s + self._back_off.failed()
 
     def driver_error(self, error: Exception) -> str:

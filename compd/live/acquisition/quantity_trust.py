@@ -82,7 +82,7 @@ class QuantityTrust:
         return not self._recall() or self._fault(sample.value, sample.time_s) is not None
 
     def fail(self, quality: Quality, now_s: float) -> None:
-        """Note a poll without a value: what the quantity has become meanwhile, its fastest change limits."""
+        """Note a poll without a value, which may end an order; how far it has gone, its fastest change limits."""
         if quality is Quality.LINE_LOST:
             self._memory.end_order(self._i)
 
@@ -91,8 +91,6 @@ class QuantityTrust:
         memory, i = self._memory, self._i
         memory.show(i, reading.value, reading.time_s)
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
-            memory.obeyed[i] = memory.accepted[i]
-            memory.heard[i] = memory.voted[i]
             return self._accepted(reading, first)
         if memory.voted[i] != memory.heard[i]:
             memory.heard[i] = memory.voted[i]
@@ -128,10 +126,14 @@ class QuantityTrust:
 
     def _accepted(self, reading: Reading, first: Reading) -> Reading:
         """The readings after a person's acceptance: whatever was before, but plausible, and two that agree."""
+        memory, i = self._memory, self._i
         self._expected, self._implausible_s = math.nan, 0.0
-        if fault := self._fault(reading.value, reading.time_s):
-            return self._distrusted(reading, fault)
-        return self._unconfirmed((reading, first)) or self._from(reading.value, reading)
+        fault = self._fault(reading.value, reading.time_s)
+        if fault is None and (unconfirmed := self._unconfirmed((reading, first))):
+            return unconfirmed
+        memory.end_order(i)
+        memory.heard[i] = memory.voted[i]
+        return self._distrusted(reading, fault) if fault else self._from(reading.value, reading)
 
     def _begin(self, reading: Reading, answers: tuple[Reading, ...]) -> Reading:
         """The first readings: two answers agree, and the neighbours, if there are any, have been read."""

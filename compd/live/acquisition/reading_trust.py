@@ -130,9 +130,11 @@ class ReadingTrust:
         memory.scatter_mm[i] = self._scatter.mm
         # one that was accepted while it was asked is asked twice at the next poll
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
-            memory.obeyed[i] = memory.accepted[i]
-            memory.heard[i] = memory.voted[i]
-            return self._begin(reading, sample, first)
+            begun = self._begin(reading, sample, first)
+            if begun.ok or memory.suspected[i]:
+                memory.end_order(i)
+                memory.heard[i] = memory.voted[i]
+            return begun
         if memory.voted[i] != memory.heard[i]:
             memory.heard[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)

@@ -43,6 +43,10 @@ TARGET_TOO_OLD = (
 )
 
 
+# In recordings of releases up to 0.2.0 the uncertainty has no radius, and stands alone.
+_FORMER_NUMBERS = 3
+
+
 class _Outcome(NamedTuple):
     """State and reason of a setpoint, with its values where they are valid.
 
@@ -259,7 +263,9 @@ def _uncertainty(tick: int, state: CycleState, settings: CycleSettings, snapshot
     """The tip's uncertainty of the cycle before, since it changes slowly; None where it is to be computed anew."""
     if settings.noise is None:
         return TipUncertainty(None, None)
-    if state.tip_noise_um is None or state.tip_by_gauge is None or tick % settings.uncertainty_every == 0:
+    if state.tip_noise_um is None or tick % settings.uncertainty_every == 0:
+        return None
+    if state.tip_by_gauge is None and len(state.tip_noise_um) > _FORMER_NUMBERS:
         return None
     if tick % settings.scattering_every == 0 and scatters(settings.noise, settings.wires, snapshot):
         return None

@@ -55,7 +55,8 @@ def read_comparators(
             _group(wires.frame, snapshot, zero_mm[wires.joints :], extrapolate),
             _quantity_group(applied, snapshot),
         )
-        return degraded_comparators(groups, quantities, last_good, now_s, settings.loop)
+        newest, usable = degraded_comparators(groups, quantities, last_good, now_s, settings.loop)
+        return newest, usable._replace(beyond=beyond) if beyond and not groups[2].lost else usable
     return None, usable_comparators(None, last_good, lost, now_s, settings.loop)
 
 

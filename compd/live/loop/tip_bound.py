@@ -83,8 +83,8 @@ def tip_bound(
 
 
 def with_place(live: ComparatorSet, nominal_scale_mm: FloatArray, settings: CycleSettings) -> ComparatorSet:
-    """A live set that knows where the machine was, for the bound while it is held."""
-    return live if settings.noise is None else live._replace(scale_mm=tuple(nominal_scale_mm.tolist()))
+    """A live set that knows where the machine was, for the bound while it is held; in part, it does already."""
+    return live if settings.noise is None or live.scale_mm else live._replace(scale_mm=tuple(nominal_scale_mm.tolist()))
 
 
 def _absent_link_mm(wanted: Compensation, reached_mm: FloatArray, weight: float) -> FloatArray | None:
@@ -158,7 +158,8 @@ def _unknown(bound: TipBound | None, needed: tuple[str, ...], settings: CycleSet
     if unmoved:
         return f"{_named(wires, unmoved)} has been read only once; how it moves is known with the next reading"
     if unlimited:
-        return f"{_named(wires, unlimited)} is silent; how far it moves, `acceleration_mm_per_s2` of its gauge limits"
+        named = _named(wires, unlimited)
+        return f"nothing limits how far {named} may have gone; give `acceleration_mm_per_s2` of its gauge"
     if math.isnan(bound.absent_um):
         return "the correction of effects is absent, as a gauge that they need is lost"
     stated = settings.noise.quantities if settings.noise else {}

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from compd.arrays import FloatArray, IntArray
 from compd.live.memory.readings import OK_NUMBER, SLOTS
 from compd.model.kernels.jit import COUNT, FLAG, INDICES, NUMBERS, SCALAR, helper, loop
+from compd.reading import ROUNDS_UNTIL_DUE
 from compd.units import UM_PER_MM
 
 # Coverage factor for 95 % of a normal distribution (GUM, table G.1).
@@ -30,8 +31,6 @@ LINK_SPEED_RATIO = 10.0
 # A machine that has rested for so many times as long as a reading is old has left since with 5 %: Laplace's rule of
 # succession, for a time of which nothing else is known.
 RESTED = 19.0
-# The next reading is due after so many rounds (`compd.live.acquisition.motion_estimate`).
-ROUNDS_UNTIL_DUE = 2.5
 
 # Arrays that may be in memory that cannot be written to, such as those of a recording.
 _READ_NUMBERS = types.Array(types.float64, 1, "C", readonly=True)

@@ -149,8 +149,9 @@ class TrustMemory:
     def believe(self, i: int, value: float, time_s: float) -> None:
         """Note a reading of channel `i` (in its unit, s) that is believed."""
         newest = self._recent[i, self._believed[i] % RECENT]
+        newest[0] = math.nan  # whoever reads in between leaves it out
         newest[1] = value
-        newest[0] = time_s  # after the value: whoever reads in between takes it for the oldest
+        newest[0] = time_s
         self._believed[i] += 1
         self.value[i], self.time_s[i] = value, time_s
         if i < self.lengths:

@@ -104,7 +104,8 @@ class LoopProcess:
         try:
             before = self.adopted.load(self.loader)
             models = self._models_wanted(before, request)
-            self._require_zero(models)
+            wanted = models.shadow if request.shadow else models.applied
+            self._require_zero(wanted)
             self.commands.models = models
             loop = self._loop()
             self._prepare(loop)
@@ -121,7 +122,8 @@ class LoopProcess:
         state = self._state_left(before, forget=False)
         self.adopted.write(models)
         self.answer(request.number, models.summary, "")
-        warn_of_datum(models.applied, _log)
+        if wanted is not None:
+            warn_of_datum(wanted, _log)
         loop.run(lambda: control.keeps_turn(number), control.ending, state)
 
     def answer(self, number: int, summary: object, refusal: str) -> None:
@@ -141,12 +143,11 @@ class LoopProcess:
             return Models(before.shadow)
         return Models(model or self.loader.without_effects, before.shadow)
 
-    def _require_zero(self, models: Models) -> None:
-        """Raise StateError where machine zero lacks a quantity from which an effect of the models counts."""
+    def _require_zero(self, model: LiveModel | None) -> None:
+        """Raise StateError where machine zero lacks a quantity from which an effect of the model counts."""
         zero = self.commands.zero
-        for model in filter(None, models):
-            if isinstance(zero, MachineZero) and (missing := model.missing_at_zero(zero)):
-                raise StateError(Problem(where=model.file, what=missing))
+        if model is not None and isinstance(zero, MachineZero) and (missing := model.missing_at_zero(zero)):
+            raise StateError(Problem(where=model.file, what=missing))
 
     def _loop(self) -> Loop:
         packer = CyclePacker(Directions(self.settings.wires.scale.wires))

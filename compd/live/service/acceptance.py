@@ -16,11 +16,11 @@ from compd.clock import Clock
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 from compd.live.service.messages import line
 
-# Votes look at 0.3 s of readings at most, and lines are polled every 0.1 s at least.
+# Votes look at 0.3 s of readings at most. Of a gauge that is read less often it is told that it has not been read yet.
 WATCHED_S = 1.0
 _LOOK_EVERY_S = 0.02
-_NO_TWO_ANSWERS = "no two answers of it agree: it moves, or does not answer"
-_SUSPECTED = "it stands while all others move"
+_NO_TWO_ANSWERS = "no two answers of it agree yet: it moves, or is read seldom; it is believed when two do"
+_SUSPECTED = "it stands while all others move: let all stand still, then `compd accept` it"
 
 _log = structlog.get_logger()
 

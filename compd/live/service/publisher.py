@@ -75,7 +75,7 @@ class Publisher:
         self._answers: deque[tuple[ClientSession, bytes]] = deque()
         self._orders: deque[bytes] = deque()
         self._unwanted = DescriptorBin()
-        self._waiting: list[ClientSession] = []  # with lines to answer; not read from meanwhile
+        self._waiting: list[ClientSession] = []  # with lines to answer
         self._next_turn_s = self._next_look_s = -math.inf
         self._selector: selectors.BaseSelector  # from `run` on, in the process that serves
         self._requests: Requests  # likewise: it needs the publisher's own figures for STATUS
@@ -155,7 +155,7 @@ class Publisher:
     def _serve(self, session: ClientSession, events: int) -> None:
         if events & selectors.EVENT_WRITE:
             session.flush()
-        if events & selectors.EVENT_READ and session.is_read:
+        if events & selectors.EVENT_READ and self._is_read(session):
             session.receive(self._clock.monotonic())
             if session.has_ended:
                 self._requests.context.release(session)
@@ -289,6 +289,10 @@ class Publisher:
             _log.warning("slow client dropped", client=session.name)
         self._update_events(session)
 
+    def _is_read(self, session: ClientSession) -> bool:
+        """Whether more is received from a client: behind a line that waits only of the controller."""
+        return session.is_read and (not session.has_lines or session is self._requests.context.controller)
+
     def _update_events(self, session: ClientSession) -> None:
         """Ask for what a client is ready for; forget one that has gone.
 
@@ -301,7 +305,7 @@ class Publisher:
         connection = session.connection
         registered = connection in self._selector.get_map()
         events = selectors.EVENT_WRITE if session.has_unsent else 0
-        if session.is_read:
+        if self._is_read(session):
             events |= selectors.EVENT_READ
         if registered and (not session.open or not events):
             self._selector.unregister(connection)

@@ -58,7 +58,7 @@ class ZeroCapture:
         accept: Callable[[str], object] = lambda gauge: None,
         ports: Mapping[str, str] = _NO_PORTS,
     ) -> None:
-        """`accept`: as in `Requests`; who takes zero has looked at the machine, and accepts every gauge. `ports`: the
+        """`accept`: as in `Requests`; who takes zero has looked at the machine, and accepts every length. `ports`: the
         lasting name of each gauge's port."""
         self._ports = ports
         self._accept = accept
@@ -100,7 +100,7 @@ class ZeroCapture:
             _log.warning("machine zero refused", reason=reason, exc_info=True)
             return ProtocolError(ErrorCode.ZERO_REFUSED, reason).to_json()
         self._commands.zero = zero
-        self._accept("all")
+        self._accept_lengths()
         without = [name for name in self._wires.quantity_names if name not in zero.quantities]
         if without:
             _log.warning("machine zero is without quantities that could not be read", quantities=", ".join(without))
@@ -138,7 +138,7 @@ class ZeroCapture:
                     next_step="where it was refused, take it again: `compd zero`",
                 )
             )
-            self._accept("all")
+            self._accept_lengths()
             self._wait_until_believed()
         taken_at = datetime.now(UTC).isoformat(timespec="seconds")
         zero = MachineZero(self._zero_hash, taken_at, *self.sample(), self._ports)
@@ -151,6 +151,11 @@ class ZeroCapture:
                 f"more than {LARGEST_CHANGE_MM:g} mm from the machine zero of {before.taken_at}: {_named(changed_mm)}",
             )
         return zero, changed_mm
+
+    def _accept_lengths(self) -> None:
+        """What a quantity is does not count from zero: one that is not believed stays so, and zero is without it."""
+        for wire in self._wires.length_wires:
+            self._accept(wire.channel)
 
     def _distrusted(self) -> list[str]:
         """Each length gauge that is not believed, with the reason."""

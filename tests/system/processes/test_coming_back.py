@@ -14,7 +14,7 @@ from tests.injection.rig import InjectedMachine
 from tests.injection.trial import BACK_WITHIN_S, settle
 from tests.support.process_checks import is_ok, started_again, starts
 from tests.support.simulated import run_directory
-from tests.support.watching import PATIENCE_S, until
+from tests.support.watching import PATIENCE_S, Seen, until
 
 # At rest a valid setpoint is nearer to the truth.
 NOISE_UM = 10.0
@@ -71,9 +71,10 @@ def test_where_no_gauge_has_changed_nobody_is_asked(injected: InjectedMachine, g
     settle(injected)
     for _ in range(3):
         gap(injected, lambda machine: None)
-        again_s = time.monotonic()
         with injected.watched() as watcher:
-            watcher.until(
-                "ok from new readings", lambda seen: is_ok(seen) and seen["time_s"] - seen["age_s"] > again_s, 0
-            )
+            watcher.until("ok from new readings", _read_since(time.monotonic()), 0)
             assert injected.judge(watcher.seen).worst_um < NOISE_UM
+
+
+def _read_since(begin_s: float) -> Callable[[Seen], bool]:
+    return lambda seen: is_ok(seen) and seen["time_s"] - seen["age_s"] > begin_s

@@ -56,6 +56,19 @@ def test_what_is_absent_counts_in_the_bound_of_the_tip_s_error(tripod):
     assert error_um > 10.0, "30 um of the frame are not corrected any more"
 
 
+def test_how_far_the_machine_has_gone_since_a_group_was_read_counts_in_the_bound():
+    """A frame that nobody reads bends elsewhere by another amount, also when the machine stands there."""
+    tripod = with_noise(machine(on_stale="degrade", tip_error_um=None), 0.1)
+    tripod.settle()
+    tripod.faults |= dict.fromkeys(FRAME, Quality.LINE_LOST)
+    there_um = after_fade(tripod)[-1].values.u_tip_um
+    for k in range(100):
+        tripod.change_mm["scale_1.position"] = 0.1 * min(k, 50)
+        setpoint = tripod.step()
+    assert setpoint.valid
+    assert setpoint.values.u_tip_um > there_um + 100.0
+
+
 def test_what_a_faded_set_does_not_correct_counts_in_the_bound():
     tripod = with_noise(machine(on_stale="fade"), 0.1)
     tripod.change_mm |= {"joints.1": 0.02, "cabinet.t1": 0.03}

@@ -158,7 +158,15 @@ def test_a_length_that_has_just_come_to_rest_may_have_left_again():
         assert (age_bound_mm(reading, 10.0 + age_s) > 0.49 * A_MM_PER_S2 * age_s**2) == departs
 
 
-def test_a_late_sample_makes_the_speed_uncertain_and_the_place():
+def test_readings_of_one_time_have_no_speed():
+    """A source's clock has whole tenths of a second."""
+    history = [GaugeSample(0.0, t, 1e-3) for t in (9.7, 9.8, 9.9)] + [
+        GaugeSample(1e-5 * k, 10.0, 1e-3) for k in range(3)
+    ]
+    assert estimated_motion(history, TOLERANCE_MM).speed_mm_per_s == 0.0
+
+
+def test_a_late_sample_makes_the_speed_uncertain():
     """The first and the last reading of a window, each late by up to 10 ms: uniformly distributed delays."""
     rng, at_s = np.random.default_rng(6), np.arange(2) * ROUND_S
     shown = estimated_motion([GaugeSample(50.0 * t, t, 0.01) for t in ROUND_S * np.arange(12)], TOLERANCE_MM)

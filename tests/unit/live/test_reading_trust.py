@@ -396,6 +396,20 @@ def test_an_order_that_is_older_than_a_loss_says_nothing_of_what_comes_back(shop
     assert shop.reading("scale_1").ok
 
 
+def test_an_order_waits_until_two_answers_agree(shop):
+    """It shakes while the person accepts it, and is believed when it stands."""
+    shop.poll(20)
+    shop.shows["scale_1"] = lambda time_s: 5.0 + 0.2 * math.sin(900.0 * time_s)
+    shop.poll(2)
+    shop.memory.accept("scale_1")
+    shop.poll(2)
+    i = shop.memory.index["scale_1.value"]
+    assert shop.memory.obeyed[i] < shop.memory.accepted[i]
+    shop.shows["scale_1"] = lambda _: 5.0
+    shop.poll(2)
+    assert shop.reading("scale_1").ok
+
+
 def test_an_absolute_gauge_needs_no_acceptance():
     shop = Shop(returns_by_itself=True)
     shop.poll(20)

@@ -55,7 +55,7 @@ class Votes:
         self._zero_mm = zero_mm
         self._setpoint_line = setpoint_line
         self._votes = _votes(settings, signal_period_mm)
-        self._remarks: dict[str, str] = {}
+        self._remarks: dict[str, str] = memory.warnings.read() or {}  # as the process before has left them
         for i in range(len(self._wired)):
             memory.suspected[i] = False  # of an acquisition that has ended: its evidence went with it
         # the messages are parsed only for votes that look at them
