@@ -33,6 +33,7 @@ from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.nuisance import nuisance_beside
 from compd.comparison.outliers import outlier_rows
+from compd.comparison.quantity_ranges import Ranges, quantity_ranges
 from compd.comparison.statistics.cluster_covariance import cluster_covariance
 from compd.comparison.statistics.least_squares import solve_least_squares
 from compd.comparison.statistics.robust import huber_weights
@@ -64,6 +65,7 @@ class FitResult:
     used : (N,) rows that the fit rests on.
     outlier : (N,) rows with a residual that no noise explains, left out of the fit.
     clusters : number of independent blocks that the standard errors rest on.
+    ranges : of each quantity that the effects read, in the rows that the parameters rest on.
     """
 
     fitted: tuple[FittedEffect, ...]
@@ -73,6 +75,7 @@ class FitResult:
     used: BoolArray
     outlier: BoolArray
     clusters: int
+    ranges: Ranges
 
     @property
     def rms_um(self) -> float:
@@ -158,6 +161,7 @@ def fit(
         used=used,
         outlier=left_out if outlier is None else outlier,
         clusters=len(np.unique(block)),
+        ranges=quantity_ranges(initial, aligned.rows, used),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from compd.arrays import FloatArray
 from compd.compensation.values import GaugeValues, Wanted, WarmStart
 from compd.errors import CompdError, Problem
 from compd.model.machine import MachineModel
+from compd.model.reference_conditions import value_at_zero
 
 
 class Rows(NamedTuple):
@@ -48,7 +49,10 @@ def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wante
     for place, name in enumerate(names):
         quantities[:, place] = _quantity(values.quantities, name)
     if references:
-        quantities[:, len(names) :] = _references(references, values.quantities_at_zero)
+        at_zero = values.quantities_at_zero
+        quantities[:, len(names) :] = [
+            value_at_zero(name, at_zero) if value is None else value for name, value in references
+        ]
     wanted_mm, attitude_M_P = np.empty((count, 6)), np.empty((count, 3, 3))
     if wanted:
         wanted_mm[:, :3] = _row_copy(wanted.tip_M_mm, lead, 1)
@@ -77,22 +81,6 @@ def _row_copy(values: FloatArray, lead: tuple[int, ...], core: int) -> FloatArra
         return np.array(values, dtype=np.float64, ndmin=core + 1)
     shape = values.shape[values.ndim - core :]
     return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64).reshape(math.prod(lead), *shape)
-
-
-def _references(references: Sequence[tuple[str, float | None]], at_zero: Mapping[str, float]) -> list[float]:
-    """From which values effects count. Raises CompdError for a quantity that was not measured at machine zero."""
-    try:
-        return [at_zero[name] if value is None else value for name, value in references]
-    except KeyError as error:
-        raise CompdError(
-            Problem(
-                where="rows for effects",
-                what="this quantity was not measured at machine zero, from where effects count",
-                value=str(error.args[0]),
-                allowed=", ".join(sorted(at_zero)) or "nothing was",
-                next_step="take machine zero again: `compd zero`",
-            )
-        ) from error
 
 
 def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:

@@ -21,11 +21,10 @@ from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effect import Effect, FittedEffect
 from compd.model.effect_basis import counted_from, recounted
-from compd.model.effect_needs import needed_quantities
 from compd.model.library import load_library
 from compd.model.observations import Observations
 from compd.model_file.model_document import Declaration, Kind, ModelStep, StoredModel
-from compd.model_file.model_file import ModelFile, Range
+from compd.model_file.model_file import ModelFile
 
 # What makes of a fit, and the standard deviations (m,) of the noise that it was weighed by, a better one.
 Refinement: TypeAlias = Callable[[FitResult, FloatArray], FitResult]
@@ -57,7 +56,8 @@ def add(
             )
         )
     before = compare(aligned, model.fitted, model.covariance)
-    result = search_constants(aligned, model.fitted, counted_from(effect, aligned.rows), before.floor.by_axis_um)
+    kept = _as_counted(model.fitted, aligned.rows)
+    result = search_constants(aligned, kept, counted_from(effect, aligned.rows), before.floor.by_axis_um)
     extended = replace(model, declared=(*model.declared, declared))
     return _changed(extended, model, refine(result, before.floor.by_axis_um), before, "add", effect.id)
 
@@ -78,7 +78,8 @@ def remove(model: ModelFile, effect_id: str, aligned: AlignedRecording, refine: 
         )
     k = ids.index(effect_id)
     before = compare(aligned, model.fitted, model.covariance)
-    result = fit(aligned, model.fitted[:k] + model.fitted[k + 1 :], before.floor.by_axis_um)
+    kept = _as_counted(model.fitted[:k] + model.fitted[k + 1 :], aligned.rows)
+    result = fit(aligned, kept, before.floor.by_axis_um)
     reduced = replace(model, declared=model.declared[:k] + model.declared[k + 1 :])
     return _changed(reduced, model, refine(result, before.floor.by_axis_um), before, "remove", effect_id)
 
@@ -158,21 +159,15 @@ def _changed(
         covariance=np.asarray(result.covariance),
         steps=(*old.steps, step),
         geometry=aligned.geometry_hash,  # all numbers were fitted on it
-        fitted_range=_fitted_range(result.fitted, aligned.rows),
+        fitted_range=result.ranges,
         plausible={id_: ranges for id_, ranges in model.plausible.items() if id_ in fitted_ids},
         warnings=(),
     )
 
 
-def _fitted_range(fitted: Sequence[FittedEffect], rows: Observations) -> dict[str, Range]:
-    """Lowest and highest value in these rows of each quantity that the effects read."""
-    ranges = {}
-    for effect in fitted:
-        for name in needed_quantities(effect.effect, rows.links):
-            values = rows.quantities.get(name, np.array([]))
-            if np.isfinite(values).any():
-                ranges[name] = float(np.nanmin(values)), float(np.nanmax(values))
-    return ranges
+def _as_counted(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[FittedEffect, ...]:
+    """The effects as they count in the rows on which they are fitted again."""
+    return tuple(replace(each, effect=counted_from(each.effect, rows)) for each in fitted)
 
 
 def _now() -> str:

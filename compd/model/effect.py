@@ -233,10 +233,11 @@ class Effect:
     registration : bool
         A rigid motion of the reference's whole frame, as laying two frames over one another takes away.
     counts_from : str
-        From which conditions what it adds counts. ``"machine zero"``: from the measured quantities there, so that it
-        adds nothing while they are as they were then. ``"20 degC"``: from 20 degC, 1013.25 hPa and 0 of anything else,
-        as in releases up to 0.2; so it is where nobody knows the quantities at machine zero. ``"its own"``: it has a
-        reference of its own, as a graduation that is true at 20 degC, or needs no measured quantity.
+        From which conditions what it adds counts. ``"machine zero"``: from the measured quantities there, so that a
+        column of the basis that one of them changes adds nothing while they are as they were then. ``"20 degC"``: from
+        20 degC, 1013.25 hPa and 0 of anything else, as in releases up to 0.2; so it is where nobody knows the
+        quantities at machine zero. ``"its own"``: it has a reference of its own, as a graduation that is true at 20
+        degC, or needs no measured quantity.
     declared : str or dict
         What a model file names it by: the mapping that it was declared with as a formula, or
         ``"/absolute/file.py:NAME"``; ``""`` for its id.

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from compd.arrays import FloatArray
+from compd.arrays import BoolArray, FloatArray
 from compd.errors import CompdError, Problem
 from compd.model.effect import Basis, BasisProgram, ConstantValues, Effect, Memory, Port
 from compd.model.effect_needs import is_measured, needed_quantities
@@ -20,6 +20,8 @@ from compd.model.reference_conditions import standard_value
 
 # Rows whose structures exist at the same time: of 4000, they take 8 MB.
 _ROWS_AT_ONCE = 4000
+# Rows, spread evenly, in which an effect in Python is asked whether quantities change it.
+_ROWS_TO_TRY = 8
 
 
 def port_sizes(links: int, joints: int, axes: int) -> dict[Port, int]:
@@ -100,13 +102,49 @@ def recounted(effect: Effect, rows: Observations) -> Effect:
 def _python_basis(
     effect: Effect, basis: Basis, rows: Observations, constants: ConstantValues, memory: Memory
 ) -> tuple[FloatArray, Memory]:
-    """Of an effect in Python, less what it adds at machine zero where it counts from there."""
+    """Of an effect in Python; where it counts from machine zero, less what these rows give with the quantities there.
+
+    Its memory has then the effect's own arrays and, behind them, those of the rows with the quantities at machine zero.
+    """
     if effect.counts_from != "machine zero":
         return basis(rows if rows.quantities_at_zero is None else rows.from_standard, constants, memory)
-    values, after = basis(rows, constants, memory)
-    if is_measured(effect):
-        values = values - basis(rows.at_machine_zero, constants, None)[0]
-    return values, after
+    if not is_measured(effect):
+        return basis(rows, constants, memory)
+    for name in needed_quantities(effect, rows.links):
+        if name in rows.quantities:
+            rows.reference_value(name)  # raises where it was not measured at machine zero
+    own, at_zero = (None, None) if memory is None else (memory[: len(memory) // 2], memory[len(memory) // 2 :])
+    values, own = basis(rows, constants, own)
+    reference, at_zero = basis(rows.with_quantities_at_zero, constants, at_zero)
+    after = None if own is None or at_zero is None else (*own, *at_zero)
+    if not reference.any():
+        return values, after
+    counted = (values != reference).any(axis=(0, 1)) | _changed_by_quantities(basis, rows, constants)
+    return values - np.where(counted, reference, 0.0), after
+
+
+def _changed_by_quantities(basis: Basis, rows: Observations, constants: ConstantValues) -> BoolArray:
+    """(P,) which columns other quantities than those at machine zero change, in some of the rows.
+
+    The rows' own quantities do not say it where they are as they were at machine zero. The rows are without history:
+    in its first row a lag shows what goes into it.
+    """
+    few = rows.select(np.unique(np.linspace(0, len(rows) - 1, _ROWS_TO_TRY).astype(np.int64)))
+    few = replace(few, session_start=np.ones(len(few), dtype=bool))
+    reference, _ = basis(few.with_quantities_at_zero, constants, None)
+    changed = np.zeros(reference.shape[2], dtype=bool)
+    for sign in (1.0, -1.0):
+        # each by another amount: a difference of two quantities changes, too
+        other = {
+            name: values + sign * (1.0 + 0.1 * place)
+            for place, (name, values) in enumerate(few.with_quantities_at_zero.quantities.items())
+        }
+        try:
+            with np.errstate(all="ignore"):
+                changed |= (basis(replace(few, quantities=other), constants, None)[0] != reference).any(axis=(0, 1))
+        except (ArithmeticError, LookupError, ValueError):
+            changed[:] = True  # a value that it does not take is one that it reads, in which columns nobody knows
+    return changed
 
 
 def program_numbers(effect: Effect, program: BasisProgram, constants: ConstantValues) -> FloatArray:

@@ -14,7 +14,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import CompdError, Problem
 from compd.model.kernels.rotation import to_outer
 from compd.model.kinematics import Mechanism
-from compd.model.reference_conditions import standard_value
+from compd.model.reference_conditions import standard_value, value_at_zero
 from compd.model.statics import link_forces
 from compd.model.tool import Arrangement, Contact
 
@@ -204,17 +204,7 @@ class Observations:
         """
         if self.quantities_at_zero is None:
             return standard_value(name)
-        if name not in self.quantities_at_zero:
-            raise CompdError(
-                Problem(
-                    where="rows for effects",
-                    what="this quantity was not measured at machine zero, from where effects count",
-                    value=name,
-                    allowed=", ".join(sorted(self.quantities_at_zero)) or "nothing was",
-                    next_step="take machine zero with it, or write it into the sidecar under `quantities_at_zero:`",
-                )
-            )
-        return self.quantities_at_zero[name]
+        return value_at_zero(name, self.quantities_at_zero)
 
     def since_zero(self, name: str) -> FloatArray:
         """(N,) a quantity less its `reference_value`."""
@@ -226,31 +216,20 @@ class Observations:
         return replace(self, quantities_at_zero=None)
 
     @cached_property
-    def at_machine_zero(self) -> Observations:
-        """One row: the machine at machine zero, at rest, with its quantities there; time 0."""
-        zero, at_zero = self.constants.zero, self.quantities_at_zero
-        assert zero is not None, "effects count from machine zero where the kinematics is known"
-        assert at_zero is not None, "and where the quantities there are known"
-        n, k = self.links, self.joint_mm.shape[1]
-        return Observations(
-            constants=self.constants,
-            scale_mm=np.zeros((1, n)),
-            joint_mm=np.zeros((1, k)),
-            frame_mm=np.zeros((1, 9)),
-            quantities={name: np.array([value]) for name, value in at_zero.items()},
-            time_s=np.zeros(1),
-            session_start=np.ones(1, dtype=bool),
-            direction=np.zeros((1, n)),
-            velocity_mm_per_s=np.zeros((1, n)),
-            joint_velocity_mm_per_s=np.zeros((1, k)),
-            link_mm=zero.link_length_mm[None],
-            directions_M=self.constants.zero_directions_M[None],
-            base_joints_M_mm=zero.base_joints_M_mm[None],
-            origin_M_mm=zero.platform_origin_M_mm[None],
-            rotation_M_P=zero.rotation_M_P[None],
-            tip_M_mm=zero.contact.tip_M_mm[None],
-            quantities_at_zero=at_zero,
-        )
+    def with_quantities_at_zero(self) -> Observations:
+        """The same rows, in each of which every quantity is what it was at machine zero.
+
+        Their `axial_force_N` is that of the pose at machine zero, too: a load that hung there is in the zero.
+        """
+        at_zero = self.quantities_at_zero
+        assert at_zero is not None, "effects count from machine zero where the quantities there are known"
+        rows = replace(self, quantities={name: np.full(len(self), value) for name, value in at_zero.items()})
+        if all(f"force_{axis}_N" in at_zero for axis in "xyz"):
+            c = self.constants
+            axial_N = c.zero_axial_force_N + c.zero_axial_per_force @ [at_zero[f"force_{axis}_N"] for axis in "xyz"]
+            # where a cached property keeps its value: it is not computed from these rows' poses then
+            rows.__dict__["axial_force_N"] = np.tile(axial_N, (len(self), 1))
+        return rows
 
     def warming_K(self, place: str) -> FloatArray:
         """(N,) `temperature_<place>_degC` since machine zero; above 20 degC where that is not known."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal, TypeAlias
+
+from compd.errors import CompdError, Problem
 
 # ISO 1: lengths are stated at 20 degC.
 REFERENCE_TEMPERATURE_degC = 20.0
@@ -17,3 +20,22 @@ def standard_value(quantity: str) -> float:
     """What a quantity is at standard conditions, by the unit in its name: 20 degC, 1013.25 hPa, 0 of anything else."""
     unit = quantity.rpartition("_")[2]
     return {"degC": REFERENCE_TEMPERATURE_degC, "hPa": REFERENCE_PRESSURE_hPa}.get(unit, 0.0)
+
+
+def value_at_zero(quantity: str, at_zero: Mapping[str, float]) -> float:
+    """What a quantity was at machine zero, of all that are known there.
+
+    Raises CompdError where it was not measured then.
+    """
+    if quantity not in at_zero:
+        raise CompdError(
+            Problem(
+                where="rows for effects",
+                what="this quantity was not measured at machine zero, from where effects count",
+                value=quantity,
+                allowed=", ".join(sorted(at_zero)) or "nothing was",
+                next_step="take machine zero again: `compd zero`; in a recording write it into its sidecar, under "
+                "`quantities_at_zero:`",
+            )
+        )
+    return at_zero[quantity]

@@ -168,8 +168,8 @@ class ModelDocument(FilePart):
     )
     fitted_range: Annotated[dict[str, _Range], _EmptyMapping] = Field(
         default={},
-        description="lowest and highest value of each quantity that the effects read, in the recording that they were "
-        "fitted on; beyond it the daemon computes with the nearer end",
+        description="lowest and highest value of each quantity that the effects read, in the rows that they were "
+        "fitted to; beyond it the daemon computes with the nearer end",
     )
     steps: Annotated[list[ModelStep], _EmptyList] = Field(
         default=[], description="every step by which the model came to be, the last one last"

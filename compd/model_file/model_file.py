@@ -105,8 +105,8 @@ class ModelFile:
     geometry : str
         Hash of the geometry that it was fitted on; ``""`` where that is not known.
     fitted_range : dict
-        Lowest and highest value of each quantity that the effects read, in the recording that they were fitted on, by
-        the quantity's name; empty where that is not known. Beyond it the daemon computes with the nearer end.
+        Lowest and highest value of each quantity that the effects read, in the rows that they were fitted to, by the
+        quantity's name; empty where that is not known. Beyond it the daemon computes with the nearer end.
     plausible : dict
         Ranges that a person means in place of the effects' own, by the effect's id and the number's name.
     warnings : tuple of Problem

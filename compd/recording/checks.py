@@ -249,11 +249,14 @@ def _reference_and_place(columns: Iterable[str]) -> list[tuple[list[str], list[s
 
 
 def _different_places(where_mm: FloatArray) -> int:
-    """How many places these rows (N, d) are at, each further than `_PLACE_MM` from the one before."""
+    """How many cells of a grid of `_PLACE_MM` these rows (N, d) are in; 1 where all are within one cell's width.
+
+    Rows with an empty cell say nothing of where they are.
+    """
     known = where_mm[np.isfinite(where_mm).all(axis=1)]
-    return (
-        len(np.unique(np.round(known / _PLACE_MM), axis=0)) if np.ptp(known, axis=0).max(initial=0) > _PLACE_MM else 1
-    )
+    if len(known) < 2 or np.ptp(known, axis=0).max(initial=0) <= _PLACE_MM:
+        return 1
+    return len(np.unique(np.round(known / _PLACE_MM), axis=0))
 
 
 def _check_limits(table: Table, problems: ProblemList) -> None:

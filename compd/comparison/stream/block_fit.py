@@ -20,6 +20,7 @@ from compd.comparison.fit import CONVERGED, LEAST_RMS_UM, STEPS, FitResult
 from compd.comparison.initial_states import initial_states
 from compd.comparison.nuisance import nuisance_columns
 from compd.comparison.outliers import OutlierLimits, outlier_limits
+from compd.comparison.quantity_ranges import Ranges, joined_ranges, quantity_ranges
 from compd.comparison.statistics.least_squares import solve_least_squares
 from compd.comparison.statistics.robust import huber_weights, robust_sigma
 from compd.comparison.stream.block_queue import HandOver, computed_blocks
@@ -53,14 +54,15 @@ def fit_blocks(
     sample : of the stream.  start : the fit on it.  weight_sigma_um : (m,) that it was weighed by.
     progress : called with the number of rows of a pass that are done, after each block; there are two to five passes.
 
-    Parameters, covariance and clusters of the result are of all rows, its residual and the rows used of the sample.
+    Parameters, covariance, clusters and ranges of the result are of all rows, its residual and the rows used of the
+    sample.
     Raises RecordingError with the problems of the recording.
     """
     system = _system(sample, start, weight_sigma_um, criteria)
     theta = np.concatenate([np.zeros(0), *(effect.theta for effect in start.fitted)])
     nuisance = system.start_nuisance
     for _ in range(STEPS):
-        normals = _normals(stream, sample, system, start.fitted, theta, nuisance, progress)
+        normals, ranges = _normals(stream, sample, system, start.fitted, theta, nuisance, progress)
         step, change = normals.step(len(theta))
         theta, nuisance = theta + step[: len(theta)], nuisance + step[len(theta) :]
         if change <= CONVERGED * max(np.sqrt(normals.squares / normals.values), LEAST_RMS_UM):
@@ -75,6 +77,7 @@ def fit_blocks(
         ),
         covariance=covariance,
         clusters=normals.clusters,
+        ranges=ranges,
     )
 
 
@@ -130,8 +133,8 @@ def _normals(
     theta: FloatArray,
     nuisance: FloatArray,
     progress: Callable[[int], None],
-) -> ClusterNormals:
-    """The normal equations at these parameters, over all rows."""
+) -> tuple[ClusterNormals, Ranges]:
+    """The normal equations at these parameters, over all rows, and the ranges of the quantities in those used."""
     ends = np.cumsum([0, *(len(effect.theta) for effect in fitted)])
     effects = [replace(effect, theta=theta[a:b]) for effect, a, b in zip(fitted, ends[:-1], ends[1:], strict=True)]
     clusters = RowClusters(sample)
@@ -142,20 +145,23 @@ def _normals(
 
     def compute(
         numbered_block: tuple[Block, IntArray], hand_over: HandOver[CarriedState]
-    ) -> tuple[ClusterNormals, int]:
+    ) -> tuple[ClusterNormals, Ranges, int]:
         block, cluster = numbered_block
         aligned = align_block(block, sample.aligned)
         rows, carried = advance_effects(effects, aligned.rows, system.keys, hand_over.take())
         hand_over.give(carried)
         session = session_places(sample.starts_s, aligned.rows.time_s)
-        return _block_normals(aligned, effects, rows, system, nuisance, cluster, session), aligned.recording.rows
+        normals, used = _block_normals(aligned, effects, rows, system, nuisance, cluster, session)
+        return normals, quantity_ranges(effects, aligned.rows, used), aligned.recording.rows
 
     totals, done = ClusterNormals(), 0
-    for normals, rows in computed_blocks(numbered(), compute, NOTHING_CARRIED):
+    ranges: Ranges = {}
+    for normals, of_block, rows in computed_blocks(numbered(), compute, NOTHING_CARRIED):
         totals.add(normals)
+        ranges = joined_ranges(ranges, of_block)
         done += rows
         progress(done)
-    return totals
+    return totals, ranges
 
 
 def _block_normals(
@@ -166,8 +172,8 @@ def _block_normals(
     nuisance: FloatArray,
     cluster: IntArray,
     session: IntArray,
-) -> ClusterNormals:
-    """The normal equations of a block.
+) -> tuple[ClusterNormals, BoolArray]:
+    """The normal equations of a block, and the rows (N,) that they are of.
 
     cluster, session : (N,) of each row, the session by its place.
     """
@@ -190,4 +196,4 @@ def _block_normals(
     weight = huber_weights(whitened[used], scale=lambda _: system.scale)
     normals = ClusterNormals()
     normals.add_rows(G_um[used] / system.sigma_um[:, None], whitened[used], weight, cluster[used])
-    return normals
+    return normals, used

@@ -120,7 +120,11 @@ def write_probed_recording(path: Path, gauges: Sequence[Path], rounds: Sequence[
     columns = {name: [row.get(name, np.nan) for row in rows] for name in (rows[0] if rows else {})}
     columns["time_s"] = [row["time_s"] - origin_s for row in rows]
     sidecar = sidecar_contents(
-        "hexapod", {"quantity": "tool_position", "frame": "machine", "sigma_um": SIGMA_um}, folds=["session"]
+        "hexapod",
+        {"quantity": "tool_position", "frame": "machine", "sigma_um": SIGMA_um},
+        folds=["session"],
+        # machine zero is taken once, before the first part
+        quantities_at_zero=_sidecar(gauges[0]).get("quantities_at_zero") if gauges else None,
     )
     write_recording(path, columns, sidecar, overwrite=True)
     return len(rows)
@@ -128,11 +132,15 @@ def write_probed_recording(path: Path, gauges: Sequence[Path], rounds: Sequence[
 
 def _recorded(part: Path) -> tuple[FloatArray, list[dict[str, str]]]:
     """Times (CLOCK_MONOTONIC, s) and cells of a part that `compd record` has written."""
-    sidecar: Mapping[str, Any] = yaml.safe_load(part.with_suffix(".yaml").read_text())
     with part.open(newline="") as file:
         rows = list(csv.DictReader(file))
     times_s = np.array([float(row["time_s"]) for row in rows])
-    return times_s - times_s[:1] + sidecar["provenance"]["started_at_monotonic_s"], rows
+    return times_s - times_s[:1] + _sidecar(part)["provenance"]["started_at_monotonic_s"], rows
+
+
+def _sidecar(part: Path) -> Mapping[str, Any]:
+    contents: Mapping[str, Any] = yaml.safe_load(part.with_suffix(".yaml").read_text())
+    return contents
 
 
 def _between(

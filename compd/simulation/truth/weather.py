@@ -17,7 +17,7 @@ MIDDLE_HUMIDITY_pct = 50.0
 class AirAtZero(NamedTuple):
     """The air when machine zero is taken, at time 0; machine and parts have its temperature then."""
 
-    temperature_degC: float = 20.0
+    temperature_degC: float = REFERENCE_degC
     pressure_hPa: float = STANDARD_PRESSURE_hPa
     humidity_pct: float = MIDDLE_HUMIDITY_pct
 

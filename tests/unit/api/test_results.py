@@ -109,7 +109,7 @@ def test_a_model_keeps_the_range_that_it_was_fitted_in(
 ) -> None:
     assert list(model.fitted_range) == [f"temperature_link_{i}_degC" for i in (1, 2, 3)]
     for name, (low, high) in model.fitted_range.items():
-        values = recording.rows.quantities[name]
+        values = recording.rows.quantities[name][recording.usable.mask]
         assert low == values.min() < values.max() == high
     model.write(tmp_path / "model.yaml")
     opened = compd.open_model(tmp_path / "model.yaml")

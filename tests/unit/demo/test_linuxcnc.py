@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from compd.demo.linuxcnc.artefact import (
     CLEAR_mm,
@@ -101,6 +102,17 @@ def test_a_probed_recording_has_the_gauges_of_each_mark_and_the_calibrated_place
     assert (first["scale_1_mm"], second["scale_1_mm"]) == (7.0, 9.0)
     assert (first["session"], first["point"], second["point"]) == (1, 1, 2)
     assert [second[f"reference_{axis}_mm"] for axis in "xyz"] == [place + CLEAR_mm for place in CORNERS_mm[1]]
+
+
+@pytest.mark.parametrize("at_zero", [None, {"temperature_link_1_degC": 23.5, "pressure_hPa": 987.0}])
+def test_a_probed_recording_counts_from_where_its_gauges_do(tmp_path: Path, at_zero: dict[str, float] | None) -> None:
+    write_log(tmp_path / "motion.log", ((1002.5, 1002.9),))
+    sidecar = sidecar_contents("hexapod", provenance={"started_at_monotonic_s": 1000.0}, quantities_at_zero=at_zero)
+    columns = {"time_s": np.arange(0.0, 5.0, 0.1), "scale_1_mm": np.zeros(50)}
+    write_recording(tmp_path / "gauges-0001.csv", columns, sidecar)
+    samples = read_motion_log(tmp_path / "motion.log")
+    assert write_probed_recording(tmp_path / "probed.csv", [tmp_path / "gauges-0001.csv"], [samples]) == 1
+    assert yaml.safe_load((tmp_path / "probed.yaml").read_text()).get("quantities_at_zero") == at_zero
 
 
 def test_a_feed_that_was_held_counts_as_no_error_and_gives_no_row(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from compd.compensation.compensation import compensate_cmm, compensate_machine_t
 from compd.compensation.values import GaugeValues, WarmStart
 from compd.errors import CompdError
 from compd.model.deltas import effect_deltas
-from compd.model.effect import ConstantValues, Effect, FittedEffect, memoryless_basis
+from compd.model.effect import ConstantValues, Effect, FittedEffect, Memory, memoryless_basis
 from compd.model.effect_basis import evaluate_basis, recounted
 from compd.model.effect_needs import is_measured, unmet_needs
 from compd.model.library import BUNDLED
@@ -43,6 +43,9 @@ FORMULAS = [
     written("k * axial_force_N"),
     written("k * force_x_N * temperature_tool_degC", "tool", axis="x"),
 ]
+
+
+MIXED = written("k * scale_mm + c * temperature_platform_degC * scale_mm + d", parameters="k c d")
 
 
 def _with_root(rows: Observations, constants: ConstantValues) -> Floats:
@@ -107,7 +110,6 @@ def test_a_link_grows_with_its_length_there_by_what_it_is_warmer_than_at_zero(mo
 
 
 def test_a_term_without_a_measured_quantity_stays_as_it_is() -> None:
-    effect = written("k * scale_mm + c * temperature_platform_degC * scale_mm + d", parameters="k c d")
     at_zero = zero_conditions(TRIPOD, 23.0)
     rows = rows_at_tips(
         TRIPOD,
@@ -115,10 +117,97 @@ def test_a_term_without_a_measured_quantity_stays_as_it_is() -> None:
         {**at_zero, "temperature_platform_degC": at_zero["temperature_platform_degC"] + 2},
         quantities_at_zero=at_zero,
     )
-    basis, _ = evaluate_basis(effect, rows, {}, None)
+    basis, _ = evaluate_basis(MIXED, rows, {}, None)
     assert basis[:, :, 0] == pytest.approx(1e-3 * rows.scale_mm)
     assert basis[:, :, 1] == pytest.approx(2e-3 * rows.scale_mm)
     assert basis[:, :, 2] == pytest.approx(1e-3)
+
+
+def _ones(rows: Observations) -> Floats:
+    return np.ones((len(rows), rows.links))
+
+
+TWINS: list[tuple[Effect, Callable[[Observations], list[Floats]]]] = [
+    (
+        written("k * link_mm * temperature_platform_degC"),
+        lambda rows: [rows.link_mm * rows.quantity("temperature_platform_degC")[:, None]],
+    ),
+    (
+        written("k * exp(temperature_platform_degC / 10) * scale_mm"),
+        lambda rows: [np.exp(rows.quantity("temperature_platform_degC") / 10)[:, None] * rows.scale_mm],
+    ),
+    (written("k * axial_force_N"), lambda rows: [rows.axial_force_N]),
+    (
+        MIXED,
+        lambda rows: [
+            rows.scale_mm,
+            rows.quantity("temperature_platform_degC")[:, None] * rows.scale_mm,
+            _ones(rows),
+        ],
+    ),
+]
+
+
+@MACHINES
+@pytest.mark.parametrize("warmer_K", [0.0, 2.0])
+@pytest.mark.parametrize("twins", TWINS, ids=lambda twins: twins[0].equation)
+def test_an_effect_in_python_counts_as_a_formula_does(
+    model: MachineModel, twins: tuple[Effect, Callable[[Observations], list[Floats]]], warmer_K: float
+) -> None:
+    """Away from machine zero, too; and a column that no quantity changes stays, as a formula's term does."""
+    formula, columns = twins
+    own = replace(formula, basis=memoryless_basis(lambda rows, _: 1e-3 * np.stack(columns(rows), axis=2)))
+    at_zero = zero_conditions(model, 23.0)
+    values = {name: value + warmer_K for name, value in at_zero.items()}
+    rows = rows_at_tips(model, tips(model, 6, 2, 60.0), values, quantities_at_zero=at_zero)
+    expected, _ = evaluate_basis(formula, rows, {}, None)
+    assert np.abs(expected).max() > 1e-6 or not warmer_K
+    found, _ = evaluate_basis(own, rows, {}, None)
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    each = [evaluate_basis(own, rows.select(slice(i, i + 1)), {}, None)[0] for i in range(len(rows))]
+    assert (np.concatenate(each) == found).all(), "the live loop computes row by row"
+
+
+def test_a_number_that_an_effect_in_python_looks_up_counts_from_that_at_zero() -> None:
+    """No other number than those of the table can be tried."""
+    table = np.array([5.0, 1.0, 2.0, 7.0])
+
+    def basis(rows: Observations, constants: ConstantValues) -> Floats:
+        shown: Floats = table[rows.quantity("gear").astype(int)][:, None, None] * _ones(rows)[:, :, None]
+        return shown
+
+    effect = replace(PYTHON, needs=("gear",), basis=memoryless_basis(basis))
+    for at_zero in (0.0, 3.0):
+        values = {"gear": np.array([0.0, 1.0, 2.0, 3.0])}
+        rows = rows_at_tips(TRIPOD, tips(TRIPOD, 4, 2, 60.0), values, quantities_at_zero={"gear": at_zero})
+        found, _ = evaluate_basis(effect, rows, {}, None)
+        assert found[:, 0, 0] == pytest.approx(table - table[int(at_zero)])
+
+
+def test_what_an_effect_in_python_remembers_counts_from_zero_too() -> None:
+    """A lag, in one column of what a quantity is part of, in the other of the pose alone: in one go and row by row."""
+
+    def basis(rows: Observations, constants: ConstantValues, memory: Memory) -> tuple[Floats, Memory]:
+        inputs = np.stack([rows.link_mm * rows.quantity("temperature_platform_degC")[:, None], rows.link_mm], axis=2)
+        shown, out = None if memory is None else memory[0], np.empty_like(inputs)
+        for i, value in enumerate(inputs):
+            shown = value.copy() if shown is None or rows.session_start[i] else shown + 0.3 * (value - shown)
+            out[i] = shown
+        return out, None if shown is None else (shown,)
+
+    effect = replace(PYTHON, remembers=True, parameters=LIBRARY["backlash"].parameters[:1] * 2, basis=basis)
+    at_zero = zero_conditions(TRIPOD, 23.0)
+    walk = at_zero["temperature_platform_degC"] + np.array([0.0, 0.0, 0.0, 1.0, 2.0, 2.0])
+    conditions = {**at_zero, "temperature_platform_degC": walk}
+    rows = rows_at_tips(TRIPOD, tips(TRIPOD, 6, 2, 60.0), conditions, quantities_at_zero=at_zero)
+    found, _ = evaluate_basis(effect, rows, {}, None)
+    assert found[:3, :, 0] == pytest.approx(0.0, abs=1e-9), "the pose changes, the quantity does not"
+    assert found[3, :, 0] == pytest.approx(0.3 * rows.link_mm[3])
+    assert found[0, :, 1] == pytest.approx(rows.link_mm[0])
+    memory: Memory = None
+    for i in range(len(rows)):
+        value, memory = evaluate_basis(effect, rows.select(slice(i, i + 1)), {}, memory)
+        assert value[0] == pytest.approx(found[i], abs=1e-9)
 
 
 def test_a_formula_of_a_force_in_the_links_is_the_librarys_spring() -> None:
@@ -144,16 +233,19 @@ def test_a_scale_is_true_at_20_degC_and_an_interferometers_tables_too() -> None:
 
 @pytest.mark.parametrize("effect", [LIBRARY["link_expansion"], written("k * humidity_pct"), PYTHON])
 def test_a_quantity_that_zero_has_not_is_no_default(effect: Effect) -> None:
-    rows = row_at_zero(TRIPOD, quantities_at_zero={"pressure_hPa": 1000.0})
+    at_zero = {"pressure_hPa": 1000.0}
+    rows = row_at_zero(TRIPOD, quantities_at_zero=at_zero)
     needed = [problem.what for problem in unmet_needs(effect, rows.available, 3, rows.quantities_at_zero)]
     assert needed
     assert all("as it was at machine zero, where it was not measured" in what for what in needed)
-    with pytest.raises(CompdError):
+    with pytest.raises(CompdError) as in_rows:
         evaluate_basis(effect, rows, {}, None)
     live = replace(TRIPOD, effects=(FittedEffect(effect, np.ones(1)),), constants=machine_constants(TRIPOD, DETAILS))
     values = GaugeValues(np.zeros(3), np.zeros(9), np.zeros(9), {n: v[0] for n, v in rows.quantities.items()}, 0.0)
-    with pytest.raises(CompdError, match="at machine zero"):
+    values = values._replace(quantities_at_zero=at_zero)
+    with pytest.raises(CompdError, match="at machine zero") as in_loop:
         compensate_cmm(live, values, WarmStart.at_zero(live))
+    assert str(in_rows.value) == str(in_loop.value)
 
 
 @pytest.mark.parametrize("effect", [LIBRARY["link_expansion"], LIBRARY["link_elasticity"], *FORMULAS[:6], PYTHON])

@@ -63,6 +63,13 @@ def test_a_single_axis_and_empty_cells_are_not_looked_at() -> None:
     assert warnings_of(empty) == []
 
 
+def test_rows_of_which_nobody_knows_the_place_are_not_told() -> None:
+    """The same digits twice, and in each of the two rows a scale is empty."""
+    unplaced = table(slice(10, 12), "scales")
+    unplaced.columns["scale_1_mm"][10] = unplaced.columns["scale_3_mm"][11] = np.nan
+    assert warnings_of(unplaced) == []
+
+
 def test_a_link_that_is_frozen_is_told() -> None:
     columns = {"scale_2_mm": PLACES_MM[:, 0], "reference_link_2_mm": PLACES_MM[:, 0] + 480.0}
     columns["reference_link_2_mm"][10:40] = 481.25

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import inspect
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
+from compd.cli.simulated.campaign import campaign
+from compd.cli.simulated.simulate import simulate
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
 from compd.simulation.causes.catalogue import CAUSES, build_cause, possible_causes
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
-from compd.simulation.truth.weather import AirAtZero
+from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero, REFERENCE_degC
 from compd.simulation.truth.world import World
 
 MACHINES = pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
@@ -25,6 +28,12 @@ CONSTANT = {
     *("link_zero", "base_joint_position", "platform_joint_position", "tool_offset", "revolute_axis_tilt"),
     *("link_sag", "scale_cyclic", "reference_registration", "reference_air_index"),
 }
+
+
+@pytest.mark.parametrize("command", [simulate, campaign])
+def test_zero_is_taken_at_the_reference_temperature_unless_told_otherwise(command: Callable[..., None]) -> None:
+    """The commands state it as a number of their own: to import the simulation for it would slow every `--help`."""
+    assert inspect.signature(command).parameters["zero_degC"].default == STANDARD_AIR.temperature_degC == REFERENCE_degC
 
 
 load_machine = cache(lambda name: load(shipped_configuration(name)))

@@ -73,6 +73,9 @@ def test_from_a_small_sample_the_fit_of_all_rows_is_found(tmp_path: Path) -> Non
     )
     assert np.abs(other - theta).max() < 0.2 * np.abs(before - theta).max()
     assert (np.abs(other - theta) < 0.2 * std).all()
+    assert list(streamed.ranges) == [f"temperature_link_{i}_degC" for i in (1, 2, 3)]
+    assert streamed.ranges == whole.ranges, "an effect is fitted to all rows, not to those of the sample alone"
+    assert any(streamed.ranges[name] != start.ranges[name] for name in start.ranges)
 
 
 @pytest.mark.parametrize("drop", [(), ("visit",), ("session", "visit")], ids=["both", "no visits", "neither"])

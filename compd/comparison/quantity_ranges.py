@@ -1,0 +1,34 @@
+"""Between which values the quantities were that fitted effects read: beyond them, a fit is extrapolated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from compd.arrays import BoolArray
+from compd.model.effect import FittedEffect
+from compd.model.effect_needs import needed_quantities
+from compd.model.observations import Observations
+
+# Lowest and highest value of each quantity, by its name.
+Ranges: TypeAlias = Mapping[str, tuple[float, float]]
+
+
+def quantity_ranges(fitted: Sequence[FittedEffect], rows: Observations, used: BoolArray) -> Ranges:
+    """Of each quantity that the effects read, in the rows `used` (N,); without those that have no value there."""
+    ranges: dict[str, tuple[float, float]] = {}
+    for effect in fitted:
+        for name in needed_quantities(effect.effect, rows.links):
+            values = rows.quantities[name][used] if name in rows.quantities else np.array([])
+            if np.isfinite(values).any():
+                ranges[name] = float(np.nanmin(values)), float(np.nanmax(values))
+    return ranges
+
+
+def joined_ranges(one: Ranges, other: Ranges) -> Ranges:
+    """Of the rows of both."""
+    nothing = (np.inf, -np.inf)
+    each = {name: (one.get(name, nothing), other.get(name, nothing)) for name in (*one, *other)}
+    return {name: (min(a[0], b[0]), max(a[1], b[1])) for name, (a, b) in each.items()}
