@@ -59,7 +59,8 @@ class StreamLine:
         self._received = bytearray()
         self._last_byte_s = clock.monotonic()
         self._rests_s: deque[float] = deque(maxlen=RESTS_IN_MIND)  # of whole replies, beyond their time on the wire
-        self._given_up = False  # on the last reply, before the timeout
+        self._given_up = False  # on a reply before the timeout, and none has been whole since
+        self._first_s = -math.inf  # when the first byte of the frame whose head was taken was there
 
     def send(self, request: bytes) -> float:
         """Write `request` once the line is quiet; the monotonic time (s) at which its last bit will have left.
@@ -153,7 +154,7 @@ class StreamLine:
         """How long the rest of a reply is waited for, beyond its time on the wire, s.
 
         At most the timeout; less where the rest of so many replies has come sooner. After a reply that was given up
-        sooner it is the timeout again: a device that has become slower is waited for.
+        sooner it is the timeout until one is whole: a device that has become slower is waited for.
         """
         if self._given_up or len(self._rests_s) < FEWEST_RESTS:
             return self._timeout_s
@@ -167,6 +168,27 @@ class StreamLine:
         while len(self._received) < count:
             self._read_more(count, first_s)
         self._whole(first_s, count)
+        return self._take(count)
+
+    def receive_head(self, count: int) -> bytes:
+        """The first `count` bytes of a frame, which say how long it is; `receive_rest` makes it whole.
+
+        Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST.
+        """
+        self._first_s = self._wait_for_first_byte(None)
+        while len(self._received) < count:
+            self._read_more(count, self._first_s)
+        return self._take(count)
+
+    def receive_rest(self, head: bytes, count: int) -> bytes:
+        """The `count` bytes behind the `head` of a frame; it is whole with them, also where that is none.
+
+        Raises LineFault: INCOMPLETE, LINE_LOST.
+        """
+        head_there_s = self._first_s + len(head) * self._port.character_s
+        while len(self._received) < count:
+            self._read_more(count, head_there_s, head)
+        self._whole(head_there_s, count)
         return self._take(count)
 
     def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
@@ -214,7 +236,7 @@ class StreamLine:
     def _take_echo(self, request: bytes) -> None:
         """Receive the request as the adapter repeats it. Raises LineFault."""
         try:
-            came = self.receive(len(request))
+            came = self.receive_head(len(request))  # of an exchange: it says nothing of the device's pauses
         except LineFault as fault:
             if fault.quality is Quality.LINE_LOST:
                 raise
@@ -277,10 +299,10 @@ class StreamLine:
         self._given_up = False
         self._rests_s.append(max(0.0, self._last_byte_s - first_s - count * self._port.character_s))
 
-    def _read_more(self, count: int, first_s: float) -> None:
+    def _read_more(self, count: int, first_s: float, head: bytes = b"") -> None:
         """Wait for more of a reply of at most `count` bytes, whose first was there at `first_s` (s).
 
-        Raises LineFault: INCOMPLETE, LINE_LOST.
+        head : what was taken of it before, for the fault. Raises LineFault: INCOMPLETE, LINE_LOST.
         """
         deadline_s = first_s + self.rest_timeout_s + count * self._port.character_s
         on_the_wire_s = (count - len(self._received)) * self._port.character_s
@@ -288,8 +310,9 @@ class StreamLine:
             self._clock.wait(self._no_event, on_the_wire_s)
         data = self._port.read(deadline_s - self._clock.monotonic())
         if not data:
-            self._given_up = self.rest_timeout_s < self._timeout_s
-            raise LineFault(Quality.INCOMPLETE, f"only {len(self._received)} bytes: {shown(bytes(self._received))}")
+            self._given_up |= self.rest_timeout_s < self._timeout_s
+            came = head + self._received
+            raise LineFault(Quality.INCOMPLETE, f"only {len(came)} bytes: {shown(came)}")
         self._store(data)
 
     def _store(self, data: bytes) -> None:
