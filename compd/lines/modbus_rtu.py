@@ -5,12 +5,10 @@ Source: Modbus over Serial Line V1.02 (frame, CRC, 3.5 characters of silence).
 
 from __future__ import annotations
 
-from compd.gauge import LineFault, Quality
+from compd.gauge import MOST_SKIPPED_BYTES, LineFault, Quality
 from compd.lines.modbus_serial import CONFIRMED, WRITES, SerialMaster
 from compd.lines.stream import StreamLine, shown
 
-# Bytes of damage before a reply: of a single edge one, rarely two.
-MOST_SKIPPED = 3
 SHORTEST_FRAME = 5  # unit, function, exception or byte count, CRC
 CONFIRMATION = 2 + CONFIRMED + 2  # of a write
 
@@ -85,7 +83,7 @@ class RtuMaster(SerialMaster):
 
         A transceiver that changes its direction late, or a line without bias resistors, makes a byte of an edge.
         """
-        for count in range(1, MOST_SKIPPED + 1):
+        for count in range(1, MOST_SKIPPED_BYTES + 1):
             came = begin[count:] + self._stream.received
             if len(came) < 3 or came[0] != unit or came[1] & 0x7F != self._function:
                 continue
