@@ -87,10 +87,10 @@ class RtuMaster(SerialMaster):
             came = begin[count:] + self._stream.received
             if len(came) < 3 or came[0] != unit or came[1] & 0x7F != self._function:
                 continue
-            missing = count + _frame_length(came) - len(begin)
+            more = count + _frame_length(came) - len(begin)
             try:
                 # all of it may have been taken for a longer frame: then there is nothing to wait for
-                frame = begin[count:] + (self._stream.receive_rest(begin, missing) if missing > 0 else b"")
+                frame = begin[count:] + (self._stream.receive_rest(begin, more) if more > 0 else b"")
             except LineFault as missing:
                 if missing.quality is Quality.LINE_LOST:
                     raise

@@ -1,4 +1,4 @@
-"""A device that has become slower within its replies is waited for after one poll, on every kind of line."""
+"""A device that has become slower within its replies is waited for after one poll, by every Modbus master."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from compd.gauge import LineFault, Quality
 from compd.lines.modbus_ascii import AsciiMaster, lrc
 from compd.lines.modbus_rtu import RtuMaster, crc16
 from compd.lines.modbus_serial import SerialMaster
-from compd.lines.stream import FEWEST_RESTS, SHORTEST_REST, StreamLine
+from compd.lines.stream import FEWEST_RESTS, MOST_GIVEN_UP, SHORTEST_REST, StreamLine
 from tests.support.wire_rig import InstantClock, ScriptedPort
 
 TIMEOUT_S = 0.1
@@ -117,10 +117,10 @@ def test_the_whole_timeout_is_waited_until_a_frame_is_whole(kind: str) -> None:
         outcome(line)
     port.frame = frame[:-1]
     waits_s = []
-    for _ in range(4):
+    for _ in range(MOST_GIVEN_UP + 3):
         waits_s.append(stream.rest_timeout_s)
         assert outcome(line) == str(Quality.INCOMPLETE)
-    assert waits_s == [SHORTEST_REST * TIMEOUT_S, *3 * [TIMEOUT_S]]
+    assert waits_s == MOST_GIVEN_UP * [SHORTEST_REST * TIMEOUT_S] + 3 * [TIMEOUT_S]
     port.frame = frame
     assert outcome(line) == "ok"
     assert stream.rest_timeout_s == SHORTEST_REST * TIMEOUT_S
