@@ -64,6 +64,7 @@ __all__ = [
     "GaugeOptions",
     "LineFault",
     "LineKind",
+    "OptionDoubt",
     "Quality",
     "Reading",
     "ReadingMotion",
@@ -234,6 +235,9 @@ class GaugeOptions(BaseModel):
 
 LineT = TypeVar("LineT")
 LineKind = Literal["bytes", "registers", "nodes", "topics"]
+
+# Bytes of damage before a reply on a serial line: of a single edge one, rarely two.
+MOST_SKIPPED_BYTES = 3
 
 
 class DataSheetNoise(NamedTuple):

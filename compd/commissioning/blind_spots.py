@@ -257,14 +257,14 @@ def _lost_periods(figures: Figures) -> str:
 
 
 def _scatter(figures: Figures) -> str:
-    gauges = figures.configuration.gauges
     kinds = {d.gauge: d.length.partition(" ")[0] for d in figures.drifts}
-    declared = {gauge: noise_um for gauge in kinds if (noise_um := gauges[gauge].noise_um) is not None}
+    most_um = {gauge: SCATTER_RATIO * figures.configuration.noise_of(gauge).um for gauge in kinds}
     parts = [
-        f"{gauge}: {most_um:.3g} um, {most_um * figures.leverage(kinds[gauge]):.3g} um at the tip"
-        for gauge, most_um in ((gauge, SCATTER_RATIO * noise_um) for gauge, noise_um in declared.items())
+        f"{gauge}: {um:.3g} um, {um * figures.leverage(kinds[gauge]):.3g} um at the tip"
+        for gauge, um in most_um.items()
+        if not math.isnan(um)
     ]
-    silent = [gauge for gauge in kinds if gauge not in declared]
+    silent = [gauge for gauge, um in most_um.items() if math.isnan(um)]
     if silent:
         parts.append(f"no `noise_um`, so that any scatter passes: {', '.join(silent)}")
     return "; ".join(parts)

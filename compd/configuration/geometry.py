@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import AfterValidator, Field
 
 from compd.configuration.document import Location
-from compd.configuration.section import Number, Positive, Section
+from compd.configuration.section import Finite, Positive, Section
 
 LINKS: Mapping[str, int] = {"tripod_3spr": 3, "hexapod_6ups": 6}
 
@@ -18,7 +18,7 @@ LINKS: Mapping[str, int] = {"tripod_3spr": 3, "hexapod_6ups": 6}
 CONVENTION_TOLERANCE_MM = 1e-6
 
 
-Vector = tuple[Number, Number, Number]
+Vector = tuple[Finite, Finite, Finite]
 
 
 def _unit_vector(vector: Vector) -> Vector:

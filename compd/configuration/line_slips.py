@@ -64,8 +64,11 @@ def _why_no_port(port: str, scheme: str) -> str:
         return "" if scheme in _SCHEMES else f"{scheme}:// is nothing that a serial line can be reached by"
     if not port.startswith("/"):
         return "is no port of this computer"
-    path = Path(port)
-    return "is no serial port, but something else" if path.exists() and not stat.S_ISCHR(path.stat().st_mode) else ""
+    try:
+        mode = Path(port).stat().st_mode
+    except (OSError, ValueError):  # not there yet, or nobody can say: another user's directory, too long a name
+        return ""
+    return "" if stat.S_ISCHR(mode) else "is no serial port, but something else"
 
 
 def _why_no_host(host: str) -> str:
@@ -79,7 +82,8 @@ def _why_no_host(host: str) -> str:
         if re.fullmatch(r"\d+|0[xX][0-9a-fA-F]+", labels[-1]) or 2 * numbers > len(labels):
             return "is no IP address: that has four numbers. The system may take it for another one"
         return "" if _HOST_NAME.fullmatch(host) else "is neither an IP address nor a name"
-    if address.is_unspecified or address.is_multicast or address.is_reserved:
+    # of IPv6, ::1 and the mapped addresses ::ffff:a.b.c.d count as reserved, too
+    if address.is_unspecified or address.is_multicast or (address.is_reserved and address.version == 4):
         return "is no single device's address"
     return ""
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from compd.configuration.pushed_lines import MqttLine, OpcUaLine, PushedLineSettings
 from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
 from compd.configuration.section import Positive, Section, Text, refusal
-from compd.gauge import Gauge, LineKind
+from compd.gauge import MOST_SKIPPED_BYTES, Gauge, LineKind
 
 AnyLine = TypeVar("AnyLine", bound="_LineSettings | PushedLineSettings")
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -113,7 +113,7 @@ class ModbusRtuLine(_ModbusSerialSettings):
     """Modbus RTU on a serial port, or over TCP with port: socket://host:port."""
 
     kind: Literal["modbus_rtu"] = Field(description="Modbus RTU registers")
-    skip_bytes: Annotated[int, Field(ge=0, le=3)] = Field(
+    skip_bytes: Annotated[int, Field(ge=0, le=MOST_SKIPPED_BYTES)] = Field(
         default=0,
         description="so many bytes before a reply are damage of a transceiver that changes its direction: they are "
         "skipped where the checksum of the rest fits; left out: such a reply counts as damaged",

@@ -16,9 +16,8 @@ from compd.configuration.document import Document, Location
 from compd.errors import Problem
 from compd.text.secrets import has_secret, holds_secret
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 def _printable(text: str) -> str:

@@ -27,12 +27,11 @@ class AsciiMaster(SerialMaster):
         return self._stream.send(START + (request + bytes([lrc(request)])).hex().upper().encode() + END)
 
     def _receive(self, unit: int) -> bytes:
-        text = self._stream.receive(SHORTEST_FRAME)
+        text = self._stream.receive_head(SHORTEST_FRAME)
         head = _decoded(text[: 1 + 2 * COUNTED], text)
-        if not head[1] & 0x80:
-            # a shortest frame has no data; a reply has as much as it counts, a confirmation as every one
-            more = CONFIRMED - 1 if head[1] in WRITES else head[2]
-            text += self._receive_rest(2 * more, text)
+        # a shortest frame has no data; a reply has as much as it counts, a confirmation as every one
+        more = 0 if head[1] & 0x80 else CONFIRMED - 1 if head[1] in WRITES else head[2]
+        text += self._stream.receive_rest(text, 2 * more)
         if not text.endswith(END):
             raise LineFault(Quality.MISMATCH, f"no CR LF at the end of {shown(text)}")
         frame = _decoded(text[: -len(END)], text)
@@ -41,14 +40,6 @@ class AsciiMaster(SerialMaster):
         if frame[0] != unit:
             raise LineFault(Quality.MISMATCH, f"asked unit {unit}, unit {frame[0]} answered")
         return frame[1:-1]
-
-    def _receive_rest(self, count: int, head: bytes) -> bytes:
-        try:
-            return self._stream.receive(count)
-        except LineFault as fault:
-            if fault.quality is not Quality.TIMEOUT:
-                raise
-            raise LineFault(Quality.INCOMPLETE, f"only {len(head)} bytes: {shown(head)}") from fault
 
 
 def _decoded(digits: bytes, text: bytes) -> bytes:

@@ -5,12 +5,10 @@ Source: Modbus over Serial Line V1.02 (frame, CRC, 3.5 characters of silence).
 
 from __future__ import annotations
 
-from compd.gauge import LineFault, Quality
+from compd.gauge import MOST_SKIPPED_BYTES, LineFault, Quality
 from compd.lines.modbus_serial import CONFIRMED, WRITES, SerialMaster
 from compd.lines.stream import StreamLine, shown
 
-# Bytes of damage before a reply: of a single edge one, rarely two.
-MOST_SKIPPED = 3
 SHORTEST_FRAME = 5  # unit, function, exception or byte count, CRC
 CONFIRMATION = 2 + CONFIRMED + 2  # of a write
 
@@ -46,7 +44,7 @@ def crc16(data: bytes) -> int:
 
 
 def _frame_length(begin: bytes) -> int:
-    """Bytes of the frame that begins so, with three bytes or more."""
+    """Bytes of the frame that begins so, with three bytes or more: as it counts, or as a write confirms."""
     if begin[1] & 0x80:
         return SHORTEST_FRAME
     return CONFIRMATION if begin[1] in WRITES else SHORTEST_FRAME + begin[2]
@@ -67,10 +65,9 @@ class RtuMaster(SerialMaster):
         return self._stream.send(request + crc16(request).to_bytes(2, "little"))
 
     def _receive(self, unit: int) -> bytes:
-        frame = self._stream.receive(SHORTEST_FRAME)
+        frame = self._stream.receive_head(SHORTEST_FRAME)
         try:
-            if not frame[1] & 0x80:
-                frame += self._receive_rest(frame)
+            frame += self._stream.receive_rest(frame, _frame_length(frame) - SHORTEST_FRAME)
             if crc16(frame):
                 raise LineFault(Quality.CRC, shown(frame))
         except LineFault as fault:
@@ -86,13 +83,14 @@ class RtuMaster(SerialMaster):
 
         A transceiver that changes its direction late, or a line without bias resistors, makes a byte of an edge.
         """
-        for count in range(1, MOST_SKIPPED + 1):
+        for count in range(1, MOST_SKIPPED_BYTES + 1):
             came = begin[count:] + self._stream.received
             if len(came) < 3 or came[0] != unit or came[1] & 0x7F != self._function:
                 continue
-            length = _frame_length(came)
+            more = count + _frame_length(came) - len(begin)
             try:
-                frame = begin[count:] + self._stream.receive(max(length - len(begin) + count, 0))
+                # all of it may have been taken for a longer frame: then there is nothing to wait for
+                frame = begin[count:] + (self._stream.receive_rest(begin, more) if more > 0 else b"")
             except LineFault as missing:
                 if missing.quality is Quality.LINE_LOST:
                     raise
@@ -106,13 +104,3 @@ class RtuMaster(SerialMaster):
                 hint = f"{bytes_text} before the reply ({begin[:count].hex(' ')}); the rest fits"
                 raise LineFault(fault.quality, f"{hint}: write `skip_bytes: {count}` on the line") from fault
         raise fault
-
-    def _receive_rest(self, head: bytes) -> bytes:
-        """The bytes that follow the shortest frame `head`: as many as its byte count says, or as a write confirms."""
-        try:
-            count = CONFIRMATION - SHORTEST_FRAME if head[1] in WRITES else head[2]
-            return self._stream.receive(count, self._stream.rest_timeout_s)
-        except LineFault as fault:
-            if fault.quality is not Quality.TIMEOUT:
-                raise
-            raise LineFault(Quality.INCOMPLETE, f"only {len(head)} bytes: {shown(head)}") from fault

@@ -23,6 +23,9 @@ RESTS_IN_MIND, FEWEST_RESTS = 256, 20
 SLOWER_REST, LATER_REST_S = 1.25, 10e-3
 # At least this share of the timeout: a device may pause within a reply now and then.
 SHORTEST_REST = 0.5
+# A reply whose rest is given up may have lost a byte. The device has become slower where the rest comes after all, or
+# after so many such replies in a row.
+MOST_GIVEN_UP = 5
 
 
 def shown(data: bytes) -> str:
@@ -59,7 +62,8 @@ class StreamLine:
         self._received = bytearray()
         self._last_byte_s = clock.monotonic()
         self._rests_s: deque[float] = deque(maxlen=RESTS_IN_MIND)  # of whole replies, beyond their time on the wire
-        self._given_up = False  # on the last reply, before the timeout
+        self._given_up = 0  # replies in a row, before the timeout; none has been whole since
+        self._first_s = -math.inf  # when the first byte of the frame whose head was taken was there
 
     def send(self, request: bytes) -> float:
         """Write `request` once the line is quiet; the monotonic time (s) at which its last bit will have left.
@@ -153,9 +157,10 @@ class StreamLine:
         """How long the rest of a reply is waited for, beyond its time on the wire, s.
 
         At most the timeout; less where the rest of so many replies has come sooner. After a reply that was given up
-        sooner it is the timeout again: a device that has become slower is waited for.
+        sooner and came after all, or `MOST_GIVEN_UP` in a row that did not, it is the timeout until one is whole: a
+        device that has become slower is waited for.
         """
-        if self._given_up or len(self._rests_s) < FEWEST_RESTS:
+        if self._given_up >= MOST_GIVEN_UP or len(self._rests_s) < FEWEST_RESTS:
             return self._timeout_s
         return min(
             self._timeout_s, max(SHORTEST_REST * self._timeout_s, SLOWER_REST * max(self._rests_s) + LATER_REST_S)
@@ -167,6 +172,27 @@ class StreamLine:
         while len(self._received) < count:
             self._read_more(count, first_s)
         self._whole(first_s, count)
+        return self._take(count)
+
+    def receive_head(self, count: int) -> bytes:
+        """The first `count` bytes of a frame, which say how long it is; `receive_rest` makes it whole.
+
+        Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST.
+        """
+        self._first_s = self._wait_for_first_byte(None)
+        while len(self._received) < count:
+            self._read_more(count, self._first_s)
+        return self._take(count)
+
+    def receive_rest(self, head: bytes, count: int) -> bytes:
+        """The `count` bytes behind the `head` of a frame; it is whole with them, also where that is none.
+
+        Raises LineFault: INCOMPLETE, LINE_LOST.
+        """
+        head_there_s = self._first_s + len(head) * self._port.character_s
+        while len(self._received) < count:
+            self._read_more(count, head_there_s, head)
+        self._whole(head_there_s, count)
         return self._take(count)
 
     def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
@@ -199,6 +225,7 @@ class StreamLine:
         until_s = self._clock.monotonic() + MOST_DRAIN_TIMEOUTS * self._timeout_s
         while (data := self._port.read(quiet_s)) and self._clock.monotonic() < until_s:
             dropped += data
+            self._came_after_all()
         self.unexpected_bytes += len(dropped)
         return dropped
 
@@ -214,7 +241,7 @@ class StreamLine:
     def _take_echo(self, request: bytes) -> None:
         """Receive the request as the adapter repeats it. Raises LineFault."""
         try:
-            came = self.receive(len(request))
+            came = self.receive_head(len(request))  # of an exchange: it says nothing of the device's pauses
         except LineFault as fault:
             if fault.quality is Quality.LINE_LOST:
                 raise
@@ -234,6 +261,7 @@ class StreamLine:
         while data := self._port.read(max(self._last_byte_s, self._left_s) + self._gap_s - self._clock.monotonic()):
             self._last_byte_s = self._clock.monotonic()
             self.unexpected_bytes += len(data)
+            self._came_after_all()
             if self._last_byte_s > give_up_s:
                 raise LineFault(Quality.MISMATCH, f"the line is never quiet: {shown(data)}")
 
@@ -274,13 +302,18 @@ class StreamLine:
 
     def _whole(self, first_s: float, count: int) -> None:
         """Note how long the rest of a reply of `count` bytes took, whose first byte was there at `first_s` (s)."""
-        self._given_up = False
+        self._given_up = 0
         self._rests_s.append(max(0.0, self._last_byte_s - first_s - count * self._port.character_s))
 
-    def _read_more(self, count: int, first_s: float) -> None:
+    def _came_after_all(self) -> None:
+        """Bytes have come without a request: behind a reply that was given up they are its rest."""
+        if self._given_up:
+            self._given_up = MOST_GIVEN_UP
+
+    def _read_more(self, count: int, first_s: float, head: bytes = b"") -> None:
         """Wait for more of a reply of at most `count` bytes, whose first was there at `first_s` (s).
 
-        Raises LineFault: INCOMPLETE, LINE_LOST.
+        head : what was taken of it before, for the fault. Raises LineFault: INCOMPLETE, LINE_LOST.
         """
         deadline_s = first_s + self.rest_timeout_s + count * self._port.character_s
         on_the_wire_s = (count - len(self._received)) * self._port.character_s
@@ -288,8 +321,9 @@ class StreamLine:
             self._clock.wait(self._no_event, on_the_wire_s)
         data = self._port.read(deadline_s - self._clock.monotonic())
         if not data:
-            self._given_up = self.rest_timeout_s < self._timeout_s
-            raise LineFault(Quality.INCOMPLETE, f"only {len(self._received)} bytes: {shown(bytes(self._received))}")
+            self._given_up += self.rest_timeout_s < self._timeout_s
+            came = head + self._received
+            raise LineFault(Quality.INCOMPLETE, f"only {len(came)} bytes: {shown(came)}")
         self._store(data)
 
     def _store(self, data: bytes) -> None:

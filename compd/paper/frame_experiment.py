@@ -134,13 +134,15 @@ def crossing_mm(result: FrameResult) -> float:
 def frame_noise_mm(configuration: Configuration) -> tuple[FloatArray, str]:
     """Standard deviation (9,) of one reading of each frame gauge, mm, and whose it is, for people.
 
-    The configuration's `noise_um` where all nine declare one, else that of the simulated comparators.
+    What the configuration, or a driver by its data sheet, states where it is known of all nine, else that of the
+    simulated comparators.
     """
-    gauge_of = {wire.distance: wire.gauge.split(".")[0] for wire in configuration.wiring.frame}
-    declared_um = [configuration.gauges[gauge_of[distance]].noise_um for distance in FRAME_DISTANCES]
-    known_um = [noise_um for noise_um in declared_um if noise_um is not None]
-    if len(known_um) == len(declared_um):
-        return np.array(known_um) / UM_PER_MM, "declared in the configuration"
+    gauge_of = {wire.distance: wire.gauge for wire in configuration.wiring.frame}
+    stated = [configuration.noise_of(gauge_of[distance]) for distance in FRAME_DISTANCES]
+    stated_um = np.array([noise.um for noise in stated])
+    if not np.isnan(stated_um).any():
+        by_driver = any(noise.source != "configuration" for noise in stated)
+        return stated_um / UM_PER_MM, f"declared in the configuration{' or by the driver' if by_driver else ''}"
     simulated_um = Strengths().comparator_noise_um
     return np.full(
         9, simulated_um / UM_PER_MM

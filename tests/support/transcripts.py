@@ -108,7 +108,6 @@ class ReplayedLine:
     """A line that carries exactly one poll's bytes at a time."""
 
     unexpected_bytes = 0
-    rest_timeout_s = 0.1
 
     def __init__(self) -> None:
         self._coming: deque[Exchange] = deque()
@@ -147,6 +146,14 @@ class ReplayedLine:
         self._check()
         if len(self._waiting) < count:
             raise LineFault(Quality.INCOMPLETE, f"only {self._waiting!r}")
+        return self._take(count)
+
+    def receive_head(self, count: int) -> bytes:
+        return self.receive(count)
+
+    def receive_rest(self, head: bytes, count: int) -> bytes:
+        if len(self._waiting) < count:
+            raise LineFault(Quality.INCOMPLETE, f"only {head + self._waiting!r}")
         return self._take(count)
 
     def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:

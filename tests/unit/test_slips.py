@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import errno
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -135,9 +137,31 @@ def test_a_slip_of_a_line_or_a_register_map_is_found_and_named(tmp_path: Path, s
     assert any(warning.startswith(key) for warning in keys), keys
 
 
-@pytest.mark.parametrize("host", ["192.168.10.20", "fe80::1", "gateway-3", "1.pool.example.org", "plc_7.local."])
+@pytest.mark.parametrize(
+    "host",
+    ["192.168.10.20", "fe80::1", "::1", "::ffff:192.168.10.20", "gateway-3", "1.pool.example.org", "plc_7.local."],
+)
 def test_an_address_or_a_name_is_none(tmp_path: Path, host: str) -> None:
     assert warned(tmp_path, "tripod-cmm.yaml", put(host, "lines", "cabinet", "host")) == set()
+
+
+@pytest.mark.parametrize("host", ["255.255.255.255", "224.0.0.1", "ff02::1", "::"])
+def test_an_address_of_many_or_of_nobody_is_one(tmp_path: Path, host: str) -> None:
+    assert warned(tmp_path, "tripod-cmm.yaml", put(host, "lines", "cabinet", "host")) == {"lines.cabinet.host"}
+
+
+def test_a_port_that_cannot_be_looked_at_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may be there when the daemon runs, as its own user."""
+    look, locked = os.stat, "/run/user/1000/ttyV0"
+
+    def denied(path: Any, *given: Any, **named: Any) -> os.stat_result:
+        if str(path) == locked:
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return look(path, *given, **named)
+
+    monkeypatch.setattr("os.stat", denied)
+    for port in (locked, "/dev/" + "a" * 300, "/dev/not-there-yet"):
+        assert warned(tmp_path, "tripod-cmm.yaml", put(port, "lines", "scale_1", "port")) == set(), port
 
 
 def test_parts_of_a_register_may_share_it(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def accept(
         for gauge in gauges or ():
             answer = client.accept(gauge)
             for channel, for_s in answer.get("believed_for_s", {}).items():
-                typer.echo(f"{channel}: believed since {for_s:.1f} s")
+                typer.echo(f"{channel}: believed for {for_s:.1f} s")
             for channel, reason in answer.get("not_believed", {}).items():
                 typer.echo(f"{channel}: still not believed: {reason}")
                 failed = True

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
+from compd.configuration.section import Finite
 from compd.errors import ConfigurationError, Problem
 from compd.model.formula.basis import VECTORS
 from compd.model.formula.parser import LONGEST
@@ -16,7 +17,6 @@ from compd.model.formula.parser import LONGEST
 # Tags of the two kinds of formula, which pydantic puts into the place of an error.
 _ONE, _BY_AXIS = "text", "by axis"
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 AxisFormulas = Annotated[dict[Literal["x", "y", "z"], str], Field(min_length=1)]
 
 

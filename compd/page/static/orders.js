@@ -82,7 +82,8 @@ export class Orders {
       return this.showConsequence(element("p", {}, answer.reason), new CommandLine(command).row, replace);
     }
     this.leave();
-    this.say(answer.ok ? `Done: ${nameOf(name, subject).toLowerCase()}.` : `Refused: ${answer.reason}`);
+    const believed = Object.entries(answer.answer?.believed_for_s ?? {}).map(([channel, seconds]) => ` ${channel}: believed for ${seconds.toFixed(1)} s.`);
+    this.say(answer.ok ? `Done: ${nameOf(name, subject).toLowerCase()}.${believed.join("")}` : `Refused: ${answer.reason}`);
     if (answer.ok && ["adopt", "no-model"].includes(name)) this.offerToKeep(answer.answer);
   }
 

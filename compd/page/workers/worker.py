@@ -10,20 +10,27 @@ from collections.abc import Callable, Coroutine, Sequence
 from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from compd.errors import CompdError
 from compd.page.workers import limits as limited
 from compd.page.workers.asked import Asked
 from compd.page.workers.limits import WorkerLimits
 
-if TYPE_CHECKING:
-    from compd.page.workers.workers import Workers
-
 # A process closes its connection just before its end.
 _ENDS_WITHIN_S = 5.0
 # Code with which a process ends on an exception that nobody expected.
 _FAULT = 1
+
+
+class Starter(Protocol):
+    """Starts the processes of all workers; see `compd.page.workers.workers.Workers`."""
+
+    starting: threading.Lock
+
+    def prepare(self) -> None: ...
+    def make_room(self, wanting: Worker) -> None: ...
+    def start(self, arguments: tuple[Any, ...]) -> tuple[ForkServerProcess, Connection]: ...
 
 
 class Worker:
@@ -38,10 +45,10 @@ class Worker:
     """
 
     def __init__(
-        self, workers: Workers, name: str, opening: str, arguments: Sequence[Any], limits: WorkerLimits
+        self, starter: Starter, name: str, opening: str, arguments: Sequence[Any], limits: WorkerLimits
     ) -> None:
-        """workers : that this one belongs to. opening, arguments : see `worker_process.serve`."""
-        self._workers, self._limits = workers, limits
+        """starter : of its process. opening, arguments : see `worker_process.serve`."""
+        self._starter, self._limits = starter, limits
         self._opening, self._arguments = opening, arguments
         self.name = name
         self.kept: Any = None
@@ -85,7 +92,7 @@ class Worker:
         self, question: str, *given: Any, seconds: float, progress: Callable[[str], None] | None = None
     ) -> Asked:
         """As `ask`, without waiting; `progress` is called with each step that the state tells."""
-        self._workers.prepare()
+        self._starter.prepare()
         asked = Asked(question, given, seconds, progress)
         with self._changed:
             if self._thread is None:
@@ -196,10 +203,10 @@ class Worker:
             if self._messages is not None:
                 return self._messages, False
         arguments = (self._opening, self._arguments, self.kept, self._limits.memory_mb)
-        with self._workers.starting:
-            self._workers.make_room(self)
+        with self._starter.starting:
+            self._starter.make_room(self)
             try:
-                process, messages = self._workers.start(arguments)
+                process, messages = self._starter.start(arguments)
             except (OSError, EOFError) as error:  # the process that they are forked from has ended, or cannot fork
                 raise limited.none_left(self.name) from error
             with self._changed:

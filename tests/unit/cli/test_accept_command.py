@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
+import pytest
+from typer.testing import CliRunner
+
 from compd.cli.live.accept import not_believed
 from compd.cli.live.zero import changes_text
+from compd.cli.main import app
 
 GAUGES = [
     {"channel": "scale_1.position", "quality": "distrusted", "detail": "came back 5.000 mm away: reference it"},
@@ -30,6 +36,38 @@ def test_a_fault_is_told_and_acknowledged_by_all():
 
 def test_where_every_gauge_is_believed_that_is_said():
     assert not_believed({"gauges": GAUGES[3:]}, STOP) == ["every gauge is believed"]
+
+
+class Answers:
+    """A client whose daemon answers every `accept` so."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def accept(self, gauge):
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "printed", "code"),
+    [
+        (
+            {"gauges": ["scale_1.position"], "believed_for_s": {"scale_1.position": 0.98}},
+            "scale_1.position: believed for 1.0 s\n",
+            0,
+        ),
+        (
+            {"gauges": [], "not_believed": {"scale_1.position": "jumped"}},
+            "scale_1.position: still not believed: jumped\n",
+            1,
+        ),
+        ({"gauges": []}, "scale_1: was believed already\n", 0),
+    ],
+)
+def test_what_has_become_of_an_accepted_gauge(answer, printed, code, monkeypatch):
+    monkeypatch.setattr("compd.client.connect", lambda *_: nullcontext(Answers(answer)))
+    result = CliRunner().invoke(app, ["accept", "scale_1"])
+    assert (result.output, result.exit_code) == (printed, code)
 
 
 def test_the_differences_to_the_zero_before_fit_a_terminal_the_largest_first():

@@ -22,7 +22,7 @@ from compd.commissioning.feigned_jumps import (
 from compd.commissioning.line_budget import line_budgets
 from compd.configuration import Configuration, load
 from compd.configuration.stated_noise import tolerance_mm
-from compd.gauge import Gauge, GaugeOptions, Quality, Reading, good
+from compd.gauge import DataSheetNoise, Gauge, GaugeOptions, Quality, Reading, good
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample, MotionLimits, unseen_jump_mm
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.memory.trust_memory import TrustMemory
@@ -178,6 +178,18 @@ def test_lost_signal_periods_and_scatter_have_their_numbers(name: str) -> None:
     assert f"one step at rest: {step_um:.3g}" in cost["lost_signal_periods"]
     assert cost["scatter"].startswith(f"scale_1: 0.2 um, {0.2 * figures.leverage('scale'):.3g} um at the tip")
     assert "no `noise_um`, so that any scatter passes: scale_2, " in cost["scatter"]
+
+
+def test_scatter_is_judged_by_the_data_sheet_where_the_configuration_says_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    configuration = load(CONFIG / "tripod-cmm.yaml")
+    gauges = {g: options.model_copy(update={"noise_um": None}) for g, options in configuration.gauges.items()}
+    monkeypatch.setattr(configuration.drivers["scale_1"], "noise", DataSheetNoise(0.05, "page 5"))
+    figures = figures_of(replace(configuration, gauges=gauges))
+    (cost,) = [spot.cost(figures) for spot in BLIND_SPOTS if spot.name == "scatter"]
+    assert cost.startswith(f"scale_1: 0.1 um, {0.1 * figures.leverage('scale'):.3g} um at the tip")
+    assert "scale_1" not in cost.partition("any scatter passes")[2]
 
 
 def test_the_command_prints_both() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 
 import pytest
@@ -45,6 +46,18 @@ def test_the_documented_driver_reads_its_gauge():
     with pytest.raises(LineFault) as caught:
         gauge.read(Replies(b"+01.23\r\n"))
     assert caught.value.quality is Quality.MISMATCH
+
+
+def test_a_driver_can_import_all_that_its_methods_take_and_give():
+    """Every class that the annotations of `Gauge` name and this module defines is in `__all__`."""
+    named = set()
+    for member in vars(compd.gauge.Gauge).values():
+        function = member.fget if isinstance(member, property) else member
+        named |= set(re.findall(r"\w+", " ".join(map(str, getattr(function, "__annotations__", {}).values()))))
+    classes = {name for name, value in vars(compd.gauge).items() if isinstance(value, type)}
+    defined = {name for name in named & classes if vars(compd.gauge)[name].__module__ == "compd.gauge"}
+    assert "DataSheetNoise" in defined
+    assert defined <= set(compd.gauge.__all__)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])

@@ -9,12 +9,13 @@ from collections.abc import Callable
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 from pymodbus.framer.rtu import FramerRTU
 
-from compd.gauge import LineFault, Quality
+from compd.gauge import MOST_SKIPPED_BYTES, LineFault, Quality
 from compd.lines.modbus_rtu import RtuMaster, crc16, gap_s
 from compd.lines.stream import StreamLine
-from tests.support.wire_rig import InstantClock, ScriptedPort
+from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 
 Device = Callable[[bytes], bytes]
 UNIT = 1
@@ -272,18 +273,34 @@ def behind(damage: bytes, device: Device) -> Device:
 
 @pytest.mark.parametrize("damage", [b"\0", b"\xff", b"\x01", b"\0\xff"])
 @pytest.mark.parametrize("count", [1, 2, 3, 32])
-def test_bytes_before_a_reply_are_told_and_can_be_skipped(damage: bytes, count: int) -> None:
+@pytest.mark.parametrize("function", [3, 4])
+@pytest.mark.parametrize("unit", [UNIT, 5, 6, 15, 16])  # the others are also functions that write
+def test_bytes_before_a_reply_are_told_and_can_be_skipped(damage: bytes, count: int, function: int, unit: int) -> None:
     device = behind(damage, counting_slave())
-    fault = fault_of(device, count)
+    with pytest.raises(LineFault) as caught:
+        master(device, ask_one_more=False)[0].read_registers(unit, function, 10, count)
     bytes_text = "one byte" if len(damage) == 1 else "2 bytes"
-    assert f"{bytes_text} before the reply ({damage.hex(' ')}); the rest fits" in fault.detail
-    assert f"`skip_bytes: {len(damage)}`" in fault.detail
+    assert f"{bytes_text} before the reply ({damage.hex(' ')}); the rest fits" in caught.value.detail
+    assert f"`skip_bytes: {len(damage)}`" in caught.value.detail
     clock = InstantClock()
     port = ScriptedPort(clock, device=device)
     line = RtuMaster(StreamLine(port, 0.1, 0.002, clock), skip_bytes=len(damage))
     for _ in range(4):  # also with one register more
-        assert line.read_registers(UNIT, 4, 10, count).registers == tuple(range(1010, 1010 + count))
+        assert line.read_registers(unit, function, 10, count).registers == tuple(range(1010, 1010 + count))
     assert line.unexpected_bytes == 0
+
+
+def test_as_many_bytes_are_told_as_a_configuration_may_skip() -> None:
+    def line(skip_bytes: int) -> dict[str, object]:
+        port = {"kind": "modbus_rtu", "port": "/dev/ttyUSB0", "baud": 9600, "format": "8N1", "timeout_s": 0.1}
+        return {**port, "skip_bytes": skip_bytes}
+
+    most = bytes(MOST_SKIPPED_BYTES)
+    assert f"`skip_bytes: {len(most)}`" in fault_of(behind(most, counting_slave())).detail
+    SETTINGS.validate_python(line(len(most)))
+    assert "skip_bytes" not in fault_of(behind(most + b"\0", counting_slave())).detail
+    with pytest.raises(ValidationError, match="skip_bytes"):
+        SETTINGS.validate_python(line(len(most) + 1))
 
 
 def test_an_exception_behind_a_byte_is_the_exception() -> None:

@@ -14,6 +14,7 @@ from compd.arrays import FloatArray
 from compd.cli.main import app
 from compd.configuration import Configuration, load
 from compd.configuration.shipped import shipped_configuration
+from compd.gauge import DataSheetNoise
 from compd.machine_builder import build_model
 from compd.model.frame import FrameGeometry, solve_frame
 from compd.model.machine import MachineModel
@@ -113,6 +114,18 @@ def test_a_declared_noise_is_taken_once_every_frame_gauge_has_one(configuration:
         some_mm, source = frame_experiment.frame_noise_mm(with_noise(names - {min(names)}))
         assert some_mm.tolist() == pytest.approx([Strengths().comparator_noise_um / 1e3] * 9)
         assert "as simulated" in source
+
+
+def test_the_noise_of_data_sheets_counts_as_what_is_declared(
+    configuration: Configuration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gauges = {name: gauge.model_copy(update={"noise_um": None}) for name, gauge in configuration.gauges.items()}
+    for wire in configuration.wiring.frame:
+        driver = configuration.drivers[wire.gauge.split(".")[0]]
+        monkeypatch.setattr(driver, "noise", DataSheetNoise(0.4, "page 5"))
+    noise_mm, source = frame_experiment.frame_noise_mm(replace(configuration, gauges=gauges))
+    assert noise_mm.tolist() == pytest.approx([4e-4] * 9)
+    assert source == "declared in the configuration or by the driver"
 
 
 def test_a_warm_up_is_far_below_the_noise(result: FrameResult) -> None:

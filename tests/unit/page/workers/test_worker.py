@@ -237,9 +237,9 @@ def test_where_no_thread_can_be_started_the_next_question_works(worker, monkeypa
     def refuse(thread):
         raise RuntimeError("can't start new thread")
 
-    worker._workers.prepare()
+    worker._starter.prepare()
     with monkeypatch.context() as patch:
-        patch.setattr(worker._workers, "prepare", lambda: None)
+        patch.setattr(worker._starter, "prepare", lambda: None)
         patch.setattr(threading.Thread, "start", refuse)
         with pytest.raises(StateError, match="start no further process"):
             ask(worker, "count", 1)
