@@ -139,6 +139,18 @@ def _unwatched(slots: NDArray[Any], wired: IntArray, scales: int, now_s: float) 
 
 
 @helper
+def _rests_since(slots: NDArray[Any], wired: IntArray, scales: int, now_s: float) -> float:
+    """For how long (s) all scales that answer have stood, until now."""
+    rested = math.inf
+    for i in range(scales):
+        slot = slots[wired[i]]
+        age_s = now_s - slot.time_s
+        if slot.quality == OK_NUMBER and age_s <= slot.due_s:
+            rested = min(rested, slot.rest_s + age_s)
+    return rested
+
+
+@helper
 def _age_bound(
     slot: Any,
     age_s: float,
@@ -187,7 +199,8 @@ def age_bounds_mm(
     been faster than `fastest` (k,), mm/s. Nor has a scale been more than LINK_SPEED_RATIO times as fast as the fastest
     scale, nor joints and frame faster than the links: while all scales that answer stand, all stands. So a machine that
     has rested for RESTED times as long is taken to rest until the next reading of its scales is due. One that has come
-    to rest just now may have left again, and one whose scales are silent is not taken to rest.
+    to rest just now may have left again, and one whose scales are silent is not taken to rest. Joints and frame that
+    were read before the scales stood have gone on since.
 
     nan where it is not known how a length moves, inf where nothing limits it; 0 for a reading without motion.
     extrapolate : whether readings are carried on, and not used as they were read.
@@ -196,6 +209,7 @@ def age_bounds_mm(
     """
     machine = _machine_speed(slots, wired, scales, now_s, acceleration, tolerance_mm)
     unwatched = _unwatched(slots, wired, scales, now_s)
+    rested = _rests_since(slots, wired, scales, now_s)
     for i in range(len(wired)):
         slot = slots[wired[i]]
         if math.isnan(slot.horizon_s):
@@ -203,7 +217,8 @@ def age_bounds_mm(
             continue
         links = LINK_SPEED_RATIO * machine if i < scales else machine
         age = now_s - slot.time_s
-        bound = _age_bound(slot, age, extrapolate, fastest[i], acceleration[i], tolerance_mm[i], links, unwatched)
+        left = unwatched if i < scales else max(unwatched, age - rested)
+        bound = _age_bound(slot, age, extrapolate, fastest[i], acceleration[i], tolerance_mm[i], links, left)
         bounds_mm[i] = bound if i < scales or math.isnan(bound) else min(bound, largest_mm)
     return machine
 

@@ -158,6 +158,22 @@ def test_a_length_that_has_just_come_to_rest_may_have_left_again():
         assert (age_bound_mm(reading, 10.0 + age_s) > 0.49 * A_MM_PER_S2 * age_s**2) == departs
 
 
+@pytest.mark.parametrize("stood_s", [0.05, 2.0])
+def test_a_joint_that_was_read_before_the_links_stood_has_gone_on(stood_s):
+    """At its reading it did not move, by its own readings; the links did."""
+    acceleration, age_s = 20.0, 0.2
+    joint = Wire("joints.1", "joint 1", 1, 1, math.inf, acceleration_mm_per_s2=acceleration)
+    wires = Wires([*SCALE.wires, joint])
+    still = motion([0.0] * 12)._replace(due_s=1.0)
+    readings = [
+        Reading(0.0, 10.0, Quality.OK, "", still._replace(rest_s=stood_s)),
+        Reading(0.0, 10.0 - age_s, Quality.OK, "", still._replace(rest_s=1.0)),
+    ]
+    bound_mm = wires.age_bound_mm(Snapshot(10.0, Readings.of(readings)), 1, True, math.inf)[0][1]
+    went_mm = 0.5 * acceleration * max(age_s - stood_s, 0.0) ** 2
+    assert bound_mm == pytest.approx(went_mm, abs=1e-4)
+
+
 def test_readings_of_one_time_have_no_speed():
     """A source's clock has whole tenths of a second."""
     history = [GaugeSample(0.0, t, 1e-3) for t in (9.7, 9.8, 9.9)] + [
