@@ -75,10 +75,13 @@ class EffectNumber:
     searched: bool
 
     @property
+    def undetermined(self) -> bool:
+        """Whether its standard error is larger than the plausible range; not where it is not known."""
+        return self.standard_error > self.plausible_high - self.plausible_low
+
+    @property
     def plausible(self) -> bool:
-        """Whether it lies in the plausible range, and its standard error, where it is known, is no larger than that."""
-        if self.standard_error > self.plausible_high - self.plausible_low:
-            return False
+        """Whether it lies in the plausible range."""
         return self.plausible_low <= self.value <= self.plausible_high
 
 

@@ -294,7 +294,9 @@ def _id_and_value_problems(effects: tuple[FittedEffect, ...]) -> list[Problem]:
 
 
 def _implausible_numbers(file: ModelFile) -> list[Problem]:
-    """Numbers beyond the plausible range of their effect, and standard errors that are larger than it."""
+    """Numbers beyond their plausible range, and those of effects of which the fit has determined none."""
+    numbers = file.numbers()
+    determined = {number.effect for number in numbers if not (number.undetermined or number.searched)}
     return [
         Problem(
             where=f"effect {number.effect}, {number.parameter}",
@@ -304,8 +306,8 @@ def _implausible_numbers(file: ModelFile) -> list[Problem]:
             next_step="fit it again with `compd effect fit`; where it is meant, write the range under the effect: "
             f"`plausible: {{{number.parameter}: [LOW, HIGH]}}`, and remove the line `checksum`",
         )
-        for number in file.numbers()
-        if not number.plausible
+        for number in numbers
+        if not number.plausible or (number.undetermined and number.effect not in determined)
     ]
 
 
