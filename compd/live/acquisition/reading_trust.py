@@ -29,7 +29,7 @@ from compd.live.acquisition.possible_motion import (
     mean_speed,
     rest_to_rest_mm,
 )
-from compd.live.acquisition.scatter import Scatter, Turns
+from compd.live.acquisition.scatter import RestScatter, Turns
 from compd.live.acquisition.steps import Steps
 from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
 from compd.live.acquisition.witnesses import all_back, moved_while_away, stood_still
@@ -85,7 +85,7 @@ class ReadingTrust:
         self._back_s = math.nan  # since when a gauge that was away answers again
         self._missed = False  # whether a poll has failed since its last reading
         self._after: list[GaugeSample] = []  # what it shows since a gap, and waits for evidence
-        self._scatter = Scatter(self._tolerance_mm)
+        self._scatter = RestScatter(self._tolerance_mm)
         self._turns = Turns(self._tolerance_mm)
         self._motion = MotionEstimate(self._tolerance_mm)
         period_mm = settings.signal_period_mm

@@ -42,7 +42,7 @@ _FEWEST_TURNS = 2
 _DECIMALS_MM = 9
 
 
-class Scatter:
+class RestScatter:
     """Of one length.
 
     Attributes

@@ -138,7 +138,7 @@ class TrustMemory:
             self.power_lost[i] = 1.0
 
     def end_order(self, i: int) -> None:
-        """Forget an order to believe channel `i`: a person has accepted what it showed before it was away."""
+        """An order to believe channel `i` is over: followed, or about what the gauge showed before it was away."""
         self.obeyed[i] = self.accepted[i]
 
     def distrust(self, i: int, doubt: Doubt, amount: float) -> None:

@@ -56,6 +56,20 @@ def test_what_is_not_plausible_is_refused(tmp_path, name, links, numbers, said):
     assert live.loader.read(expansion(tmp_path / "m.yaml", name, links)).warnings == ()
 
 
+@pytest.mark.parametrize("determined", [True, False])
+def test_an_effect_is_refused_where_none_of_its_numbers_is_determined(tmp_path, determined):
+    """What one number leaves open is in the bound; diagnosis names such effects, too."""
+    effect, path = hidden("tool_offset", 0.0, 0.0, 0.0), tmp_path / "m.yaml"
+    stds = np.array([1e-6 if determined else 1e6, 1e6, 1e6])
+    ModelFile("tripod-cmm", 3, ("tool_offset",), (effect,), np.diag(stds**2)).write(path)
+    live = machine()
+    if determined:
+        assert live.loader.read(path).machine.effects
+        return
+    with pytest.raises(StateError, match="is not plausible"):
+        live.loader.read(path)
+
+
 def test_a_person_may_mean_it(tmp_path):
     file = expansion(tmp_path / "m.yaml", "tripod-cmm.yaml", 3, ppm_per_K=24.0)
     live = machine()
