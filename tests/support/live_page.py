@@ -155,7 +155,7 @@ def opened(chromium: Any, page: LivePage, **options: Any) -> Iterator[Any]:
         context.close()
 
 
-def until(tab: Any, expression: str, within_s: float = 30.0) -> None:
+def until(tab: Any, expression: str, within_s: float = 60.0) -> None:
     """Wait until a JavaScript expression is true. (`wait_for_function` would need a page that allows `eval`.)
 
     An expression that fails is not true yet: after a click on a link the page may still be the one before, or be

@@ -17,7 +17,7 @@ from compd.errors import DaemonError
 from compd.live.loop.states import State, state_named
 
 # Long enough for a loaded computer; what is waited for comes much sooner.
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 LOOK_EVERY_S = 0.05
 # Numbers are rounded to 1e-7 mm.
 ROUNDING_MM = 1e-6
