@@ -125,7 +125,8 @@ def _rests(machine: InjectedMachine, each_s: float) -> Iterator[Seen]:
         machine.truth.drive(place_mm)
         with machine.watched() as watcher:
             machine.truth.rest_for(each_s)
-            yield from watcher.seen
+        machine.truth.rest_for(0.0)  # the truth after the last of them is known before the machine leaves
+        yield from watcher.seen
 
 
 def _leave(machine: InjectedMachine, seen: list[Seen], broken: list[str]) -> str:

@@ -97,7 +97,8 @@ def test_a_daemon_that_is_killed(moving: CorrectedLinuxCnc) -> None:
 
     until("a person is asked for", lambda: moving.daemon.quality("scale_4.position") in ("distrusted", "ok"))
     until("the setpoints are valid", a_person_accepts)
-    assert moving.controller.value("compd.reason") in (2, 4)
+    # no connection, expired, or an invalid setpoint as the last of a daemon whose processes end one by one
+    assert moving.controller.value("compd.reason") in (2, 3, 4)
     arms_only_when_asked(moving, moving.controller.value("compd.reason"))
 
 
