@@ -20,7 +20,7 @@ from compd.demo.live import take_zero
 from compd.demo.processes import Command, run_commands
 from compd.simulation.wires.control_client import ControlClient
 from tests.support.paths import CONFIG
-from tests.support.simulated import run_directory
+from tests.support.simulated import made_patient, run_directory
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
 # No name is resolved but this computer's own: what the page wants from elsewhere fails, and is seen.
@@ -59,10 +59,6 @@ def served(*options: str, name: str = "tripod-cmm.yaml", simulate: Sequence[str]
             yield LivePage(address, pid, directory, recordings, machine)
 
 
-# A browser that starts keeps simulated gauges from answering for as long as this; at zero a person would be asked then.
-HASTY = "stale_after_s: 0.5"
-
-
 @contextmanager
 def running_machine(
     name: str = "tripod-cmm.yaml", simulate: Sequence[str] = AT_REST
@@ -71,9 +67,8 @@ def running_machine(
     with run_directory() as directory:
         patient = directory / "patient" / name
         patient.parent.mkdir()
-        text = (CONFIG / name).read_text()
-        assert HASTY in text
-        patient.write_text(text.replace(HASTY, "stale_after_s: 3.0"))
+        # a browser that starts keeps simulated gauges from answering
+        patient.write_text(made_patient((CONFIG / name).read_text()))
         commands = [
             Command(
                 ["simulate", str(patient), "--directory", str(directory), *simulate],

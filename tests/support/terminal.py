@@ -6,6 +6,7 @@ import contextlib
 import os
 import re
 import shlex
+import shutil
 import signal
 import socket
 import subprocess
@@ -19,6 +20,7 @@ from typing import NamedTuple
 from compd.client import connect
 from compd.demo.session import wait_for_gauges
 from tests.support.paths import ROOT
+from tests.support.simulated import made_patient
 from tests.support.staging import make_stage, staged
 
 # What the pages write, and what it is while a test runs.
@@ -91,14 +93,21 @@ def check_printed(shown: Shown, output: str) -> None:
 class Terminal:
     """One directory with the checkout's `config` and `drivers`, and the processes that run beside the others."""
 
-    def __init__(self, directory: Path, installs: bool = False) -> None:
-        """installs : the page installs into the system; a stage stands in for it."""
+    def __init__(self, directory: Path, installs: bool = False, patient: bool = False) -> None:
+        """installs : the page installs into the system; a stage stands in for it.
+        patient : the computer may stand still for longer than shipped configurations allow before a person is asked.
+        """
         self.directory = directory
         self._stage = make_stage(directory) if installs else None
         self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
         self._logs: list[Path] = []
         for name in ("config", "drivers"):
             (directory / name).symlink_to(ROOT / name)
+        if patient:
+            (directory / "config").unlink()
+            shutil.copytree(ROOT / "config", directory / "config")
+            for path in (directory / "config").glob("*.yaml"):
+                path.write_text(made_patient(path.read_text()))
         with socket.create_server(("127.0.0.1", 0)) as probe:
             self._broker_port = str(probe.getsockname()[1])
 
