@@ -15,7 +15,7 @@ from compd.client import Client, connect
 from compd.demo.processes import Command, run_commands
 from compd.demo.session import wait_for_gauges
 from compd.simulation.wires.control_client import ControlClient
-from tests.support.paths import ROOT
+from tests.support.simulated import TRIPOD, made_patient
 
 RATE_HZ = 50.0
 # Long enough for a loaded machine; what is waited for comes much sooner.
@@ -74,9 +74,11 @@ def without_a_controller(chain: Chain) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
     directory = tmp_path_factory.mktemp("chain")
+    patient = tmp_path_factory.mktemp("patient") / TRIPOD.name
+    patient.write_text(made_patient(TRIPOD.read_text()))
     simulate = [
         "simulate",
-        str(ROOT / "config/tripod-cmm.yaml"),
+        str(patient),
         "--directory",
         str(directory),
         "--seed",
