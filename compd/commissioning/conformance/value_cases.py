@@ -196,8 +196,8 @@ def share_of(session: ConformanceSession, channel: str, share: float, logarithmi
     if not logarithmic or lowest * highest >= 0:
         return lowest + share * (highest - lowest)
     end = highest if share >= 0.5 else lowest
-    digit = session.replies.digit[channel]
-    return math.copysign(digit * (abs(end) / digit) ** abs(2 * share - 1), end)
+    smallest = min(session.replies.digit[channel], abs(end))
+    return math.copysign(smallest * (abs(end) / smallest) ** abs(2 * share - 1), end)
 
 
 def _two_of_them(session: ConformanceSession, subject: Subject) -> CaseResult:

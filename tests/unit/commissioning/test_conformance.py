@@ -19,6 +19,7 @@ from compd.commissioning.conformance.cases import CaseResult, Subject, run_case
 from compd.commissioning.conformance.faults import Fault
 from compd.commissioning.conformance.harness import ASKED_AGAIN_TIMEOUTS
 from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
+from compd.commissioning.conformance.value_cases import share_of
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 from compd.lines.modbus_rtu import RtuMaster
 from compd.simulation.wires.device import SimulatedByteDevice
@@ -292,3 +293,14 @@ def test_real_wire_replugs(tmp_path: Path) -> None:
         assert session.recover()[1].ok
     finally:
         session.close()
+
+
+@pytest.mark.parametrize("logarithmic", [False, True])
+def test_no_value_is_beyond_a_range_that_ends_within_a_digit_of_zero(logarithmic: bool) -> None:
+    """A humidity from 0: what the device rounds to 0 counts as shown."""
+    session = Mock()
+    session.sensors.whole = session.sensors.extents = {"humidity": (-0.05, 100.0)}
+    session.replies.digit = {"humidity": 0.1}
+    shares = [number / 200 for number in range(201)]
+    values = [share_of(session, "humidity", share, logarithmic) for share in shares]
+    assert all(-0.05 <= value <= 100.0 + 1e-9 for value in values)
