@@ -32,6 +32,7 @@ _read = cache(read_document)
 
 def made_patient(text: str) -> str:
     """A shipped configuration for a computer that other tests keep from its work for longer than `_HASTY` allows."""
+    assert _HASTY in text
     return text.replace(_HASTY, _PATIENT)
 
 

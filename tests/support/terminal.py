@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 from compd.client import connect
 from compd.demo.session import wait_for_gauges
-from tests.support.paths import ROOT
-from tests.support.simulated import made_patient
+from tests.support.paths import CONFIG, ROOT
+from tests.support.simulated import HEXAPOD, TRIPOD, made_patient
 from tests.support.staging import make_stage, staged
 
 # What the pages write, and what it is while a test runs.
@@ -101,13 +101,13 @@ class Terminal:
         self._stage = make_stage(directory) if installs else None
         self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
         self._logs: list[Path] = []
-        for name in ("config", "drivers"):
-            (directory / name).symlink_to(ROOT / name)
+        (directory / "drivers").symlink_to(ROOT / "drivers")
         if patient:
-            (directory / "config").unlink()
-            shutil.copytree(ROOT / "config", directory / "config")
-            for path in (directory / "config").glob("*.yaml"):
-                path.write_text(made_patient(path.read_text()))
+            shutil.copytree(CONFIG, directory / "config")
+            for machine in (TRIPOD, HEXAPOD):
+                (directory / "config" / machine.name).write_text(made_patient(machine.read_text()))
+        else:
+            (directory / "config").symlink_to(CONFIG)
         with socket.create_server(("127.0.0.1", 0)) as probe:
             self._broker_port = str(probe.getsockname()[1])
 
