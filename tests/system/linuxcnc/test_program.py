@@ -37,7 +37,7 @@ def machine() -> Iterator[LinuxCnc]:
 
 
 def run(machine: LinuxCnc, program: Path) -> TipErrors:
-    start_s, end_s = machine.run(program, LONGEST_S)
+    start_s, end_s = machine.run(program, LONGEST_S, lambda _: machine.arms())
     return tip_errors(Mechanism(load(HEXAPOD).geometry), read_motion_log(machine.motion_log, start_s, end_s))
 
 
