@@ -28,7 +28,7 @@ CLAMP_MM, SLEW_MM_PER_S, PERIOD_S = 0.2, 0.5, 0.001
 # halsampler prints six decimals of two commands, and limit3 may exceed its slew a little where it stops.
 ROUNDING_MM = 3e-6
 # A computer that other work keeps busy stands still for some tenths of a second, in which the machine moves by mm.
-STALE_AFTER_S, TIP_ERROR_UM = 2.0, 1e5
+STALE_AFTER_S, TIP_ERROR_UM = 3.0, 1e5
 # Of a machine that is to be armed when a fault comes.
 TRIES = 5
 # Between any two places within reach, for as long as a test likes.
