@@ -29,6 +29,8 @@ PAUSE_S = 0.01
 TARGETS_PER_S = 2000
 TARGETS_AT_ONCE = 4
 BURST_S = 0.25
+# nice(1): of what floods the daemon, and of a controller, whose targets would be late without processor time.
+NICENESS, CONTROLLERS_NICENESS = 19, 5
 RESET = struct.pack("ii", 1, 0)
 Address = tuple[str, int]
 BEGINS = "begins"
@@ -182,11 +184,12 @@ ATTACKS: dict[str, tuple[str, str]] = {
     "target_bursts": ("a controller behind a network that stalls", "500 targets at once, four times a second"),
     "target_burst_closed": ("a controller that goes while its targets wait", "5000 targets at once, then closed"),
 }
+_CONTROLLERS = (targets, target_bursts, target_burst_closed)
 _ATTACKS: dict[str, Callable[[str, Address], None]] = {
     function.__name__: function
     for function in (
         *(status, version, deaf, idle, endless, noise, churn, models),
-        *(targets, target_bursts, target_burst_closed),
+        *_CONTROLLERS,
     )
 }
 
@@ -194,11 +197,10 @@ _ATTACKS: dict[str, Callable[[str, Address], None]] = {
 def main(name: str, unix: str, host: str, port: str) -> None:
     """Until it is killed; the daemon's end is its end too.
 
-    It takes little processor time from the simulated machine: the daemon is attacked, not the computer. A controller
-    takes more, so that its targets are not late on a busy computer.
+    It takes little processor time from the simulated machine: the daemon is attacked, not the computer.
     """
     print(BEGINS, flush=True)
-    os.nice(5 if name.startswith("target") else 19)
+    os.nice(CONTROLLERS_NICENESS if _ATTACKS[name] in _CONTROLLERS else NICENESS)
     with contextlib.suppress(OSError):
         _ATTACKS[name](unix, (host, int(port)))
 

@@ -73,8 +73,7 @@ def arms_only_when_asked(machine: CorrectedLinuxCnc, reason: int) -> None:
 
 
 def test_a_bridge_that_is_stopped(moving: CorrectedLinuxCnc) -> None:
-    pid = moving.stop_bridge()
-    fault_s = time.monotonic()
+    pid, fault_s = moving.stop_bridge()
     try:
         print(f"bridge stopped: inhibited after {stands_inhibited(moving, fault_s):.3f} s")
     finally:
