@@ -62,13 +62,13 @@ def page_names() -> list[str]:
     return ["README.md", *sorted(name for name in names if not name.startswith(GENERATED))]
 
 
-def run_page(name: str, patient: bool = False) -> None:
-    """Run all of a page in a directory of its own. patient : see `Terminal`."""
+def run_page(name: str) -> None:
+    """Run all of a page in a directory of its own."""
     document = SYBIL.parse(ROOT / name)
     with run_directory() as directory:
         before = Path.cwd()
         os.chdir(directory)
-        terminal = document.namespace["terminal"] = Terminal(directory, name in INSTALLS, patient)
+        terminal = document.namespace["terminal"] = Terminal(directory, name in INSTALLS)
         try:
             for example in document.examples():
                 print(f"--- {name}, line {example.line}")

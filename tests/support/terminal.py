@@ -91,23 +91,18 @@ def check_printed(shown: Shown, output: str) -> None:
 
 
 class Terminal:
-    """One directory with the checkout's `config` and `drivers`, and the processes that run beside the others."""
+    """One directory with `drivers` of the checkout and its `config` made patient, and the processes that run beside it."""
 
-    def __init__(self, directory: Path, installs: bool = False, patient: bool = False) -> None:
-        """installs : the page installs into the system; a stage stands in for it.
-        patient : the computer may stand still for longer than shipped configurations allow before a person is asked.
-        """
+    def __init__(self, directory: Path, installs: bool = False) -> None:
+        """installs : the page installs into the system; a stage stands in for it."""
         self.directory = directory
         self._stage = make_stage(directory) if installs else None
         self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
         self._logs: list[Path] = []
         (directory / "drivers").symlink_to(ROOT / "drivers")
-        if patient:
-            shutil.copytree(CONFIG, directory / "config")
-            for machine in (TRIPOD, HEXAPOD):
-                (directory / "config" / machine.name).write_text(made_patient(machine.read_text()))
-        else:
-            (directory / "config").symlink_to(CONFIG)
+        shutil.copytree(CONFIG, directory / "config")
+        for machine in (TRIPOD, HEXAPOD):
+            (directory / "config" / machine.name).write_text(made_patient(machine.read_text()))
         with socket.create_server(("127.0.0.1", 0)) as probe:
             self._broker_port = str(probe.getsockname()[1])
 
