@@ -91,7 +91,7 @@ def check_printed(shown: Shown, output: str) -> None:
 
 
 class Terminal:
-    """One directory with `drivers` of the checkout and its `config` made patient, and the processes that run beside it."""
+    """One directory with the checkout's `drivers` and its `config` made patient, and the processes that run there."""
 
     def __init__(self, directory: Path, installs: bool = False) -> None:
         """installs : the page installs into the system; a stage stands in for it."""
