@@ -7,12 +7,17 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+import hypothesis
 import pytest
 import pytest_timeout
 import structlog
 from _pytest.runner import runtestprotocol
 
 from tests.support.pauses import MATTERS_S, Pauses
+
+# Every run tries the same examples, and none has a time limit: one takes 0.3 s where the computer has paused.
+hypothesis.settings.register_profile("the same everywhere", deadline=None, derandomize=True)
+hypothesis.settings.load_profile("the same everywhere")
 
 _TRIES = 4
 # Of a report: it failed, and its test is tried again. Counted and listed by this word at the end.

@@ -23,7 +23,7 @@ from compd.lines.stream import StreamLine
 from compd.plugins import GAUGES, load
 from tests.support.wire_rig import InstantClock, ScriptedPort
 
-bounded = settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+bounded = settings(max_examples=200, suppress_health_check=[HealthCheck.too_slow])
 
 
 def driver(name: str, **options: Any) -> Callable[[], Any]:

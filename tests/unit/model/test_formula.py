@@ -51,7 +51,7 @@ LEAVES = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.recursive(LEAVES, combined, max_leaves=6))
 def test_a_formulas_value_is_pythons(made: Made) -> None:
     text, value = made

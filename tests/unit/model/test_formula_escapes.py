@@ -154,13 +154,13 @@ def nothing_but_arithmetic(text: str) -> None:
     assert all(value.dtype == np.float64 for value in found.values())
 
 
-@settings(deadline=None, max_examples=400)
+@settings(max_examples=400)
 @given(st.text(max_size=LONGEST + 20))
 def test_no_text_gets_out(text: str) -> None:
     nothing_but_arithmetic(text)
 
 
-@settings(deadline=None, max_examples=600)
+@settings(max_examples=600)
 @given(st.text(alphabet="k0129.exsinlagpow_+-*/(), []'\":=<lmbd", max_size=60))
 def test_no_text_of_tempting_characters_gets_out(text: str) -> None:
     nothing_but_arithmetic(text)
@@ -202,7 +202,7 @@ PIECES = [  # not formatted: a list to choose from
 ]
 
 
-@settings(deadline=None, max_examples=800)
+@settings(max_examples=800)
 @given(st.lists(st.sampled_from(PIECES), max_size=40))
 def test_no_heap_of_tokens_gets_out(pieces: list[str]) -> None:
     nothing_but_arithmetic("".join(pieces))

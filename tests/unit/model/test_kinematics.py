@@ -75,7 +75,7 @@ def test_tripod_against_an_independent_solver() -> None:
     np.testing.assert_allclose(rotation_vector(inverse(TRIPOD, tip).rotation_M_P), solution, atol=1e-11)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.tuples(*[st.floats(-100, 100)] * 3))
 def test_tripod_round_trip(offset_mm: tuple[float, float, float]) -> None:
     tip = TRIPOD.zero.contact.tip_M_mm + offset_mm
@@ -86,7 +86,7 @@ def test_tripod_round_trip(offset_mm: tuple[float, float, float]) -> None:
     np.testing.assert_allclose(back.rotation_M_P, there.rotation_M_P, rtol=0, atol=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.tuples(*[st.floats(-80, 80)] * 3), st.tuples(*[st.floats(-0.25, 0.25)] * 3))
 def test_hexapod_round_trip(offset_mm: tuple[float, float, float], attitude: tuple[float, float, float]) -> None:
     R = rotation_matrix(np.array(attitude))

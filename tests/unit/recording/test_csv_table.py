@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from compd.recording.tables import csv_table
@@ -31,7 +31,6 @@ def parse(body: str, least_bytes_for_arrow: int) -> tuple[Table | None, ProblemL
         return parse_table(Path("run.csv"), content, problems, lambda names: names[0] == NAMES[0]), problems
 
 
-@settings(deadline=None)
 @given(lines=LINES, line_end=st.sampled_from(["\n", "\r\n"]), last=st.booleans())
 def test_arrow_and_python_read_the_same(lines: list[str], line_end: str, last: bool) -> None:
     body = line_end.join(lines) + line_end * last
