@@ -38,6 +38,10 @@ class Heartbeat:
         self._without += 1
         return False
 
+    def excuse(self) -> None:
+        """Begin to count anew: a debugger has held the process."""
+        self._without = 0
+
     def reset(self) -> None:
         """Begin to count anew: the process is another one, which has yet to start."""
         self._without, self._starting = 0, True

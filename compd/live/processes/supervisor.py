@@ -180,8 +180,11 @@ class Supervisor:
             heart.look(process.beats)
             hearts.append((heart, self._acquisition[process.name]))
         for heart, child in hearts:
-            if heart.hangs and child.running and not child.is_debugged:
-                child.kill("it hung, and was killed")
+            if heart.hangs and child.running:
+                if child.is_debugged:
+                    heart.excuse()
+                else:
+                    child.kill("it hung, and was killed")
         self._tell()
 
     def _pass_on(self) -> None:

@@ -24,7 +24,8 @@ MANY = 1100
 UNKNOWN = ConnectionLimits().unknown
 # Sockets of the server itself, and connections that are just being closed.
 MORE_DESCRIPTORS = 24
-ANSWER_WITHIN_S = 2.0
+# Shorter than any time for which the server waits for a client.
+ANSWER_WITHIN_S = 0.8 * HEAD_WITHIN_S
 # Of the server's timers and this computer.
 MORE_S = 3.0
 GROWTH_MB = 30.0
