@@ -33,6 +33,8 @@ FLAGS = [
 # The machine stands at machine zero until it is driven.
 AT_REST = ("--zero-hold", "600")
 _LOOK_EVERY_S = 0.05
+# A browser that runs behind everything else.
+_WITHIN_S = 60.0
 
 
 @dataclass
@@ -139,7 +141,7 @@ def opened(chromium: Any, page: LivePage, **options: Any) -> Iterator[Any]:
     tab.on("pageerror", lambda error: failures.append(str(error)))
     tab.on("console", lambda message: failures.append(message.text) if message.type == "error" else None)
     try:
-        tab.goto(page.address)
+        tab.goto(page.address, timeout=1e3 * _WITHIN_S)
         until(tab, "window.compd?.live?.setpoint && document.body.dataset.tone !== 'gone'")
         yield tab
         origin = page.address.partition("?")[0]
@@ -150,7 +152,7 @@ def opened(chromium: Any, page: LivePage, **options: Any) -> Iterator[Any]:
         context.close()
 
 
-def until(tab: Any, expression: str, within_s: float = 60.0) -> None:
+def until(tab: Any, expression: str, within_s: float = _WITHIN_S) -> None:
     """Wait until a JavaScript expression is true. (`wait_for_function` would need a page that allows `eval`.)
 
     An expression that fails is not true yet: after a click on a link the page may still be the one before, or be

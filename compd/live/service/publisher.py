@@ -37,6 +37,8 @@ _LOOK_EVERY_S = 0.25
 _REST_PER_TURN = 2.0
 # The process may have been suspended in a turn.
 _LONGEST_REST_S = 0.05
+# Of a setpoint for clients, s: older ones have piled up while this process stood still, and only make a client late.
+_MAX_AGE_S = 1.0
 
 _log = structlog.get_logger()
 
@@ -262,7 +264,8 @@ class Publisher:
         self._last_state = setpoint.state.code
         for observe in self._observers:
             observe(setpoint)
-        self._send_to_watchers(Stream.SETPOINTS, setpoint.time_s, setpoint.line)
+        if self._clock.monotonic() - setpoint.time_s <= _MAX_AGE_S:
+            self._send_to_watchers(Stream.SETPOINTS, setpoint.time_s, setpoint.line)
 
     def _publish_in_place_of_loop(self, setpoint: Setpoint) -> None:
         self._publish(SentSetpoint.of(setpoint, self._packet_hash))

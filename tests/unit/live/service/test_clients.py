@@ -150,6 +150,27 @@ def test_a_full_queue_drops_the_oldest_and_counts_them(service):
     assert service.publisher.summary()["dropped_setpoints"] == dropped
 
 
+def test_setpoints_of_a_time_when_the_service_stood_still_make_no_client_late(service):
+    peer = service.unix()
+    entered, leave = threading.Event(), threading.Event()
+
+    def hold_up(setpoint):
+        entered.set()
+        assert leave.wait(TIMEOUT_S)
+
+    service.publisher._observers = (hold_up,)
+    peer.ask({"class": "WATCH"})
+    now_s = service.clock.monotonic()
+    for seq in range(100):
+        service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+    assert entered.wait(TIMEOUT_S)
+    service.clock.step(6.0)
+    service.deliver(setpoint(100, service.clock.monotonic()))
+    leave.set()
+    assert peer.read()["seq"] == 100
+    assert service.publisher.dropped_clients == 0
+
+
 def test_beyond_the_last_seat_a_client_is_told_and_closed(service):
     seated = [service.unix() for _ in range(32)]
     extra = service.tcp()
