@@ -18,6 +18,7 @@ from compd.errors import DaemonError
 from tests.support.daemon_process import Daemon
 from tests.support.misbehaving import DIAL, Misdeeds
 from tests.support.paths import CONFIG
+from tests.support.simulated import PATIENT_TIP_ERROR_UM
 from tests.support.watching import until
 
 TRIPOD = "tripod-cmm.yaml"
@@ -78,6 +79,7 @@ class Machine:
         data["gauges"][DIAL] = {"driver": self.misdeeds.driver, "line": DIAL}
         data["wiring"]["quantities"].append({"name": "temperature_dial_degC", "gauge": DIAL})
         data["loop"]["rate_hz"] = rate_hz
+        data["limits"]["tip_error_um"] = PATIENT_TIP_ERROR_UM
         data["acquisition"] = {"own_process": list(own_process), "memory_mb": MEMORY_MB}
         data["sockets"] = {"unix": {"path": str(self.directory / "s")}, "valid_for_s": 0.1}
         data["state"] = {"directory": str(self.directory / "state")}

@@ -24,8 +24,13 @@ TRIPOD = CONFIG / "tripod-cmm.yaml"
 HEXAPOD = CONFIG / "hexapod.yaml"
 
 
+# A bound of the tip's error, um, that readings as old as a pause of the computer do not reach.
+PATIENT_TIP_ERROR_UM = 100_000
 # How old readings may be before a person is asked, and how wrong the tip by their age before a setpoint is refused.
-_PATIENT = {"stale_after_s: 0.5": "stale_after_s: 3.0", "tip_error_um: 3000": "tip_error_um: 100000"}
+_PATIENT = {
+    "stale_after_s: 0.5": "stale_after_s: 3.0",
+    "tip_error_um: 3000": f"tip_error_um: {PATIENT_TIP_ERROR_UM}",
+}
 
 _read = cache(read_document)
 

@@ -21,7 +21,7 @@ from tests.support.daemon_process import Daemon
 from tests.support.mosquitto import Broker, needs_mosquitto, publisher, running_broker
 from tests.support.paths import CONFIG
 from tests.support.processes import takes_zero
-from tests.support.simulated import run_directory
+from tests.support.simulated import PATIENT_TIP_ERROR_UM, run_directory
 from tests.support.watching import Watcher, until
 
 MACHINE = "tripod-cmm.yaml"
@@ -46,6 +46,7 @@ def with_scales(directory: Path, line: dict[str, Any], driver: str, address: dic
             "channels": [{"name": "position", "unit": "mm", **placed}],
         }
     data["lines"]["scales"] = {"timeout_s": 2.0, "back_off_s": BACK_OFF_S, **line}
+    data["limits"]["tip_error_um"] = PATIENT_TIP_ERROR_UM
     path = directory / MACHINE
     path.write_text(yaml.safe_dump(data, sort_keys=False))
     return path

@@ -26,6 +26,11 @@ class Heartbeat:
         self._starting = True
 
     @property
+    def is_late(self) -> bool:
+        """Whether the last look found no beat."""
+        return self._without > 0
+
+    @property
     def hangs(self) -> bool:
         """Whether the last looks found no beat."""
         return self._without >= (_STARTS_WITHIN if self._starting else self._hung_after)
@@ -39,7 +44,7 @@ class Heartbeat:
         return False
 
     def excuse(self) -> None:
-        """Begin to count anew: a debugger has held the process."""
+        """Begin to count anew: a debugger holds the process."""
         self._without = 0
 
     def reset(self) -> None:

@@ -180,11 +180,10 @@ class Supervisor:
             heart.look(process.beats)
             hearts.append((heart, self._acquisition[process.name]))
         for heart, child in hearts:
-            if heart.hangs and child.running:
-                if child.is_debugged:
-                    heart.excuse()
-                else:
-                    child.kill("it hung, and was killed")
+            if heart.is_late and child.running and child.is_debugged:
+                heart.excuse()
+            elif heart.hangs and child.running:
+                child.kill("it hung, and was killed")
         self._tell()
 
     def _pass_on(self) -> None:

@@ -71,7 +71,9 @@ def test_a_heart_stops_by_looks_and_not_by_seconds():
     assert not any(heart.look(0) or heart.hangs for _ in range(50)), "it has yet to start"
     assert heart.look(1)
     assert [heart.look(1) or heart.hangs for _ in range(4)] == [False, False, True, True]
+    assert heart.is_late
     heart.excuse()
+    assert not heart.is_late
     assert [heart.look(1) or heart.hangs for _ in range(3)] == [False, False, True], "a debugger has let it go"
     heart.reset()
     assert not heart.hangs
