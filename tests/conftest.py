@@ -15,9 +15,9 @@ from _pytest.runner import runtestprotocol
 
 from tests.support.pauses import MATTERS_S, Pauses
 
-# Every run tries the same examples, and none has a time limit: one takes 0.3 s where the computer has paused.
-hypothesis.settings.register_profile("the same everywhere", deadline=None, derandomize=True)
-hypothesis.settings.load_profile("the same everywhere")
+# Every run tries the same examples, or others with COMPD_FUZZ; none has a time limit: the computer may pause.
+hypothesis.settings.register_profile("compd", deadline=None, derandomize="COMPD_FUZZ" not in os.environ)
+hypothesis.settings.load_profile("compd")
 
 _TRIES = 4
 # Of a report: it failed, and its test is tried again. Counted and listed by this word at the end.

@@ -63,14 +63,16 @@ class Chain:
 
 
 @pytest.fixture(autouse=True)
-def without_a_controller(chain: Chain) -> Iterator[None]:
-    """A test that was the controller is not when it ends: its target would grow old in the next one.
-
-    Before it, a person accepts the gauges that are not believed after a pause of the computer.
-    """
+def accepted(chain: Chain) -> None:
+    """A person accepts the gauges that are not believed after a pause of the computer."""
     if next(chain.setpoints)["state"] == "fault":
         with connect(chain.directory / "compd.sock", PATIENCE_S) as operator:
             operator.accept("all")
+
+
+@pytest.fixture(autouse=True)
+def without_a_controller(chain: Chain) -> Iterator[None]:
+    """A test that was the controller is not when it ends: its target would grow old in the next one."""
     yield
     if next(chain.setpoints)["mode"] == "machine_tool":
         chain.daemon.release()

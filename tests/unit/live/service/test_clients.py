@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
+from contextlib import contextmanager
 
 import pytest
 
@@ -128,8 +129,9 @@ def test_a_slow_client_is_dropped_and_counted_and_the_others_miss_nothing(servic
         pass  # what was on its way, then the end of the stream
 
 
-def test_a_full_queue_drops_the_oldest_and_counts_them(service):
-    peer = service.tcp()
+@contextmanager
+def held_up(service):
+    """The publisher stands still at the first setpoint, which has been delivered, until this ends."""
     entered, leave = threading.Event(), threading.Event()
 
     def hold_up(setpoint):
@@ -137,13 +139,19 @@ def test_a_full_queue_drops_the_oldest_and_counts_them(service):
         assert leave.wait(TIMEOUT_S)
 
     service.publisher._observers = (hold_up,)
-    peer.ask({"class": "WATCH"})
-    now_s = MonotonicClock().monotonic()
-    service.deliver(setpoint(0, now_s))
+    service.deliver(setpoint(0, service.clock.monotonic()))
     assert entered.wait(TIMEOUT_S)
-    for seq in range(1, 601):
-        service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+    yield
     leave.set()
+
+
+def test_a_full_queue_drops_the_oldest_and_counts_them(service):
+    peer = service.tcp()
+    peer.ask({"class": "WATCH"})
+    now_s = service.clock.monotonic()
+    with held_up(service):
+        for seq in range(1, 601):
+            service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
     assert peer.read()["seq"] == 0
     dropped = peer.read()["seq"] - 1
     assert 600 - ENTRIES <= dropped <= 600 - ENTRIES + 20, "all but what the ring has, less a margin"
@@ -152,21 +160,13 @@ def test_a_full_queue_drops_the_oldest_and_counts_them(service):
 
 def test_setpoints_of_a_time_when_the_service_stood_still_make_no_client_late(service):
     peer = service.unix()
-    entered, leave = threading.Event(), threading.Event()
-
-    def hold_up(setpoint):
-        entered.set()
-        assert leave.wait(TIMEOUT_S)
-
-    service.publisher._observers = (hold_up,)
     peer.ask({"class": "WATCH"})
     now_s = service.clock.monotonic()
-    for seq in range(100):
-        service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
-    assert entered.wait(TIMEOUT_S)
-    service.clock.step(6.0)
-    service.deliver(setpoint(100, service.clock.monotonic()))
-    leave.set()
+    with held_up(service):
+        for seq in range(1, 100):
+            service.deliver(setpoint(seq, now_s + seq * PERIOD_S))
+        service.clock.step(6.0)
+        service.deliver(setpoint(100, service.clock.monotonic()))
     assert peer.read()["seq"] == 100
     assert service.publisher.dropped_clients == 0
 
