@@ -7,7 +7,7 @@ from typing import Literal
 
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
-from compd.configuration.stated_noise import tolerance_mm
+from compd.configuration.stated_noise import SAME_VALUE_SIGMAS, tolerance_mm
 from compd.live.acquisition.gauge_trust import Judge
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.quantity_trust import QuantityLimits, QuantityTrust
@@ -82,4 +82,5 @@ def _settings(configuration: Configuration, wire: Wire, is_scale: bool) -> Trust
         options.trust_after_loss or (driver.absolute if options.absolute is None else options.absolute),
         wire.stale_after_s,
         configuration.geometry.scale_signal_period_mm or math.nan if is_scale else math.nan,
+        math.inf if math.isnan(wire.noise.um) else SAME_VALUE_SIGMAS * wire.noise.um / UM_PER_MM,
     )

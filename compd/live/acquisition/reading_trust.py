@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from compd.gauge import Quality, Reading, bad
-from compd.live.acquisition.motion_estimate import MotionEstimate
+from compd.live.acquisition.motion_estimate import LONGEST_WINDOW_S, MotionEstimate
 from compd.live.acquisition.possible_motion import (
     BASE_S,
     WINDOW_S,
@@ -29,10 +29,10 @@ from compd.live.acquisition.possible_motion import (
     mean_speed,
     rest_to_rest_mm,
 )
-from compd.live.acquisition.scatter import RestScatter, Turns
+from compd.live.acquisition.scatter import LatestScatter, RestScatter
 from compd.live.acquisition.steps import Steps
 from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
-from compd.live.acquisition.witnesses import all_back, moved_while_away, stood_still
+from compd.live.acquisition.witnesses import all_back, moved_while_away, scales_stood, stood_still
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
 # After a gap, s, until the others have been read that have begun to move at the same time.
@@ -54,6 +54,8 @@ _HISTORY = 32
 _AGREEMENT = 0.2
 # From one poll to the next a speed changes by at most this factor, where no limit of acceleration is given.
 _SPEED_RATIO = 5.0
+# Changes by so many of its last digits are none that a display makes by itself.
+_DIGITS = 2.0
 # How much of the acceleration that is there already is no surprise.
 _ACCELERATION_MARGIN = 2.0
 
@@ -64,12 +66,14 @@ class TrustSettings:
 
     limits : what the measured part can do. returns_by_itself : the device shows the same value again when it is back.
     stale_after_s : age from which a last reading is lost. signal_period_mm : of a scale, where it is known; nan.
+    noise_mm : by more than that two readings of the same value do not differ by noise, mm; inf where none is stated.
     """
 
     limits: MotionLimits
     returns_by_itself: bool
     stale_after_s: float
     signal_period_mm: float = math.nan
+    noise_mm: float = math.inf
 
 
 class ReadingTrust:
@@ -86,7 +90,7 @@ class ReadingTrust:
         self._missed = False  # whether a poll has failed since its last reading
         self._after: list[GaugeSample] = []  # what it shows since a gap, and waits for evidence
         self._scatter = RestScatter(self._tolerance_mm)
-        self._turns = Turns(self._tolerance_mm)
+        self._latest = LatestScatter(self._tolerance_mm)
         self._motion = MotionEstimate(self._tolerance_mm)
         period_mm = settings.signal_period_mm
         least_mm = LEAST_PERIODS * period_mm - self._tolerance_mm
@@ -177,17 +181,29 @@ class ReadingTrust:
     def _believed(self, reading: Reading, sample: GaugeSample) -> Reading:
         self._missed = False
         self._after.clear()
+        self._latest.note(sample.value, self._unexplained_mm(sample))
         self._remember(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
         motion = self._motion.note(self._history)
         if self._memory.suspected[self._i]:
             return bad(reading.time_s, Quality.STALE, "stands while all others move")
-        return reading._replace(motion=motion._replace(scatter_mm=self._scatter_mm(sample)))
+        return reading._replace(motion=motion._replace(scatter_mm=self._scatter_mm()))
 
-    def _scatter_mm(self, sample: GaugeSample) -> float:
+    def _scatter_mm(self) -> float:
         """The larger one of what windows of readings and the last few show; nan where neither does."""
-        known = [mm for mm in (self._scatter.mm, self._turns.note(sample.value)) if not math.isnan(mm)]
+        known = [mm for mm in (self._scatter.mm, self._latest.mm) if not math.isnan(mm)]
         return max(known, default=math.nan)
+
+    def _unexplained_mm(self, sample: GaugeSample) -> float:
+        """By how much (mm) a joint or the frame has changed while the machine stood; 0 within its noise, and over times
+        in which it may drift."""
+        memory, i = self._memory, self._i
+        if i < memory.scales or not self._history or sample.time_s - memory.time_s[i] > LONGEST_WINDOW_S:
+            return 0.0
+        change_mm = abs(sample.value - float(memory.value[i]))
+        # digits of a display go to and fro
+        within_mm = max(self._settings.noise_mm, _DIGITS * float(memory.step_mm[i]))
+        return change_mm if change_mm > min(within_mm, self._tolerance_mm) and scales_stood(memory, i) else 0.0
 
     def _remember(self, sample: GaugeSample) -> None:
         """Keep a sample of motion, and count the step that it completes."""
@@ -245,6 +261,7 @@ class ReadingTrust:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
         if self._is_expected(earlier) and not self._needs_evidence(earlier):
             return self._believed(first, earlier)
+        self._latest.note(earlier.value)  # one answer may be damaged; two that are not where the last ones lead count
         last = self._history[-1]
         stays = abs(sample.value - earlier.value) <= self._tolerance_mm + _AGREEMENT * abs(earlier.value - last.value)
         limits = self._settings.limits
@@ -264,6 +281,7 @@ class ReadingTrust:
         if stays:
             self._memory.distrust(self._i, Doubt.JUMPED, sample.value - last.value)
             return self._refused(reading)
+        self._latest.note(sample.value)
         values = ", ".join(f"{value:.4f}" for value in (last.value, earlier.value, sample.value))
         return bad(reading.time_s, Quality.MISMATCH, f"no two of three values agree: {values} mm{self._limits_text()}")
 

@@ -7,8 +7,9 @@ median of the last windows counts, so that one in which the machine has moved al
 
 A hum that the polls alias to less than three periods in a window looks like motion, and does not count.
 
-Windows take seconds. Until they tell, readings that turn round from one to the next do: a machine does so at the end of
-a way, noise and hum again and again.
+Windows take seconds. Until they tell, the last readings do, where they turn round from one to the next: a machine does
+so at the end of a way, noise and hum again and again. So does a joint or the frame that changes while the scales stand:
+it is no faster than the links (`compd.live.loop.wired_readings`).
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _BEYOND = 0.5
 _STAYS = 2.0
 # A reading so many medians of the deviations from the middle is damaged: of noise 7 is 5 sigma, of hum 1.4 is the most.
 _DAMAGED = 7.0
-# Turns among so many of the last readings count, and so many of them are no machine's.
+# Of so many of the last readings turns and changes count, and so many turns are no machine's.
 _LAST = 32
 _FEWEST_TURNS = 2
 # A recording has it as text: 1 pm is less than anybody knows of it.
@@ -82,30 +83,43 @@ class RestScatter:
                 self.mm = round(float(np.median(self._windows)), _DECIMALS_MM)
 
 
-class Turns:
-    """Of the readings of one length, where they turn round from one to the next by more than their tolerance."""
+class LatestScatter:
+    """Of the last readings of one length, whether believed or not, as far as no motion explains how they differ."""
 
     def __init__(self, tolerance_mm: float) -> None:
+        """`tolerance_mm`: readings that differ by no more do not turn round."""
         self._tolerance_mm = tolerance_mm
         self._value = self._change = math.nan
         self._count = 0
-        self._sizes: deque[tuple[int, float]] = deque()  # of each turn: the number of its reading, and how far, mm
+        # of each turn and change, the number of its reading, and how far, mm
+        self._turns: deque[tuple[int, float]] = deque()
+        self._changes: deque[tuple[int, float]] = deque()
 
-    def note(self, value: float) -> float:
-        """The scatter (mm) that a reading and the last ones show; nan where they do not turn round.
-
-        The mean size of the turns is 1.0 standard deviations of noise, and 1.06 of hum.
-        """
+    def note(self, value: float, unexplained_mm: float = 0.0) -> None:
+        """A reading. unexplained_mm : by how much it has changed while the machine stood."""
         change, before = value - self._value, self._change
         self._value, self._change = value, change
         self._count += 1
         if change * before < 0.0 and (least := min(abs(change), abs(before))) > self._tolerance_mm:
-            self._sizes.append((self._count, least))
-        while self._sizes and self._sizes[0][0] <= self._count - _LAST:
-            self._sizes.popleft()
-        if len(self._sizes) < _FEWEST_TURNS:
-            return math.nan
-        return round(sum(size for _, size in self._sizes) / len(self._sizes), _DECIMALS_MM)
+            self._turns.append((self._count, least))
+        if unexplained_mm > 0.0:
+            self._changes.append((self._count, unexplained_mm))
+        for sizes in (self._turns, self._changes):
+            while sizes and sizes[0][0] <= self._count - _LAST:
+                sizes.popleft()
+
+    @property
+    def mm(self) -> float:
+        """The scatter that they show, mm; nan where they show none.
+
+        The mean size of turns is 1.0 standard deviations of noise, and 1.06 of hum. Of changes the largest counts: a
+        single one may be all that is known.
+        """
+        turns_mm = [size for _, size in self._turns]
+        shown_mm = [size for _, size in self._changes]
+        if len(turns_mm) >= _FEWEST_TURNS:
+            shown_mm.append(sum(turns_mm) / len(turns_mm))
+        return round(max(shown_mm), _DECIMALS_MM) if shown_mm else math.nan
 
 
 def _off_line(time_s: FloatArray, value_mm: FloatArray) -> tuple[FloatArray, float]:

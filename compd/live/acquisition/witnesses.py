@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from compd.live.memory.trust_memory import Doubt, TrustMemory
@@ -46,6 +48,18 @@ def stood_still(memory: TrustMemory, i: int) -> bool:
     return bool(
         compared.any() and (np.abs(memory.value[:n] - before)[compared] <= memory.tolerance_mm[:n][compared]).all()
     )
+
+
+def scales_stood(memory: TrustMemory, i: int) -> bool:
+    """Whether every scale that is believed shows what it showed when `i` was last believed; False where none is."""
+    compared = 0
+    for scale in range(memory.scales):
+        if memory.doubt[scale] != Doubt.NONE or math.isnan(before := memory.witness[i, scale]):
+            continue
+        if abs(memory.value[scale] - before) > memory.tolerance_mm[scale]:
+            return False
+        compared += 1
+    return compared > 0
 
 
 def all_back(memory: TrustMemory, i: int, since_s: float) -> bool:

@@ -31,7 +31,7 @@ from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import UsableComparators
 from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_bound import refused_bound, tip_bound, with_place
-from compd.live.loop.tip_uncertainty import TipUncertainty, noise_now, scatters, tip_uncertainty
+from compd.live.loop.tip_uncertainty import TipUncertainty, has_grown, noise_now, tip_uncertainty
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
@@ -260,16 +260,21 @@ def _with_zero(state: CycleState, zero: MachineZero, zero_vectors: ZeroVectors, 
 
 
 def _uncertainty(tick: int, state: CycleState, settings: CycleSettings, snapshot: Snapshot) -> TipUncertainty | None:
-    """The tip's uncertainty of the cycle before, since it changes slowly; None where it is to be computed anew."""
+    """The tip's uncertainty of the cycle before, since it changes slowly; None where it is to be computed anew: now and
+    then, more often while a length scatters, and at once where it begins to."""
     if settings.noise is None:
         return TipUncertainty(None, None)
     if state.tip_noise_um is None or tick % settings.uncertainty_every == 0:
         return None
     if state.tip_by_gauge is None and len(state.tip_noise_um) > _FORMER_NUMBERS:
         return None
-    if tick % settings.scattering_every == 0 and scatters(settings.noise, settings.wires, snapshot):
+    former = TipUncertainty(state.tip_noise_um, state.tip_by_gauge)
+    scatters = bool((settings.wires.lengths.scatter_mm(snapshot) > settings.scatter_limits_mm).any())
+    if scatters and (
+        tick % settings.scattering_every == 0 or has_grown(former, settings.noise, settings.wires, snapshot)
+    ):
         return None
-    return TipUncertainty(state.tip_noise_um, state.tip_by_gauge)
+    return former
 
 
 def _not_below_held(u_tip: TipUncertainty, former_um: FloatArray | None, usable: UsableComparators) -> TipUncertainty:

@@ -17,6 +17,7 @@ from compd.live.loop.commands import Target
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import Models
 from compd.live.loop.stale_policy import ComparatorSet
+from compd.live.loop.tip_uncertainty import scatter_limits_mm
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.model.effect_memory import EffectMemory
@@ -139,6 +140,11 @@ class CycleSettings:
     def scattering_every(self) -> int:
         """The same while a length scatters by far more than is stated."""
         return max(1, round(_SCATTERING_EVERY_S * self.loop.rate_hz))
+
+    @cached_property
+    def scatter_limits_mm(self) -> FloatArray:
+        """As `tip_uncertainty.scatter_limits_mm`; inf where no noise is known."""
+        return np.full(1, math.inf) if self.noise is None else scatter_limits_mm(self.noise)
 
     @cached_property
     def unread_scales_mm(self) -> FloatArray:

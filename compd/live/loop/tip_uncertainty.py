@@ -56,9 +56,9 @@ def noise_now(
     return _noise(np.fmax(stated_mm, scatter_mm), wires, quantities, "stated, or measured")
 
 
-def scatters(noise: GaugeNoise, wires: MachineWires, snapshot: Snapshot) -> bool:
-    """Whether a length scatters at rest by far more than is stated."""
-    return not bool(np.isnan(_scatter_mm(noise, wires, snapshot)).all())
+def scatter_limits_mm(noise: GaugeNoise) -> FloatArray:
+    """(n + k + 9) scatter of one reading beyond which a length scatters by far more than is stated, mm."""
+    return SCATTER_RATIO / math.sqrt(_READINGS) * _lengths_mm(noise)
 
 
 def _lengths_mm(noise: GaugeNoise) -> FloatArray:
@@ -67,9 +67,8 @@ def _lengths_mm(noise: GaugeNoise) -> FloatArray:
 
 def _scatter_mm(noise: GaugeNoise, wires: MachineWires, snapshot: Snapshot) -> FloatArray:
     """(n + k + 9) of a length that scatters by far more than is stated, mm; nan of the others."""
-    scatter_mm = wires.lengths.scatter_mm(snapshot) * math.sqrt(_READINGS)
-    scatter_mm[~(scatter_mm > SCATTER_RATIO * _lengths_mm(noise))] = math.nan
-    return scatter_mm
+    scatter_mm = wires.lengths.scatter_mm(snapshot)
+    return np.where(scatter_mm > scatter_limits_mm(noise), scatter_mm * math.sqrt(_READINGS), math.nan)
 
 
 def _noise(lengths_mm: FloatArray, wires: MachineWires, quantities: Mapping[str, float], how: str) -> GaugeNoise:
@@ -94,6 +93,14 @@ class TipUncertainty(NamedTuple):
 
     by_noise_um: FloatArray | None
     tip_by_gauge: FloatArray | None
+
+
+def has_grown(u: TipUncertainty, noise: GaugeNoise, wires: MachineWires, snapshot: Snapshot) -> bool:
+    """Whether the scatter of one length alone moves the tip by more than all noise did when `u` was computed."""
+    if u.by_noise_um is None or u.tip_by_gauge is None:
+        return False
+    tip_mm = np.sqrt((u.tip_by_gauge * u.tip_by_gauge).sum(axis=0)) * _scatter_mm(noise, wires, snapshot)
+    return bool((math.sqrt(_CHI_SQUARED_95[-1]) * UM_PER_MM * tip_mm > u.by_noise_um[-1]).any())
 
 
 def radius_95(covariance: FloatArray) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from compd.configuration import load
-from compd.gauge import Reading, good
+from compd.gauge import Quality, Reading, good
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.acquisition.votes.votes import LOOK_EVERY_S, Votes
 from compd.live.memory.latest import Latest
@@ -45,6 +45,7 @@ class Machine:
         self.judges = wired_trust(configuration, pipeline.wires, self.memory)
         self.true_mm: dict[str, Truth] = {channel: lambda _: 0.0 for channel in self.channels}
         self.noise_um: dict[str, float] = dict.fromkeys(self.channels, NOISE_UM)
+        self.lost: dict[str, float] = dict.fromkeys(self.channels, 0.0)  # share of its replies
         self.digit_mm = STEP_MM
         self.setpoint: dict[str, Any] | None = None
         self.published: dict[str, Reading] = {}
@@ -75,6 +76,9 @@ class Machine:
 
     def _poll(self, channel: str) -> None:
         judge, first = self.judges[channel], None
+        if self._random.random() < self.lost[channel]:
+            judge.fail(Quality.CRC, self.now_s)
+            return
         reading = self._reading(channel, self.now_s)
         if judge.surprises(GaugeSample(reading.value, reading.time_s, 0.001)):
             first, reading = reading, self._reading(channel, self.now_s + 2 * TICK_S)
@@ -241,6 +245,38 @@ def test_noise_that_begins_counts_before_it_is_measured(machine: Machine, distur
     assert quiet.scatter_mm < 0.0002
     assert motion is not None
     assert 0.002 < motion.scatter_mm < 0.008
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("lost", [0.0, 0.5])
+def test_a_joint_that_begins_to_hum_says_so_with_each_reading(name: str, lost: float) -> None:
+    """The scales stand, so it does; readings are rare where replies are lost, and each is as wrong as it says."""
+    wrong = 0
+    for late_s in np.arange(6) * 0.003:
+        machine = Machine(name)
+        joint, since_s = machine.channels[len(machine.scales)], machine.now_s + 1.0 + late_s
+        machine.true_mm[joint] = lambda time_s, since_s=since_s: hum(0.005)(max(0.0, time_s - since_s))
+        machine.run(1.0)
+        machine.lost[joint] = lost
+        for _ in range(75):
+            machine.run(TICK_S)
+            reading = machine.published[joint]
+            if reading.ok and abs(reading.value) > 2e-3:
+                assert reading.motion is not None
+                assert abs(reading.value) < 2 * math.sqrt(2) * reading.motion.scatter_mm
+                wrong += 1
+    assert wrong > 0
+
+
+def test_joints_that_move_with_their_scales_do_not_scatter(machine: Machine) -> None:
+    links, since_s = len(machine.scales), machine.now_s + 0.5
+    for k, channel in enumerate(machine.channels):
+        share = 1.0 if k < links else 0.01
+        machine.true_mm[channel] = lambda time_s, share=share: share * max(0.0, 0.3 * (time_s - since_s))
+    for _ in range(20):
+        machine.run(0.1)
+        scatter_mm = [reading.motion.scatter_mm for reading in machine.published.values() if reading.motion]
+        assert not any(mm > 2e-4 for mm in scatter_mm)
 
 
 @pytest.mark.parametrize(("noise_um", "is_told"), [(0.3, True), (0.14, False), (0.08, False), (0.03, True)])
