@@ -54,7 +54,7 @@ _HISTORY = 32
 _AGREEMENT = 0.2
 # From one poll to the next a speed changes by at most this factor, where no limit of acceleration is given.
 _SPEED_RATIO = 5.0
-# Changes by so many of its last digits are none that a display makes by itself.
+# By so many of its last digits a display goes to and fro by itself.
 _DIGITS = 2.0
 # How much of the acceleration that is there already is no surprise.
 _ACCELERATION_MARGIN = 2.0
@@ -201,7 +201,6 @@ class ReadingTrust:
         if i < memory.scales or not self._history or sample.time_s - memory.time_s[i] > LONGEST_WINDOW_S:
             return 0.0
         change_mm = abs(sample.value - float(memory.value[i]))
-        # digits of a display go to and fro
         within_mm = max(self._settings.noise_mm, _DIGITS * float(memory.step_mm[i]))
         return change_mm if change_mm > min(within_mm, self._tolerance_mm) and scales_stood(memory, i) else 0.0
 
