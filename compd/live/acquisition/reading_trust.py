@@ -260,7 +260,8 @@ class ReadingTrust:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
         if self._is_expected(earlier) and not self._needs_evidence(earlier):
             return self._believed(first, earlier)
-        self._latest.note(earlier.value)  # one answer may be damaged; two that are not where the last ones lead count
+        if abs(sample.value - earlier.value) > self._tolerance_mm:  # one answer may be damaged; two are not
+            self._latest.note(earlier.value)
         last = self._history[-1]
         stays = abs(sample.value - earlier.value) <= self._tolerance_mm + _AGREEMENT * abs(earlier.value - last.value)
         limits = self._settings.limits

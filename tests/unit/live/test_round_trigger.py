@@ -306,6 +306,15 @@ def test_a_latched_gauge_that_begins_to_move_is_believed_and_one_that_jumps_is_n
         assert judged.ok == believed, moved_mm
 
 
+def test_a_latched_gauge_that_goes_to_and_fro_scatters_though_each_sample_is_shown_twice() -> None:
+    judge = trust(acceleration=10.0)
+    for k in range(6):
+        sample = good(0.0 if k < 2 else 0.005 * (-1) ** k, 100.0 + 0.2 * k)
+        judged = judge.judge(sample, 1e-3, sample)
+    assert judged.motion is not None
+    assert judged.motion.scatter_mm == pytest.approx(0.01, rel=0.3)
+
+
 # --- the configuration -------------------------------------------------------------------------------------
 
 

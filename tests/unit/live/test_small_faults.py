@@ -269,11 +269,11 @@ def test_a_joint_that_begins_to_hum_says_so_with_each_reading(name: str, lost: f
 
 
 def test_joints_that_move_with_their_scales_do_not_scatter(machine: Machine) -> None:
-    links, since_s = len(machine.scales), machine.now_s + 0.5
+    links, since_s, acceleration = len(machine.scales), machine.now_s + 0.1, 50.0
     for k, channel in enumerate(machine.channels):
-        share = 1.0 if k < links else 0.01
-        machine.true_mm[channel] = lambda time_s, share=share: share * max(0.0, 0.3 * (time_s - since_s))
-    for _ in range(20):
+        share = 0.5 * acceleration * (1.0 if k < links else 0.01)  # 10 um from one poll of a joint to the next
+        machine.true_mm[channel] = lambda time_s, share=share: share * max(0.0, time_s - since_s) ** 2
+    for _ in range(6):
         machine.run(0.1)
         scatter_mm = [reading.motion.scatter_mm for reading in machine.published.values() if reading.motion]
         assert not any(mm > 2e-4 for mm in scatter_mm)

@@ -141,8 +141,10 @@ def held_up(service):
     service.publisher._observers = (hold_up,)
     service.deliver(setpoint(0, service.clock.monotonic()))
     assert entered.wait(TIMEOUT_S)
-    yield
-    leave.set()
+    try:
+        yield
+    finally:
+        leave.set()
 
 
 def test_a_full_queue_drops_the_oldest_and_counts_them(service):
