@@ -44,7 +44,7 @@ $(INSTALLED): pyproject.toml
 
 $(STAMP): $(INSTALLED)
 	@echo "Compiling the kernels for this processor (a minute, once) ..."
-	@$(BIN)/python -c 'import compd.live.run'
+	@$(BIN)/python -c 'import compd.live.run_daemon'
 	@touch $@
 
 demo: $(STAMP)

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from compd.comparison.open import open_recording as open_recording
     from compd.configuration.shipped import load_machine as load_machine
     from compd.errors import CompdError as CompdError
-    from compd.model.effect import Constant as Constant
-    from compd.model.effect import Effect as Effect
-    from compd.model.effect import Parameter as Parameter
-    from compd.model.effect import memoryless_basis as memoryless_basis
+    from compd.model.effects.effect import Constant as Constant
+    from compd.model.effects.effect import Effect as Effect
+    from compd.model.effects.effect import Parameter as Parameter
+    from compd.model.effects.effect import memoryless_basis as memoryless_basis
     from compd.model.library.effects_file import load_effects as load_effects
     from compd.release import __version__ as __version__
     from compd.simulation.campaign.simulate_campaign import simulate_campaign as simulate_campaign
@@ -46,10 +46,10 @@ _MODULES = {
     "fit_stream": "compd.api.long_recordings",
     "plan_measurement": "compd.api.measurements",
     "connect": "compd.client",
-    "Effect": "compd.model.effect",
-    "Parameter": "compd.model.effect",
-    "Constant": "compd.model.effect",
-    "memoryless_basis": "compd.model.effect",
+    "Effect": "compd.model.effects.effect",
+    "Parameter": "compd.model.effects.effect",
+    "Constant": "compd.model.effects.effect",
+    "memoryless_basis": "compd.model.effects.effect",
     "CompdError": "compd.errors",
 }
 __all__ = list(_MODULES)

@@ -10,10 +10,10 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.configuration.geometry import Geometry, ToolOnPlateSettings, ToolOnPlatformSettings
 from compd.configuration.operation import Wiring
-from compd.model.kernels.rotation import rotation_matrix, to_outer
+from compd.rotation import rotation_matrix, to_outer
 from compd.model.machine import MachineModel, machine_constants, machine_model
-from compd.model.observations import MachineDetails
-from compd.model.tool import Arrangement, Contact, ToolOnPlate, ToolOnPlatform
+from compd.model.effects.observations import MachineDetails
+from compd.model.kinematics.tool import Arrangement, Contact, ToolOnPlate, ToolOnPlatform
 
 # Equation (1): the two ball shanks of a revolute joint are averaged, gB = (Ra + Rb) / 2.
 WEIGHT_OF_ROLE: Mapping[str, float] = {"S": 1.0, "B": 1.0, "Ra": 0.5, "Rb": 0.5}

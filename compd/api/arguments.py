@@ -10,7 +10,7 @@ from typing import TypeAlias
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.open import open_recording
 from compd.errors import Problem, StateError
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.model_file.model_file import ModelFile, read_model_file
 
 # An opened recording, or the path of one whose machine is found by its name.

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.comparison.compare import compare as compare_aligned
+from compd.comparison.recording_comparison import compare as compare_aligned
 from compd.comparison.comparison import Comparison
-from compd.diagnosis.diagnose import diagnose as diagnose_aligned
+from compd.diagnosis.recording_diagnosis import diagnose as diagnose_aligned
 from compd.diagnosis.verdict import Diagnosis
-from compd.model.effect_needs import can_concern
+from compd.model.effects.effect_needs import can_concern
 from compd.model.library import load_library
 from compd.model.library.effects_file import gather_effects
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from compd.api.arguments import Model, opened_model
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.fit import FitResult
+from compd.comparison.effect_fit import FitResult
 from compd.comparison.open import open_recording
 from compd.comparison.stream.block_comparison import compare_blocks
 from compd.comparison.stream.block_fit import fit_blocks

@@ -10,7 +10,7 @@ from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_r
 from compd.configuration.shipped import Machine, load_machine, shipped_names
 from compd.diagnosis import model_changes
 from compd.errors import CompdError, Problem, StateError
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.model.library import find_effect, load_library
 from compd.model.library.effects_file import gather_effects, named_effect
 from compd.model_file.model_document import read_stored

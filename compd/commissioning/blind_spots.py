@@ -15,21 +15,21 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.commissioning.feigned_jumps import FeignedJump, feigned_jumps, measured_lengths
+from compd.commissioning.jump_trials import FeignedJump, feigned_jumps, measured_lengths
 from compd.commissioning.line_budget import LineBudget, line_budgets
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
-from compd.configuration.stated_noise import SCATTER_RATIO, tolerance_mm
+from compd.stated_noise import SCATTER_RATIO, tolerance_mm
 from compd.errors import KinematicsError
 from compd.live.acquisition.reading_trust import LEAST_MOTION
 from compd.live.acquisition.way_evidence import LEAST_WAY_MM, WAY_SHARE
 from compd.live.loop.wired_readings import RESTED
-from compd.live.quantity_limits import UNIT_LIMITS
+from compd.live.acquisition.quantity_limits import UNIT_LIMITS
 from compd.machine_builder import build_model
 from compd.model.machine import MachineModel
-from compd.model.tool import ToolOnPlate
+from compd.model.kinematics.tool import ToolOnPlate
 from compd.units import UM_PER_MM
 
 DRIFT_UM = 10.0

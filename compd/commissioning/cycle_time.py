@@ -21,10 +21,10 @@ from compd.live.loop.directions import Directions
 from compd.live.loop.loop import Loop
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import Models, ModelText, try_model
-from compd.live.loop.sent_cycle import CyclePacker, SentSetpoint
+from compd.live.loop.ring_entries import CyclePacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
-from compd.live.pipeline import build_pipeline
+from compd.live.loop.pipeline import build_pipeline
 from compd.model.machine import MachineModel
 
 _CYCLES = 200

@@ -20,10 +20,10 @@ from compd.comparison.display_unit import format_error, residual_ending
 from compd.comparison.noise_floor import NoiseFloor
 from compd.comparison.prediction_uncertainty import Uncertainty
 from compd.comparison.residual_trends import Trend
-from compd.model.effect import FittedEffect
+from compd.model.effects.effect import FittedEffect
 from compd.model.uncertainty import GaugeNoise
 from compd.recording.reference import sigma_key
-from compd.tables import data_frame, html_table
+from compd.result_tables import data_frame, html_table
 from compd.text.json_text import nan_to_null
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.initial_states import initial_state_columns
-from compd.comparison.statistics.least_squares import column_norms, solve_least_squares
-from compd.comparison.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
-from compd.model.effect import FittedEffect
+from compd.statistics.least_squares import column_norms, solve_least_squares
+from compd.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
+from compd.model.effects.effect import FittedEffect
 from compd.units import UM_PER_MM
 
 # What is fitted along is an effect's own where the effect leaves less of it than this share.

@@ -2,7 +2,7 @@
 
 Example::
 
-    from compd.comparison.compare import compare
+    from compd.comparison.recording_comparison import compare
     from compd.comparison.open import open_recording
 
     aligned = open_recording("run.csv")  # the machine's configuration is found by its name in the sidecar

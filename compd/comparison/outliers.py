@@ -8,8 +8,8 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.statistics.replicates import replicate_pairs
-from compd.comparison.statistics.robust import LEAST_SIGMA, robust_sigma, trimmed_scale
+from compd.statistics.replicates import replicate_pairs
+from compd.statistics.robust import LEAST_SIGMA, robust_sigma, trimmed_scale
 
 
 class OutlierLimits(NamedTuple):

@@ -22,10 +22,10 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.statistics.least_squares import solve_least_squares
-from compd.comparison.statistics.periodogram import PeriodLimits, strongest_periods
-from compd.model.effect import Constant, ConstantValues, Effect
-from compd.model.effect_basis import evaluate_basis, port_size
+from compd.statistics.least_squares import solve_least_squares
+from compd.statistics.periodogram import PeriodLimits, strongest_periods
+from compd.model.effects.effect import Constant, ConstantValues, Effect
+from compd.model.effects.effect_basis import evaluate_basis, port_size
 from compd.model.formula.columns import column_values
 from compd.units import UM_PER_MM
 

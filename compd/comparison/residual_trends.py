@@ -18,12 +18,12 @@ from scipy.special import betainc
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.covariates import Covariate, covariates
+from compd.comparison.covariate import Covariate, covariates
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import format_error
-from compd.comparison.neighbour_blocks import neighbour_blocks
+from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.noise_floor import NoiseFloor
-from compd.comparison.statistics.cluster_covariance import cluster_std
+from compd.statistics.cluster_covariance import cluster_std
 from compd.recording.gaps import filled
 
 # Trends per coordinate, and collinear covariates per trend: more are noise in a report.

@@ -20,9 +20,9 @@ from scipy.optimize import minimize_scalar
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.fit import FitResult, fit, initial_effect
+from compd.comparison.effect_fit import FitResult, fit, initial_effect
 from compd.comparison.period_search import neighbouring_periods, promising_constants
-from compd.model.effect import ConstantValues, Effect, FittedEffect
+from compd.model.effects.effect import ConstantValues, Effect, FittedEffect
 
 # A constant is known well enough when an error of it moves the residual by less than its own standard error: 1 % is.
 FINE = 0.01

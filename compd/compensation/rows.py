@@ -12,7 +12,7 @@ from compd.arrays import FloatArray
 from compd.compensation.values import GaugeValues, Wanted, WarmStart
 from compd.errors import CompdError, Problem
 from compd.model.machine import MachineModel
-from compd.model.reference_conditions import value_at_zero
+from compd.reference_conditions import value_at_zero
 
 
 class Rows(NamedTuple):

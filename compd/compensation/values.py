@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from compd.arrays import FloatArray, IntArray
 from compd.model.effect_memory import EffectMemory
-from compd.model.frame import Frame
+from compd.model.kinematics.frame import Frame
 from compd.model.machine import MachineModel
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.comparison import Comparison
 from compd.diagnosis.verdict import Diagnosis
 

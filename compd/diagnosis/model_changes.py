@@ -11,18 +11,18 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.comparison import Comparison
-from compd.comparison.fit import FitResult, fit, initial_effect
+from compd.comparison.effect_fit import FitResult, fit, initial_effect
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.candidates.candidates import library_pool
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
-from compd.model.effect import Effect, FittedEffect
-from compd.model.effect_basis import counted_from, recounted
+from compd.model.effects.effect import Effect, FittedEffect
+from compd.model.effects.effect_basis import counted_from, recounted
 from compd.model.library import load_library
-from compd.model.observations import Observations
+from compd.model.effects.observations import Observations
 from compd.model_file.model_document import Declaration, Kind, ModelStep, StoredModel
 from compd.model_file.model_file import ModelFile
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from compd.diagnosis.findings import EmpiricalFinding
-from compd.diagnosis.planning.next_measurement import measurement_of_constant, measurement_to_test, next_measurement
+from compd.planning.next_measurement import measurement_of_constant, measurement_to_test, next_measurement
 from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.verdict import Diagnosis

@@ -10,9 +10,9 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.fit import FitResult
+from compd.comparison.effect_fit import FitResult
 from compd.comparison.nuisance import nuisance_beside
-from compd.comparison.statistics.least_squares import normal_inverse
+from compd.statistics.least_squares import normal_inverse
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
 from compd.units import UM_PER_MM

@@ -15,7 +15,7 @@ from compd.diagnosis.findings import (
     GrossRows,
     UntestedEffect,
 )
-from compd.tables import Columns, data_frame, html_table
+from compd.result_tables import Columns, data_frame, html_table
 from compd.text.json_text import nan_to_null
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from compd.errors import CompdError, Problem
 from compd.files.atomic_files import file_stamp
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import Outcome, outcomes
-from compd.fleet.examination import Examination
+from compd.fleet.machine_examination import Examination
 from compd.fleet.fleet_recording import FleetRecording
 from compd.fleet.recording_result import NOT_DONE, Command, RecordingResult
 

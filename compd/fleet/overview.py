@@ -17,7 +17,7 @@ from compd.fleet.outlying import ERROR, ERROR_LEFT, OutlyingMachine, outlying_ma
 from compd.fleet.recording_result import AT_FLOOR, RecordingResult
 from compd.fleet.steady_effects import LoneEffect, lone_effects, steady_effects
 from compd.report.page_table import PageTable
-from compd.text.number_text import estimate_text, join_words, number_text
+from compd.text.numbers_as_text import estimate_text, join_words, number_text
 
 # Verdicts of recordings that the model explains: of `diagnose`, and of `compare`.
 _NOTHING_MISSING = ("adequate", AT_FLOOR)

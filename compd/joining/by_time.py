@@ -14,7 +14,7 @@ from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.instruments.track import LENGTH, Track
 from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
-from compd.recording.columns import ATTITUDE_COLUMNS, DISTANCE_COLUMN, link_reference_column
+from compd.tables.columns import ATTITUDE_COLUMNS, DISTANCE_COLUMN, link_reference_column
 from compd.recording.recording import Recording
 from compd.recording.reference import Frame
 from compd.recording.sidecar import sidecar_contents

@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import Problem, RecordingError
-from compd.recording.columns import ID_COLUMNS, approach_columns
+from compd.tables.columns import ID_COLUMNS, approach_columns
 from compd.recording.recording import Recording
 
 # The scales of a machine at rest stay within this, or within what their own noise can imitate.

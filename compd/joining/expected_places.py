@@ -9,10 +9,10 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.machine_builder import build_model
-from compd.model.motion import Movement
-from compd.model.observe import observe
+from compd.model.kinematics.motion import Movement
+from compd.model.observer import observe
 from compd.model.prediction import predict
-from compd.recording.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.tables.columns import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.units import UM_PER_MM
 
 

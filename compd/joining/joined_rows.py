@@ -12,7 +12,7 @@ from compd.instruments.export import ATTITUDE_AXES, LENGTH_AXES, InstrumentExpor
 from compd.joining.assignment import REPEAT_MM
 from compd.joining.by_time import Instrument
 from compd.joining.dwells import Dwell, dwell_columns
-from compd.recording.columns import ATTITUDE_COLUMNS, POSITION_COLUMNS, link_reference_column
+from compd.tables.columns import ATTITUDE_COLUMNS, POSITION_COLUMNS, link_reference_column
 from compd.recording.recording import Recording
 from compd.recording.sidecar import sidecar_contents
 

@@ -10,9 +10,9 @@ from compd.arrays import FloatArray, IntArray
 from compd.errors import Problem, RecordingError
 from compd.joining.distances import LARGEST_RMS_MM
 from compd.joining.monotone_match import CLEAR_MARGIN, match_in_order
-from compd.recording.plan_file import TIP_COLUMNS, WRITTEN_BY
-from compd.recording.tables.csv_table import read_table
-from compd.recording.tables.problem_list import ProblemList
+from compd.plan_file import TIP_COLUMNS, WRITTEN_BY
+from compd.tables.csv_table import read_table
+from compd.tables.problem_list import ProblemList
 
 
 def read_plan_points(path: Path) -> FloatArray:

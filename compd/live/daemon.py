@@ -26,20 +26,20 @@ from compd.configuration.lines import powered
 from compd.configuration.pushed_lines import PushedLineSettings
 from compd.errors import DaemonError, StateError
 from compd.live.acquisition.acquisition import Acquisition
-from compd.live.acquisition.votes.votes import Votes
+from compd.live.acquisition.cross_checks.cross_checks import Votes
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model, warn_of_datum
-from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.ring_entries import SentSetpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.poll_requests import PollRequests
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.memory.trust_memory import TrustMemory
-from compd.live.pipeline import build_pipeline
-from compd.live.port_names import changed_ports, port_names
+from compd.live.loop.pipeline import build_pipeline
+from compd.live.system.port_names import changed_ports, port_names
 from compd.live.processes.acquisition_process import AcquisitionProcess
-from compd.live.processes.control import Control
+from compd.live.memory.control import Control
 from compd.live.processes.loop_process import LoopProcess
 from compd.live.processes.service_process import ServiceProcess, StateLog
 from compd.live.service.acceptance import Acceptance
@@ -47,7 +47,7 @@ from compd.live.service.budget_message import BudgetMessage
 from compd.live.service.last_readings import LastReadings
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
-from compd.live.service.machine_message import machine_message
+from compd.live.service.machine_reply import machine_message
 from compd.live.service.messages import PROTOCOL
 from compd.live.service.model_keeping import ModelKeeping
 from compd.live.service.model_switch import ModelSwitch

@@ -6,16 +6,16 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from compd.arrays import FloatArray
-from compd.model.deltas import Memories
-from compd.model.effect_program import EffectProgram
+from compd.model.effects.deltas import Memories
+from compd.model.effects.effect_program import EffectProgram
 from compd.model.machine import MachineModel
-from compd.model.motion import Motion, pack_motion, unpack_motion
+from compd.model.kinematics.motion import Motion, pack_motion, unpack_motion
 
 _NO_MEMORIES: Memories = {}
 
 
 class PackedMemory(NamedTuple):
-    """What the kernel of one program leaves; see `compd.model.kernels.motion` and `compd.model.effect_program`.
+    """What the kernel of one program leaves; see `compd.model.kernels.motion` and `compd.model.effects.effect_program`.
 
     links : n.  motion : a row of numbers.  memories : those of all effects, behind one another.
     """

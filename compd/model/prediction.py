@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.deltas import Deltas
-from compd.model.effect import Port
-from compd.model.frame import solve_frame
+from compd.model.effects.deltas import Deltas
+from compd.model.effects.effect import Port
+from compd.model.kinematics.frame import solve_frame
 from compd.model.kernels.joints import joint_shortening
-from compd.model.kernels.rotation import compose, rotation_matrix
-from compd.model.kinematics import Mechanism, forward_kinematics, link_length_mm
+from compd.rotation import compose, rotation_matrix
+from compd.model.kinematics.link_kinematics import Mechanism, forward_kinematics, link_length_mm
 from compd.model.machine import MachineModel
-from compd.model.observations import Observations
+from compd.model.effects.observations import Observations
 
 
 class Prediction(NamedTuple):

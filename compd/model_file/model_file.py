@@ -16,8 +16,8 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
-from compd.model.effect import Effect, FittedEffect
-from compd.model.effect_needs import is_measured, needed_quantities
+from compd.model.effects.effect import Effect, FittedEffect
+from compd.model.effects.effect_needs import is_measured, needed_quantities
 from compd.model.library import find_effect
 from compd.model_file.model_document import (
     Declaration,
@@ -30,7 +30,7 @@ from compd.model_file.model_document import (
     write_stored,
 )
 from compd.plugins import OWN_CODE, Code
-from compd.tables import Columns, data_frame, html_table
+from compd.result_tables import Columns, data_frame, html_table
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,10 +17,10 @@ from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.machine_builder import build_model
-from compd.model.frame import solve_frame
-from compd.model.instantaneous import frame_difference, frame_jacobians, instantaneous_frame
-from compd.model.kernels.rotation import compose, rotation_matrix, to_outer
-from compd.model.kinematics import forward_kinematics
+from compd.model.kinematics.frame import solve_frame
+from compd.model.kinematics.instantaneous import frame_difference, frame_jacobians, instantaneous_frame
+from compd.rotation import compose, rotation_matrix, to_outer
+from compd.model.kinematics.link_kinematics import forward_kinematics
 from compd.model.machine import MachineModel
 from compd.paper.gauge_log import GaugeLog
 from compd.simulation.truth.strengths import Strengths

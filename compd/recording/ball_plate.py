@@ -11,9 +11,9 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.errors import Problem
 from compd.files.atomic_files import write_files
-from compd.recording.tables.csv_table import read_table
-from compd.recording.tables.problem_list import ProblemList, rows_text, values_text
-from compd.recording.tables.table import Table
+from compd.tables.csv_table import read_table
+from compd.tables.problem_list import ProblemList, rows_text, values_text
+from compd.tables.table import Table
 
 COLUMNS: Mapping[str, str] = {
     "ball": "number of the ball, each once",

@@ -13,11 +13,11 @@ from itertools import chain, pairwise
 from pathlib import Path
 
 from compd.configuration import Configuration
-from compd.recording import table_file
+from compd.tables import table_file
 from compd.recording.recording import Recording
 from compd.recording.recording_builder import RecordingBuilder
-from compd.recording.table_file import table_blocks, table_path
-from compd.recording.tables.table import TableBlock
+from compd.tables.table_file import table_blocks, table_path
+from compd.tables.table import TableBlock
 
 BLOCK_ROWS = 100_000
 

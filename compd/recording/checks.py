@@ -24,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.recording.columns import DISTANCE_COLUMN, ID_COLUMNS
-from compd.recording.tables.problem_list import ProblemList, rows_text, values_text
-from compd.recording.tables.table import Table
+from compd.tables.columns import DISTANCE_COLUMN, ID_COLUMNS
+from compd.tables.problem_list import ProblemList, rows_text, values_text
+from compd.tables.table import Table
 
 
 class Limit(NamedTuple):

@@ -15,11 +15,11 @@ import numpy as np
 
 from compd.errors import Problem, RecordingError
 from compd.files.atomic_files import Content
-from compd.recording.columns import number_text
+from compd.tables.columns import number_text
 from compd.recording.open_part import ARROW, OpenPart
 from compd.recording.parquet_writer import ROW_GROUP_ROWS, arrow_batch, arrow_schema, write_parquet
-from compd.recording.table_file import CSV, PARQUET, SUFFIXES, row_count, table_blocks, table_path
-from compd.recording.tables.table import FIRST_ROW, Table
+from compd.tables.table_file import CSV, PARQUET, SUFFIXES, row_count, table_blocks, table_path
+from compd.tables.table import FIRST_ROW, Table
 from compd.recording.writer import write_recording_files
 
 # Columns that may hold text in some recording; a reader knows in which.

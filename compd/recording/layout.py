@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from compd.configuration import Configuration
 from compd.errors import Problem
-from compd.recording.columns import (
+from compd.tables.columns import (
     ATTITUDE_COLUMNS,
     ATTITUDES,
     AXES,
@@ -24,7 +24,7 @@ from compd.recording.columns import (
 )
 from compd.recording.reference import OF_FIXED_PLACES, sigma_key
 from compd.recording.sidecar import EXTERNAL, PLACE, TIME, Sidecar
-from compd.recording.tables.problem_list import ProblemList
+from compd.tables.problem_list import ProblemList
 from compd.units import REFERENCE_UNITS
 
 _IN_REFERENCE_UNIT = re.compile(r"(?:reference|model)_(?:[xyz]|link_[1-9]\d*)")

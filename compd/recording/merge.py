@@ -12,7 +12,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.recording.columns import ID_COLUMNS
+from compd.tables.columns import ID_COLUMNS
 from compd.recording.recording import Recording
 from compd.recording.reference import sigma_key
 from compd.recording.sidecar import sidecar_contents

@@ -13,7 +13,7 @@ from typing import Any
 from compd.errors import Problem, RecordingError
 from compd.files.atomic_files import write_files
 from compd.recording.parquet_writer import arrow_batch, arrow_schema, write_parquet
-from compd.recording.tables.parquet_table import arrow_modules
+from compd.tables.parquet_table import arrow_modules
 
 ARROW = ".arrow"
 

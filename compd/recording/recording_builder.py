@@ -23,7 +23,7 @@ from compd.recording.checks import (
     check_values,
     largest_joint_um,
 )
-from compd.recording.columns import (
+from compd.tables.columns import (
     ATTITUDE_COLUMNS,
     ATTITUDES,
     AXES,
@@ -37,8 +37,8 @@ from compd.recording.columns import (
 from compd.recording.layout import Layout, machine_problems, read_layout
 from compd.recording.recording import Recording
 from compd.recording.sidecar import Sidecar, read_sidecar
-from compd.recording.tables.problem_list import ProblemList, rows_text
-from compd.recording.tables.table import FIRST_ROW, Table
+from compd.tables.problem_list import ProblemList, rows_text
+from compd.tables.table import FIRST_ROW, Table
 from compd.travel_direction import RowDirections
 from compd.units import UM_PER_MM
 

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
 from compd.files.atomic_files import Content, write_files
-from compd.recording.columns import decimals, is_covariate, number_text, parse_name
+from compd.tables.columns import decimals, is_covariate, number_text, parse_name
 from compd.recording.parquet_writer import arrow_batch, arrow_schema, write_parquet
 from compd.recording.sidecar import sidecar_text
-from compd.recording.table_file import PARQUET, SUFFIXES
+from compd.tables.table_file import PARQUET, SUFFIXES
 
 
 def write_recording(

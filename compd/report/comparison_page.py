@@ -10,7 +10,7 @@ from plotly.graph_objects import Figure
 
 from compd.arrays import rms
 from compd.comparison.comparison import Comparison
-from compd.comparison.covariates import covariates
+from compd.comparison.covariate import covariates
 from compd.comparison.display_unit import format_error
 from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.model_file.model_file import parameter_estimates
@@ -25,7 +25,7 @@ from compd.report.figures import (
 from compd.report.page import Panel, write_page
 from compd.report.page_table import PageTable
 from compd.report.small_multiples import plot_residual_against
-from compd.text.number_text import number_text
+from compd.text.numbers_as_text import number_text
 
 HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all {rows}; a flat line at zero is right."
 

@@ -20,7 +20,7 @@ from compd.diagnosis.words.phrases import (
 )
 from compd.report.page_table import PageTable
 from compd.report.planned_rows import planned_rows_table
-from compd.text.number_text import chance_text, estimate_text, fall_text, number_text, percent_text
+from compd.text.numbers_as_text import chance_text, estimate_text, fall_text, number_text, percent_text
 
 # Columns of the YAML in a page and a terminal: lines that are not broken can be copied.
 YAML_WIDTH = 76

@@ -14,7 +14,7 @@ from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import ErrorFall, error_fall
 from compd.diagnosis.words.summary_lines import summary_lines
-from compd.model.effect import FittedEffect
+from compd.model.effects.effect import FittedEffect
 from compd.model.library import find_effect
 from compd.report.diagnosis_evidence import (
     candidates_table,

@@ -14,7 +14,7 @@ from compd.diagnosis.holdout import Holdout
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import ErrorFall, error_fall
 from compd.diagnosis.words.summary_lines import WIDTH, summary_lines
-from compd.recording.plan_file import PURPOSE_COLUMN
+from compd.plan_file import PURPOSE_COLUMN
 from compd.report.diagnosis_evidence import (
     candidates_table,
     constant_table,

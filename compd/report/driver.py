@@ -10,9 +10,9 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.covariates import Covariate, covariates
-from compd.model.effect import FittedEffect
-from compd.model.effect_needs import needed_quantities
+from compd.comparison.covariate import Covariate, covariates
+from compd.model.effects.effect import FittedEffect
+from compd.model.effects.effect_needs import needed_quantities
 from compd.report.error_part import ErrorPart
 from compd.report.small_multiples import axis_title
 from compd.units import unit_of

@@ -10,16 +10,16 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError
-from compd.model.deltas import effect_deltas
-from compd.model.effect import Constant, Effect, FittedEffect, Parameter
-from compd.model.effect_needs import needed_quantities, unmet_needs
-from compd.model.kinematics import inverse_kinematics
+from compd.model.effects.deltas import effect_deltas
+from compd.model.effects.effect import Constant, Effect, FittedEffect, Parameter
+from compd.model.effects.effect_needs import needed_quantities, unmet_needs
+from compd.model.kinematics.link_kinematics import inverse_kinematics
 from compd.model.machine import MachineModel, machine_constants
-from compd.model.motion import Movement, update_motion
-from compd.model.observations import MachineDetails, Observations
-from compd.model.observe import observe
+from compd.model.kinematics.motion import Movement, update_motion
+from compd.model.effects.observations import MachineDetails, Observations
+from compd.model.observer import observe
 from compd.model.prediction import predict
-from compd.model.reference_conditions import REFERENCE_PRESSURE_hPa
+from compd.reference_conditions import REFERENCE_PRESSURE_hPa
 from compd.units import UM_PER_MM
 
 # The workspace that is drawn: as far from machine zero as the shipped machines go comfortably.

@@ -9,8 +9,8 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, rms
 from compd.comparison.comparison import Comparison
-from compd.comparison.statistics.least_squares import solve_least_squares
-from compd.model.effect import FittedEffect
+from compd.statistics.least_squares import solve_least_squares
+from compd.model.effects.effect import FittedEffect
 from compd.model.sensitivity import link_residuals
 from compd.units import UM_PER_MM
 

@@ -12,7 +12,7 @@ from compd.comparison.display_unit import format_error
 from compd.model_file.model_document import StoredModel
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
-from compd.text.number_text import number_text
+from compd.text.numbers_as_text import number_text
 
 LEDGER_HEAD = ("", "step", "fitted on", "before", "after", "floor", "unit", "date")
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
-from compd.recording.plan_file import PURPOSE_COLUMN
+from compd.plan_file import PURPOSE_COLUMN
 from compd.report.page_table import PageTable
 
 Row = Mapping[str, Any]

@@ -6,7 +6,7 @@ from itertools import takewhile
 from pathlib import Path
 
 from compd.configuration.shipped import shipped_effects
-from compd.model.effect import Constant, Effect, Parameter
+from compd.model.effects.effect import Constant, Effect, Parameter
 from compd.model.library.effects_file import load_effects
 from docs.generate.markdown import code, escape, fence, heading, join, link, sentence, table, target
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.live.events import EVENTS, KEYS
+from compd.live.system.events import EVENTS, KEYS
 from docs.generate.markdown import code, codes, escape, heading, join, sentence, table
 
 INTRODUCTION = """\

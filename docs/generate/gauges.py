@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from compd.commissioning.catalogue import GIVEN_BY_THE_CONFIGURATION, catalogue, driver_text
+from compd.gauge_tools.driver_catalogue import GIVEN_BY_THE_CONFIGURATION, catalogue, driver_text
 from compd.gauge import Gauge, GaugeOptions, Quality
 from compd.plugins import GAUGES, load
 from docs.generate.configuration import keys_table

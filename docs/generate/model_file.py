@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from compd.model.effect import FittedEffect
+from compd.model.effects.effect import FittedEffect
 from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK, READING_PORTS
 from compd.model.formula.declaration import formula_effect
 from compd.model.formula.functions import FUNCTIONS, LAG

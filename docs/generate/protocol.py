@@ -16,7 +16,7 @@ from compd.live.service.messages import LARGEST_NUMBER, MAX_LINE_BYTES, PROTOCOL
 from compd.live.service.order import OrderKeys
 from compd.live.service.request import Asker, Request
 from compd.live.service.requests import REQUESTS
-from compd.live.service.seats import AUTH_WITHIN_S, IDLE_AFTER_S, MAX_CLIENTS, MAX_TCP_CLIENTS
+from compd.live.service.connection_limits import AUTH_WITHIN_S, IDLE_AFTER_S, MAX_CLIENTS, MAX_TCP_CLIENTS
 from docs.generate.live_examples import Exchange, exchanges, shown
 from docs.generate.markdown import code, escape, fence, heading, join, link, prose, table, target, term
 from docs.generate.schema import Key, ModelSchema

@@ -17,7 +17,7 @@ from compd.diagnosis.findings import (
     ParameterEstimate,
     Rival,
 )
-from compd.diagnosis.planning.measurement_plan import MeasurementPlan
+from compd.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import (
     ConfigurationError,
@@ -28,7 +28,7 @@ from compd.errors import (
     RecordingError,
     StateError,
 )
-from compd.model.effect import FittedEffect
+from compd.model.effects.effect import FittedEffect
 from compd.model_file.model_document import ModelStep
 from compd.model_file.model_file import EffectNumber, ModelFile
 from compd.simulation.campaign.simulate_campaign import CampaignFiles

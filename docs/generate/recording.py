@@ -6,8 +6,9 @@ import inspect
 from typing import Any
 
 from compd.live.record.recording_part import CYCLES_SUFFIX
-from compd.recording import ball_plate, checks, plan_file
-from compd.recording.columns import COLUMN_KINDS, DECIMALS
+from compd.recording import ball_plate, checks
+from compd import plan_file
+from compd.tables.columns import COLUMN_KINDS, DECIMALS
 from compd.recording.reference import Reference
 from compd.recording.sidecar import EXTERNAL, SECTIONS, Exclusion, sidecar_contents, sidecar_text
 from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table, term

@@ -14,13 +14,13 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.cli.main import app
-from compd.comparison.compare import compare
-from compd.comparison.neighbour_blocks import neighbour_blocks
+from compd.comparison.recording_comparison import compare
+from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.open import open_recording
-from compd.comparison.statistics.robust import robust_regression, trimmed_scale
+from compd.statistics.robust import robust_regression, trimmed_scale
 from compd.configuration.shipped import shipped_configuration
 from compd.diagnosis.candidates.candidates import Candidate
-from compd.diagnosis.diagnose import diagnose, explain_residual
+from compd.diagnosis.recording_diagnosis import diagnose, explain_residual
 from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.gross_rows import EXPONENT, RIDGE, ROUNDS

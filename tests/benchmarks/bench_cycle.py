@@ -11,9 +11,9 @@ import numpy as np
 from compd.gauge import good
 from compd.live.loop.commands import Target
 from compd.live.loop.model_loader import LiveModel, Models
-from compd.live.realtime import QuietCollector
-from compd.model.effect import FittedEffect
-from compd.model.effect_needs import needed_quantities
+from compd.live.system.realtime import QuietCollector
+from compd.model.effects.effect import FittedEffect
+from compd.model.effects.effect_needs import needed_quantities
 from compd.model.library import load_library
 from compd.model.uncertainty import GaugeNoise
 from tests.benchmarks.figures import median_and_p99, show

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import outcomes
-from compd.fleet.examination import Examination, examination
+from compd.fleet.machine_examination import Examination, examination
 from compd.fleet.examine import BATCH
 from compd.fleet.fleet_recording import FleetRecording
 from compd.fleet.recordings import find_recordings

@@ -34,7 +34,7 @@ import numpy as np
 
 from compd.configuration.operation import LoopSettings
 from compd.gauge import Quality, Reading, bad, good
-from compd.live import realtime
+from compd.live.system import realtime
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.setpoint import Setpoint, SetpointValues

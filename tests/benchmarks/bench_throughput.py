@@ -29,7 +29,7 @@ from compd.lines import open_line
 from compd.lines.modbus_rtu import crc16
 from compd.live.acquisition.acquisition import Acquisition
 from compd.live.memory.latest import Latest
-from compd.live.realtime import sharpen_timers
+from compd.live.system.realtime import sharpen_timers
 from compd.plugins import GAUGES, load
 
 SECONDS = 4.0  # of measuring per row

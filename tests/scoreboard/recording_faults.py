@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
-from compd.recording.columns import POSITION_COLUMNS
+from compd.tables.columns import POSITION_COLUMNS
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM
 
 UM = 1e-3

@@ -10,13 +10,13 @@ from typing import Any
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.open import open_recording
 from compd.comparison.shape_search import search_constants
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.errors import CompdError
-from compd.model.effect import Effect, FittedEffect
+from compd.model.effects.effect import Effect, FittedEffect
 from compd.model.library import load_library
 from compd.model.library.effects_file import load_effects
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.deltas import split_by_port
-from compd.model.effect import Effect, Port
-from compd.model.observations import Observations
+from compd.model.effects.deltas import split_by_port
+from compd.model.effects.effect import Effect, Port
+from compd.model.effects.observations import Observations
 from compd.model.sensitivity import Sensitivity
 
 

@@ -12,11 +12,11 @@ import yaml
 from compd.arrays import FloatArray
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.model.formula.declaration import formula_effect
-from compd.model.motion import Movement
-from compd.model.observations import Observations
-from compd.model.observe import observe_external
+from compd.model.kinematics.motion import Movement
+from compd.model.effects.observations import Observations
+from compd.model.observer import observe_external
 from compd.recording.reader import read_recording
 
 SIGMA_UM = 0.5

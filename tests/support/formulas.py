@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.model.formula.declaration import formula_effect
 
 

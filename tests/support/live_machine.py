@@ -11,7 +11,7 @@ from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.states import State
-from compd.live.pipeline import build_pipeline
+from compd.live.loop.pipeline import build_pipeline
 from tests.support.paths import CONFIG
 
 RATE_HZ = 200

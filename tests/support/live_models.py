@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from compd.live.loop.model_loader import Models
-from compd.model.effect import FittedEffect
+from compd.model.effects.effect import FittedEffect
 from compd.model.library import find_effect
 from compd.model_file.model_file import ModelFile
 from tests.support.live_machine import Machine

@@ -13,7 +13,7 @@ from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.configuration import Configuration, load
 from compd.configuration.shipped import shipped_configuration
-from compd.model.effect import FittedEffect
+from compd.model.effects.effect import FittedEffect
 from compd.model.library import load_library
 from compd.recording.reader import read_recording
 from compd.recording.writer import write_recording

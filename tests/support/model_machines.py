@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from compd.model.machine import MachineModel, machine_model
-from compd.model.tool import Contact, ToolOnPlate, ToolOnPlatform
+from compd.model.kinematics.tool import Contact, ToolOnPlate, ToolOnPlatform
 from tests.support.paths import VECTORS
 
 Floats = NDArray[np.float64]

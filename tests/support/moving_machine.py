@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.configuration import Configuration, load
-from compd.configuration.stated_noise import tolerance_mm
+from compd.stated_noise import tolerance_mm
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import MotionEstimate
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
@@ -24,7 +24,7 @@ from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.states import State
 from compd.live.memory.latest import Snapshot
 from compd.live.memory.readings import Readings
-from compd.live.pipeline import build_pipeline
+from compd.live.loop.pipeline import build_pipeline
 from compd.simulation.truth.motion import Move
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
 from compd.simulation.truth.world import World

@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 
 from compd.live.memory.shared_array import shared_floats
-from compd.live.realtime import sleep_until
+from compd.live.system.realtime import sleep_until
 from tests.support.other_process import beside
 
 _STEP_S = 0.01

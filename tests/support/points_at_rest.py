@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
 from compd.instruments.export import InstrumentExport
-from compd.recording.columns import FRAME_COLUMNS
+from compd.tables.columns import FRAME_COLUMNS
 from compd.recording.writer import write_recording
 
 SIDECAR = {"machine": "tripod-cmm"}

@@ -14,7 +14,7 @@ from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.loop.commands import Target
 from compd.live.loop.directions import Directions
-from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker
+from compd.live.loop.ring_entries import CyclePacker, CycleUnpacker
 from compd.live.record.recorder import Recorder, RecordingLimits
 from compd.live.service.readings_message import ReadingsMessage
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine

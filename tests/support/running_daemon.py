@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from compd.clock import MonotonicClock
 from compd.configuration import Configuration
 from compd.live.daemon import Daemon
-from compd.live.processes.child_process import ChildProcess
-from compd.live.processes.supervisor import Supervisor
-from compd.live.systemd import Notifier
+from compd.live.system.child_process import ChildProcess
+from compd.live.supervisor import Supervisor
+from compd.live.system.systemd import Notifier
 
 START_WITHIN_S = 30
 

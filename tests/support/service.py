@@ -14,7 +14,7 @@ from compd.compensation.values import CorrectionShares
 from compd.configuration.operation import SocketSettings
 from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
-from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.ring_entries import SentSetpoint
 from compd.live.loop.setpoint import Setpoint, SetpointValues
 from compd.live.loop.states import Mode, State
 from compd.live.memory.poll_requests import PollRequests

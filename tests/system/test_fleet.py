@@ -16,7 +16,7 @@ from distributed import Client
 from compd.errors import CompdError
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import outcomes
-from compd.fleet.examination import examination
+from compd.fleet.machine_examination import examination
 from compd.fleet.examine import examine_fleet
 from compd.fleet.recording_result import RecordingResult
 from compd.fleet.recordings import find_recordings

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.live.service import seats
+from compd.live.service import connection_limits as seats
 from tests.support.service import Service
 
 TOKEN = "hvNhV6l3Zk3lY0cJ4lV5Wg"

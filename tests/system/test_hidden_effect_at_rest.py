@@ -14,9 +14,9 @@ import pytest
 from typer.testing import CliRunner
 
 from compd.cli.main import app
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.open import open_recording
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.model.library import load_library
 from compd.recording.reader import read_recording
 from compd.recording.sidecar import sidecar_contents

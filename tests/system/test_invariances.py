@@ -18,7 +18,7 @@ import pytest
 from compd.comparison.open import open_recording
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.findings import ParameterEstimate
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.library import find_effect, load_library

@@ -12,7 +12,7 @@ import pytest
 from compd.comparison.open import open_recording
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.model.library import load_library
 from compd.recording.writer import write_recording
 from compd.simulation.campaign.simulated_recording import simulate_recording

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from compd.commissioning.conformance.case_result import CaseResult
-    from compd.commissioning.conformance.report import DriverUnderTest
+    from compd.conformance.case_result import CaseResult
+    from compd.conformance.report import DriverUnderTest
 
 driver = typer.Typer(no_args_is_help=True, help="Try gauge drivers.")
 
@@ -36,8 +36,8 @@ def try_on_wires(
 
     Exit code 1 if any case fails, or if a driver cannot be tried.
     """
-    from compd.commissioning.catalogue import polled_drivers
-    from compd.commissioning.conformance.report import driver_under_test
+    from compd.gauge_tools.driver_catalogue import polled_drivers
+    from compd.conformance.report import driver_under_test
     from compd.errors import PluginError
 
     chosen = _read_options(options, name) if options and name else None
@@ -58,7 +58,7 @@ def try_on_wires(
 
 def _try(driver: DriverUnderTest, quick: bool) -> int:
     """Print each case as it ends, and the table; the number that failed."""
-    from compd.commissioning.conformance.report import run_conformance
+    from compd.conformance.report import run_conformance
 
     typer.echo(f"\n{driver.name}, {driver.gauge.line_kind}:")
     results: list[tuple[str, CaseResult]] = []

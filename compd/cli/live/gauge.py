@@ -12,8 +12,8 @@ import typer
 from compd.cli.options import OverwriteOption
 
 if TYPE_CHECKING:
-    from compd.commissioning.gauge_statistics import GaugeStatistics
-    from compd.commissioning.open_gauge import GaugeTarget, PortArguments
+    from compd.gauge_tools.gauge_statistics import GaugeStatistics
+    from compd.gauge_tools.open_gauge import GaugeTarget, PortArguments
     from compd.gauge import Reading
 
 gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and describe gauges.")
@@ -47,7 +47,7 @@ def list_gauges() -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.commissioning.catalogue import catalogue
+    from compd.gauge_tools.driver_catalogue import catalogue
     from compd.report.terminal_table import keep_words_whole
 
     entries = catalogue()
@@ -68,7 +68,7 @@ def show(name: Annotated[str, typer.Argument(help="A driver's name: `compd gauge
     from rich.table import Table
 
     from compd.cli.reflow import reflowed
-    from compd.commissioning.catalogue import driver_description
+    from compd.gauge_tools.driver_catalogue import driver_description
 
     description = driver_description(name)
     console = Console()
@@ -88,7 +88,7 @@ def scan(
     ] = False,
 ) -> None:
     """Find serial ports; with --probe, look which presets fit what answers."""
-    from compd.commissioning.probe import announcements, preset_candidates
+    from compd.gauge_tools.probe import announcements, preset_candidates
     from compd.lines.computer_ports import serial_ports
 
     ports = serial_ports()
@@ -125,7 +125,7 @@ def read(
 ) -> None:
     """Read one gauge once, and show every byte. Exit code 1 if a channel has no value, or one that is stale."""
     from compd.clock import MonotonicClock
-    from compd.commissioning.open_gauge import aged, read_gauge
+    from compd.gauge_tools.open_gauge import aged, read_gauge
     from compd.gauge import LineFault
 
     gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
@@ -165,8 +165,8 @@ def watch(
     from rich.live import Live
 
     from compd.clock import MonotonicClock
-    from compd.commissioning.gauge_statistics import GaugeStatistics
-    from compd.commissioning.open_gauge import aged, poll_gauge
+    from compd.gauge_tools.gauge_statistics import GaugeStatistics
+    from compd.gauge_tools.open_gauge import aged, poll_gauge
 
     gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
     clock = MonotonicClock()
@@ -229,13 +229,13 @@ def learn(
 
     What the replies leave open is asked, each question with the option that answers it.
     """
-    from compd.commissioning.gauge_description.answers import Answers, error_reply, range_of
-    from compd.commissioning.gauge_description.capture import capture_live, read_capture, saved_capture
-    from compd.commissioning.gauge_description.describe import learn_gauge
-    from compd.commissioning.gauge_description.read_back import rounds
-    from compd.commissioning.gauge_description.reply_columns import DescriptionError
-    from compd.commissioning.gauge_file import LEARNED_GAUGE, gauge_file_text
-    from compd.commissioning.open_gauge import byte_line_settings
+    from compd.gauge_description.answers import Answers, error_reply, range_of
+    from compd.gauge_description.capture import capture_live, read_capture, saved_capture
+    from compd.gauge_description.describe import learn_gauge
+    from compd.gauge_description.read_back import rounds
+    from compd.gauge_description.reply_columns import DescriptionError
+    from compd.gauge_tools.gauge_file import LEARNED_GAUGE, gauge_file_text
+    from compd.gauge_tools.open_gauge import byte_line_settings
     from compd.files.output_file import check_replaceable
 
     if to is not None:
@@ -289,14 +289,14 @@ def _between_captures(done: int, wanted: int) -> None:
 def _port(
     port: str, baud: int | None, form: str | None, timeout_s: float, line_keys: Sequence[str] | None
 ) -> PortArguments:
-    from compd.commissioning.open_gauge import PortArguments
+    from compd.gauge_tools.open_gauge import PortArguments
 
     return PortArguments(port, baud, form, timeout_s, line_keys or ())
 
 
 def _target(target: str, name: str | None, port: PortArguments, assignments: Sequence[str] | None) -> GaugeTarget:
-    from compd.commissioning.gauge_file import gauge_of_file
-    from compd.commissioning.open_gauge import gauge_of_driver
+    from compd.gauge_tools.gauge_file import gauge_of_file
+    from compd.gauge_tools.open_gauge import gauge_of_driver
 
     if target.endswith((".yaml", ".yml")):
         return gauge_of_file(Path(target), name, port)

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
-from compd.recording.tables.table_format import TableFormat
+from compd.tables.table_format import TableFormat
 
 _MB = 1_000_000
 _S_PER_H = 3600.0

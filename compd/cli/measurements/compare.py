@@ -12,7 +12,7 @@ from compd.cli.options import MachineOption, OverwriteOption
 
 if TYPE_CHECKING:
     from compd.comparison.comparison import Comparison
-    from compd.model.effect import FittedEffect
+    from compd.model.effects.effect import FittedEffect
 
 # More sentences than this nobody reads in a terminal.
 MOST_SENTENCES = 6
@@ -129,6 +129,6 @@ def print_comparisons(comparisons: list[Comparison]) -> None:
 
 
 def _is_measured(fitted: FittedEffect) -> bool:
-    from compd.model.effect_needs import is_measured
+    from compd.model.effects.effect_needs import is_measured
 
     return is_measured(fitted.effect)

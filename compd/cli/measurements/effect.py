@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
     from compd.arrays import FloatArray
     from compd.comparison.alignment.aligned_recording import AlignedRecording
-    from compd.comparison.fit import FitResult
+    from compd.comparison.effect_fit import FitResult
     from compd.configuration import Configuration
     from compd.diagnosis.model_changes import Refinement
     from compd.errors import Problem
-    from compd.model.effect import Effect
+    from compd.model.effects.effect import Effect
     from compd.model_file.model_document import Declaration
     from compd.model_file.model_file import ModelFile
 
@@ -214,7 +214,7 @@ def _card(effect: Effect, configuration: Configuration | None) -> RenderableType
     from rich.console import Group
     from rich.table import Table
 
-    from compd.model.effect import PORTS
+    from compd.model.effects.effect import PORTS
 
     card = Table.grid(padding=(0, 2))
     card.add_row("[bold]effect", effect.id)
@@ -250,8 +250,8 @@ def _card(effect: Effect, configuration: Configuration | None) -> RenderableType
 def _lacking(effect: Effect, configuration: Configuration) -> list[Problem]:
     """What the effect needs and the machine's gauges do not measure."""
     from compd.machine_builder import build_model
-    from compd.model.effect_needs import unmet_needs
-    from compd.model.observations import available_settings
+    from compd.model.effects.effect_needs import unmet_needs
+    from compd.model.effects.observations import available_settings
 
     model = build_model(configuration.geometry, configuration.wiring)
     assert model.constants is not None

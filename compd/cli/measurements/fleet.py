@@ -11,7 +11,7 @@ from compd.cli.options import EffectsOption, OverwriteOption
 from compd.fleet.machine_names import MachinesBy
 
 if TYPE_CHECKING:
-    from compd.fleet.examination import Examination
+    from compd.fleet.machine_examination import Examination
     from compd.fleet.recording_result import RecordingResult
 
 # More of each a terminal does not show; the page and the table have all.
@@ -103,7 +103,7 @@ def compare(
     that was interrupted goes on where it stopped.
     """
     from compd.fleet.cluster import check_installed
-    from compd.fleet.examination import examination
+    from compd.fleet.machine_examination import examination
 
     check_installed()
     wanted = examination("compare", machine or (), model or ())
@@ -129,7 +129,7 @@ def diagnose(
     that was interrupted goes on where it stopped.
     """
     from compd.fleet.cluster import check_installed
-    from compd.fleet.examination import examination
+    from compd.fleet.machine_examination import examination
 
     check_installed()
     wanted = examination("diagnose", machine or (), model or (), effects or ())
@@ -158,7 +158,7 @@ def report(
 ) -> None:
     """Write the page: which machine has which effect, what drifts, which machine differs, what could not be read."""
     from compd.fleet.cluster import check_installed
-    from compd.fleet.examination import examination
+    from compd.fleet.machine_examination import examination
     from compd.fleet.fleet_page import write_fleet_page
     from compd.fleet.table import is_table, read_table
     from compd.report.page import check_page_path

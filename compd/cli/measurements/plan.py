@@ -74,9 +74,9 @@ def plan(
     """
     from compd.api.measurements import plan_measurement
     from compd.comparison.open import open_recording
-    from compd.diagnosis.planning.plan_formats import MARKS
+    from compd.planning.plan_formats import MARKS
     from compd.files.output_file import check_replaceable
-    from compd.recording.plan_file import PURPOSE_COLUMN
+    from compd.plan_file import PURPOSE_COLUMN
 
     if out is not None:
         mark = f"{PURPOSE_COLUMN},".encode() if shape is PlanShape.plan else MARKS[shape.value]

@@ -60,7 +60,7 @@ def merge(
     from compd.comparison.open import read_with_machine
     from compd.errors import CompdError, Problem
     from compd.recording.merge import ASSUMED_GAP_S, merge_recordings
-    from compd.recording.table_file import written_path
+    from compd.tables.table_file import written_path
 
     if len(recordings) < 2:
         raise CompdError(

@@ -76,7 +76,7 @@ def simulate(
 
     from compd.clock import MonotonicClock
     from compd.configuration import load
-    from compd.live.realtime import use_fifo
+    from compd.live.system.realtime import use_fifo
     from compd.simulation.campaign.plan_reader import read_plan
     from compd.simulation.causes.hidden_cause import write_answer
     from compd.simulation.truth.mechanism import Mechanism

@@ -13,7 +13,7 @@ from compd.cli.options import OverwriteOption
 from compd.units import UM_PER_MM
 
 if TYPE_CHECKING:
-    from compd.simulation.wires.looks import Looks
+    from compd.simulation.wires.instrument_sampling import Looks
 
 _ANSWER_TIMEOUT_S = 15.0
 # So long at rest, every gauge has been read anew.
@@ -64,7 +64,7 @@ def tracker(
     from compd.files.atomic_files import write_files
     from compd.files.output_file import check_replaceable
     from compd.instruments.writers.registry import FORMATS
-    from compd.simulation.wires.looks import Looks
+    from compd.simulation.wires.instrument_sampling import Looks
 
     written = FORMATS[shape.value]
     _check_options(shape, link, points, unit)

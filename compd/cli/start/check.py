@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from compd.commissioning.feigned_jumps import BelievedJump, FeignedJump
+    from compd.commissioning.jump_trials import BelievedJump, FeignedJump
     from compd.commissioning.line_budget import LineBudget
     from compd.configuration import Configuration
     from compd.errors import Problem
@@ -117,7 +117,7 @@ def print_blind_spots(configuration: Configuration) -> None:
 
 def print_lines(configuration: Configuration) -> list[Problem]:
     """Print what the lines carry and which jumps their gauges can feign; the warnings that follow."""
-    from compd.commissioning.feigned_jumps import feigned_jumps, jump_warnings, reply_warnings
+    from compd.commissioning.jump_trials import feigned_jumps, jump_warnings, reply_warnings
     from compd.commissioning.line_budget import line_budgets
     from compd.commissioning.line_warnings import budget_warnings
     from compd.commissioning.pushed_periods import period_warnings
@@ -216,7 +216,7 @@ def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.commissioning.feigned_jumps import named_together
+    from compd.commissioning.jump_trials import named_together
     from compd.report.terminal_table import keep_words_whole
 
     title = "Largest jump that is believed of a machine at rest; on the move it is larger"

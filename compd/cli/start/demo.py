@@ -74,7 +74,7 @@ def demo(
 
 def _load_daemon() -> None:
     """The first start on a machine compiles the kernels: here it is said, and the daemon's own start does not wait."""
-    import_module("compd.live.run")
+    import_module("compd.live.run_daemon")
 
 
 def _show_live(config: Path | None, seed: int, port: int) -> None:

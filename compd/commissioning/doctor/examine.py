@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from compd.commissioning.daemon_status import DaemonStatus, Health, daemon_status
+from compd.commissioning.daemon_health import DaemonStatus, Health, daemon_status
 from compd.commissioning.doctor.finding import Computer, Finding, Verdict, advice, good, unknown
 from compd.commissioning.doctor.ports import port_findings
 from compd.commissioning.doctor.system import (

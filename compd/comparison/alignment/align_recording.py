@@ -19,9 +19,9 @@ from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.machine_builder import build_model
 from compd.model.machine import MachineModel
-from compd.model.motion import Movement
-from compd.model.observations import Observations
-from compd.model.observe import observe
+from compd.model.kinematics.motion import Movement
+from compd.model.effects.observations import Observations
+from compd.model.observer import observe
 from compd.recording.recording import Recording
 
 

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.statistics.least_squares import solve_least_squares
-from compd.comparison.statistics.robust import robust_regression
+from compd.statistics.least_squares import solve_least_squares
+from compd.statistics.robust import robust_regression
 from compd.errors import Problem, RecordingError
 
 # Gauss-Newton on a sphere from its algebraic fit converges in three or four steps.

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.registration import Registration
-from compd.model.kernels.rotation import compose, rotation_matrix, rotation_vector
+from compd.rotation import compose, rotation_matrix, rotation_vector
 
 LABELS = ("rx", "ry", "rz")
 UNIT = "urad"

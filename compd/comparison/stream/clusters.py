@@ -1,6 +1,6 @@
 """The blocks of neighbouring rows that standard errors rest on, of a recording that comes in parts.
 
-They are those of `compd.comparison.neighbour_blocks`, but that a visit is looked for in neighbouring parts alone.
+They are those of `compd.comparison.neighbour_block`, but that a visit is looked for in neighbouring parts alone.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import IntArray
-from compd.comparison.neighbour_blocks import BLOCKS
+from compd.comparison.neighbour_block import BLOCKS
 from compd.comparison.stream.sample import Sample
 from compd.recording.recording import BLOCKS as FOLDS
 from compd.recording.recording import Recording

@@ -12,10 +12,10 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.alignment.measured_attitude import LABELS as ATTITUDE_LABELS
 from compd.comparison.alignment.measured_attitude import MM_PER_RAD
 from compd.comparison.alignment.measured_attitude import UNIT as ATTITUDE_UNIT
-from compd.comparison.statistics.least_squares import column_norms, solve_least_squares
+from compd.statistics.least_squares import column_norms, solve_least_squares
 from compd.diagnosis.candidates.candidates import Candidate
-from compd.model.effect import ConstantValues, Effect, Parameter, memoryless_basis
-from compd.model.observations import Observations
+from compd.model.effects.effect import ConstantValues, Effect, Parameter, memoryless_basis
+from compd.model.effects.observations import Observations
 from compd.units import UM_PER_MM
 
 CONSTANT = "constant"

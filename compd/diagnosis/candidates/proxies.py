@@ -13,8 +13,8 @@ import numpy as np
 
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate, searched_parameters, variant
-from compd.model.effect import Effect
-from compd.model.effect_needs import needed_quantities, unmet_needs
+from compd.model.effects.effect import Effect
+from compd.model.effects.effect_needs import needed_quantities, unmet_needs
 
 _PREFIX = "temperature_"
 

@@ -22,8 +22,8 @@ from compd.diagnosis.descriptions.search_covariates import (
 )
 from compd.diagnosis.descriptions.term_formula import CONSTANTS, PARAMETERS, formula_text
 from compd.diagnosis.descriptions.term_grids import LAGS_S, ROUNDING, knees, periods, refined_periods, step_times_s
-from compd.model.effect import Effect, Port
-from compd.model.effect_basis import evaluate_basis
+from compd.model.effects.effect import Effect, Port
+from compd.model.effects.effect_basis import evaluate_basis
 from compd.model.library import find_effect
 from compd.units import UM_PER_MM, unit_of
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.statistics.periodogram import PeriodLimits, strongest_periods
+from compd.statistics.periodogram import PeriodLimits, strongest_periods
 from compd.diagnosis.descriptions.search_covariates import SearchCovariate, round_within
 from compd.units import unit_of
 

@@ -16,7 +16,7 @@ from compd.diagnosis.descriptions.empirical_terms import EmpiricalTerm, empirica
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.regression import Regressors
 from compd.diagnosis.search.significance import OrthogonalComplement
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 
 # Values between neighbours of a grid that are tried for a step, a knee or a period.
 REFINED_VALUES = 9

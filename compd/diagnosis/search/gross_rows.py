@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtr, chdtrc, gammaln
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
+from compd.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import GrossRows
 

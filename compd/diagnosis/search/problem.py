@@ -12,9 +12,9 @@ from scipy.special import fdtri
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import Comparison
-from compd.comparison.neighbour_blocks import neighbour_blocks
+from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.nuisance import nuisance_columns
-from compd.comparison.statistics.robust import LEAST_SIGMA, trimmed_scale
+from compd.statistics.robust import LEAST_SIGMA, trimmed_scale
 from compd.diagnosis.candidates.candidates import Candidate, CandidatePool
 from compd.diagnosis.candidates.constant import constant_candidate, split_constants
 from compd.diagnosis.criteria import Criteria

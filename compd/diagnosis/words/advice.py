@@ -12,7 +12,7 @@ from compd.diagnosis.words.phrases import (
     untested_here,
 )
 from compd.model.formula.keys import FormulaDeclaration
-from compd.text.number_text import join_words
+from compd.text.numbers_as_text import join_words
 
 # What a formula says of telling it from others where the person who wrote it said nothing.
 NO_WORDS = FormulaDeclaration.model_fields["separated_by"].default

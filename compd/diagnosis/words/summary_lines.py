@@ -25,7 +25,7 @@ from compd.diagnosis.words.phrases import (
 )
 from compd.diagnosis.words.summary import CANNOT_KNOW
 from compd.text.labelled_lines import LabelledText, fit_lines
-from compd.text.number_text import fall_text, join_words, number_text, percent_text
+from compd.text.numbers_as_text import fall_text, join_words, number_text, percent_text
 
 # What a terminal shows without scrolling, and its usual width.
 MOST_LINES = 12

@@ -20,14 +20,14 @@ from compd.gauge import Gauge, LineFault, Quality
 from compd.lines import open_line
 from compd.lines.modbus_tcp import ModbusTcp
 from compd.live.acquisition.gauge_trust import Judge
-from compd.live.acquisition.peers import Peers
+from compd.live.acquisition.shared_endpoints import Peers
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.polled_round import OpenLine, PolledRound
 from compd.live.acquisition.pushed_round import PushedRound
 from compd.live.acquisition.round_trigger import RoundBuffer
 from compd.live.memory.latest import Latest
 from compd.live.memory.poll_requests import PollRequests
-from compd.live.realtime import sharpen_timers
+from compd.live.system.realtime import sharpen_timers
 
 log = structlog.get_logger()
 

@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
-from compd.configuration.stated_noise import DIFFERENCE_SIGMAS
+from compd.stated_noise import DIFFERENCE_SIGMAS
 from compd.gauge import ReadingMotion
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.reading import ROUNDS_UNTIL_DUE

@@ -32,7 +32,7 @@ from compd.live.acquisition.possible_motion import (
 from compd.live.acquisition.scatter import LatestScatter, RestScatter
 from compd.live.acquisition.steps import Steps
 from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
-from compd.live.acquisition.witnesses import all_back, moved_while_away, scales_stood, stood_still
+from compd.live.acquisition.motion_while_away import all_back, moved_while_away, scales_stood, stood_still
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 
 # After a gap, s, until the others have been read that have begun to move at the same time.

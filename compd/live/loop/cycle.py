@@ -35,7 +35,7 @@ from compd.live.loop.tip_uncertainty import TipUncertainty, has_grown, noise_now
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.model.machine import MachineModel
-from compd.model.solve_status import MEANING, Reason
+from compd.model.kernels.solve_status import MEANING, Reason
 
 TARGET_TOO_OLD = (
     "the controller's target is too old (sockets.target.valid_for_s): it sends one again, or its role ends by "

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from compd.clock import Clock
-from compd.live import realtime
+from compd.live.system import realtime
 from compd.live.loop.commands import Commands
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState

@@ -21,10 +21,10 @@ from compd.files.atomic_files import read_small_file
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.wiring import Beyond, MachineWires, WiredValues, Wires
 from compd.live.memory.latest import Snapshot
-from compd.model.effect import FittedEffect
-from compd.model.effect_needs import needed_quantities, unmet_needs
+from compd.model.effects.effect import FittedEffect
+from compd.model.effects.effect_needs import needed_quantities, unmet_needs
 from compd.model.machine import MachineModel
-from compd.model.observations import available_settings
+from compd.model.effects.observations import available_settings
 from compd.model_file.model_file import ModelFile, Range, read_model_file
 from compd.plugins import OWN_CODE, Code
 from compd.recording.checks import limit_of

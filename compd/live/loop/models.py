@@ -13,7 +13,7 @@ from compd.live.loop.setpoint import ShadowResult
 from compd.live.memory.latest import Snapshot
 from compd.model.effect_memory import EffectMemory, carry_over
 from compd.model.machine import MachineModel
-from compd.model.solve_status import MEANING, Reason
+from compd.model.kernels.solve_status import MEANING, Reason
 
 
 def adopt_models(state: CycleState, models: Models) -> CycleState:

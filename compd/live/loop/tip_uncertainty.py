@@ -12,12 +12,12 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation.values import GaugeValues
 from compd.configuration import Configuration
-from compd.configuration.stated_noise import SCATTER_RATIO
+from compd.stated_noise import SCATTER_RATIO
 from compd.live.loop.wiring import Beyond, MachineWires
 from compd.live.memory.latest import Snapshot
 from compd.model.effect_memory import EffectMemory
 from compd.model.machine import MachineModel
-from compd.model.tip_derivatives import tip_derivatives
+from compd.model.tip_derivative import tip_derivatives
 from compd.model.uncertainty import GaugeNoise, parameter_variance
 from compd.units import UM_PER_MM
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from compd.arrays import FloatArray, IntArray
 from compd.live.memory.readings import OK_NUMBER, SLOTS
-from compd.model.kernels.jit import COUNT, FLAG, INDICES, NUMBERS, SCALAR, helper, loop
+from compd.jit import COUNT, FLAG, INDICES, NUMBERS, SCALAR, helper, loop
 from compd.reading import ROUNDS_UNTIL_DUE
 from compd.units import UM_PER_MM
 

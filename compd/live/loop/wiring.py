@@ -12,7 +12,7 @@ from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
 from compd.configuration.operation import FRAME_DISTANCES, FrameWire
-from compd.configuration.stated_noise import NOT_STATED, StatedNoise, tolerance_mm
+from compd.stated_noise import NOT_STATED, StatedNoise, tolerance_mm
 from compd.gauge import Quality, Reading
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.reasons import GaugeFault, Lost, lost

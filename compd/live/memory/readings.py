@@ -24,7 +24,7 @@ from numba import from_dtype, types
 from numpy.typing import NDArray
 
 from compd.gauge import Quality, Reading, ReadingMotion
-from compd.model.kernels.jit import INDICES, helper, loop
+from compd.jit import INDICES, helper, loop
 
 _SLOT = struct.Struct("=12dBBxxI152s")
 _HEAD = struct.Struct("=12dBBxxI")

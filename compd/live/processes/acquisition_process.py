@@ -10,12 +10,12 @@ from typing import Any
 
 from compd.clock import Clock
 from compd.live.acquisition.acquisition import Acquisition
-from compd.live.acquisition.votes.votes import LOOK_EVERY_S
+from compd.live.acquisition.cross_checks.cross_checks import LOOK_EVERY_S
 from compd.live.memory.shared_message import SharedMessage
-from compd.live.processes.child_process import OUT_OF_MEMORY
-from compd.live.processes.control import Control, Phase
-from compd.live.processes.memory_limit import limit_memory
-from compd.live.realtime import LARGEST_SHARE, RationedPriority
+from compd.live.system.child_process import OUT_OF_MEMORY
+from compd.live.memory.control import Control, Phase
+from compd.live.system.memory_limit import limit_memory
+from compd.live.system.realtime import LARGEST_SHARE, RationedPriority
 
 # A driver in the middle of a poll may take so long to let go of its line.
 _STOP_WITHIN_S = 0.5

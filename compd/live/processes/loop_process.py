@@ -14,7 +14,7 @@ import structlog
 from compd.clock import Clock
 from compd.configuration.operation import LoopSettings
 from compd.errors import CompdError, Problem, StateError
-from compd.live import realtime
+from compd.live.system import realtime
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.cycle import step
@@ -23,12 +23,12 @@ from compd.live.loop.directions import Directions
 from compd.live.loop.loop import Loop
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import LiveModel, ModelLoader, Models, ModelText, warn_of_datum
-from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker, SentSetpoint
+from compd.live.loop.ring_entries import CyclePacker, CycleUnpacker, SentSetpoint
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.latest import Latest
 from compd.live.memory.shared_ring import SharedRing
-from compd.live.processes.control import Control
+from compd.live.memory.control import Control
 
 # Cycles that a loop computes before the first that counts.
 _TRIAL_CYCLES = 20
@@ -72,7 +72,7 @@ class ModelChange:
 class LoopProcess:
     """The parts of the daemon that a loop needs, all made before its process was forked.
 
-    setpoints, cycles : the rings, see `compd.live.loop.sent_cycle`. packet_hash : first bytes of the configuration's
+    setpoints, cycles : the rings, see `compd.live.loop.ring_entries`. packet_hash : first bytes of the configuration's
     hash, for UDP packets; None where they are not configured.
     """
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import structlog
 
 from compd.clock import Clock
-from compd.live.journal import Journal
-from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.system.journal import Journal
+from compd.live.loop.ring_entries import SentSetpoint
 from compd.live.loop.states import State
-from compd.live.processes.control import Control, Phase
+from compd.live.memory.control import Control, Phase
 from compd.live.processes.log_relay import LogRelay
-from compd.live.realtime import RationedPriority, sharpen_timers, shorten_switch_interval
+from compd.live.system.realtime import RationedPriority, sharpen_timers, shorten_switch_interval
 from compd.live.service.last_readings import LastReadings
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher

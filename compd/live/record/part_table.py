@@ -11,10 +11,10 @@ from typing import Protocol
 from compd.errors import CompdError
 from compd.files.atomic_files import sync_directory
 from compd.live.record.appended_file import AppendedFile
-from compd.recording.columns import number_text
+from compd.tables.columns import number_text
 from compd.recording.open_part import ARROW, OpenPartFormat, close_part
-from compd.recording.table_file import CSV, PARQUET
-from compd.recording.tables.table_format import TableFormat
+from compd.tables.table_file import CSV, PARQUET
+from compd.tables.table_format import TableFormat
 
 # One value of every column; None where nothing was measured.
 Row = Sequence[float | None]

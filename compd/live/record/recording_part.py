@@ -12,7 +12,7 @@ from compd.live.record.appended_file import AppendedFile
 from compd.live.record.part_table import part_table
 from compd.live.record.table_rows import Message, TableRows
 from compd.recording.sidecar import sidecar_contents, sidecar_text
-from compd.recording.tables.table_format import TableFormat
+from compd.tables.table_format import TableFormat
 from compd.text.json_text import encode_compact
 
 CYCLES_SUFFIX = ".cycles.jsonl"

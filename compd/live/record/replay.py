@@ -16,14 +16,14 @@ from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.tip_uncertainty import stated_noise
-from compd.live.pipeline import Pipeline, build_pipeline
+from compd.live.loop.pipeline import Pipeline, build_pipeline
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER
 from compd.live.record.table_rows import Message
 from compd.live.service.readings_message import RecordedCycle, parse_readings
 from compd.live.service.state_json import FORMER_TIP_NOISE
-from compd.recording.columns import SKEW_COLUMN
+from compd.tables.columns import SKEW_COLUMN
 from compd.recording.open_part import ARROW, OpenPart
-from compd.recording.table_file import CSV, SUFFIXES, row_count
+from compd.tables.table_file import CSV, SUFFIXES, row_count
 
 # Of a part's messages the first two say who spoke, and what the columns are.
 _FIRST_CLASSES = ("VERSION", "WATCH")

@@ -22,7 +22,7 @@ from compd.clock import Clock
 from compd.files.atomic_files import write_files
 from compd.files.checksum import CHECKSUM, checksum_of
 from compd.live.memory.trust_memory import Doubt, TrustMemory
-from compd.live.port_names import changed_ports
+from compd.live.system.port_names import changed_ports
 
 FILE_NAME = "last-readings.json"
 _FORMAT = 1

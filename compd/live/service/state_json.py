@@ -17,7 +17,7 @@ from compd.compensation.values import WarmStart
 from compd.live.loop.cycle_state import CycleState
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.model.effect_memory import EffectMemory
-from compd.model.motion import Motion
+from compd.model.kinematics.motion import Motion
 
 # The tags are part of the recordings' format: they stay as they are when a class is renamed.
 _KINDS: Mapping[str, Any] = {

@@ -18,8 +18,8 @@ from compd.live.loop.timing import LoopTiming
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
-from compd.live.port_names import changed_ports
-from compd.live.processes.control import Control
+from compd.live.system.port_names import changed_ports
+from compd.live.memory.control import Control
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender
 from compd.text.json_text import omit_unknown

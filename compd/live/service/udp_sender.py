@@ -7,7 +7,7 @@ from typing import Any
 
 from compd.configuration.operation import UdpTarget
 from compd.errors import DaemonError, Problem
-from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.ring_entries import SentSetpoint
 
 
 class UdpSender:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effect import Basis, BasisProgram, ConstantValues, Effect, Memory, Port
-from compd.model.effect_needs import needed_quantities
+from compd.model.effects.effect import Basis, BasisProgram, ConstantValues, Effect, Memory, Port
+from compd.model.effects.effect_needs import needed_quantities
 from compd.model.formula.columns import column_codes
 from compd.model.formula.formula import Formula
 from compd.model.formula.program import write_program
 from compd.model.kernels.effect_dispatch import FORMULA
-from compd.model.observations import Observations
+from compd.model.effects.observations import Observations
 
 AXES = ("x", "y", "z")
 # Ports that take a vector at each of their places; `reference` also a rotation.
@@ -37,7 +37,7 @@ class FormulaBasis:
     to_mm: float
 
     def program(self, effect: Effect, links: int, sizes: Mapping[Port, int]) -> BasisProgram:
-        """See `compd.model.effect.CompiledBasis`."""
+        """See `compd.model.effects.effect.CompiledBasis`."""
         (port,) = effect.ports
         along = 1 if "" in self.formulas else 6 if port == "reference" else 3
         places = 1 if port == "reference" else sizes[port] // along

@@ -9,10 +9,10 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem
-from compd.model.effect import Port
+from compd.model.effects.effect import Port
 from compd.model.formula.program import ColumnCodes
 from compd.model.kernels import formula as machine_code
-from compd.model.observations import Observations
+from compd.model.effects.observations import Observations
 
 PER_LINK: tuple[Port, ...] = ("scale", "link", "base_joint", "platform_joint")
 READING_PORTS: tuple[Port, ...] = ("scale", "joint", "frame")

@@ -11,7 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.effect_row import EFFECT_MACHINE
 from compd.model.kernels.effects_on_machine import add_effect, add_effects, set_row
-from compd.model.kernels.jit import COUNT, FLAG, INDEX_ROWS, INDICES, NUMBERS, ROW_MATRICES, ROWS, helper, loop
+from compd.jit import COUNT, FLAG, INDEX_ROWS, INDICES, NUMBERS, ROW_MATRICES, ROWS, helper, loop
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import (
     copy_frame,
@@ -23,7 +23,7 @@ from compd.model.kernels.machine_solver import (
 )
 from compd.model.kernels.motion import advance_motion
 from compd.model.kernels.reason_codes import OK
-from compd.model.kernels.rotation import to_inner_frame
+from compd.rotation import to_inner_frame
 from compd.model.kernels.solver_structures import EFFECTS, GIVEN, MODELS, RESULTS, WORKSPACES
 
 
@@ -190,7 +190,7 @@ def compensate_rows(  # noqa: PLR0912  the steps of a cycle, in their order
 
     passes : how often effects are computed, each time at the setpoint of the time before.  starts : the first row has
     no history.  other_mode : the motion before the first row is of the other mode.
-    models, machines, works (1,).  The effects' numbers: see `compd.model.effect_program.EffectProgram`.
+    models, machines, works (1,).  The effects' numbers: see `compd.model.effects.effect_program.EffectProgram`.
     scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9), time_s (N,).  quantities (N, q + z) : those that the effects
         need, and behind them those from which the effects count, in the order of the program.
     target_mm (N, 6) : the contact in {M} and in {P}, attitude_M_P (N, 3, 3) : wanted; both in machine-tool mode alone.

@@ -12,7 +12,7 @@ from typing import Any
 
 from compd.model.kernels import effects
 from compd.model.kernels.formula import set_formula_basis
-from compd.model.kernels.jit import helper
+from compd.jit import helper
 
 FORMULA = 0
 

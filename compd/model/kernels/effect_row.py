@@ -16,7 +16,7 @@ from numba import from_dtype
 MOST_LINKS = 16
 MOST_JOINTS = 4 * MOST_LINKS
 
-# Fields as in `compd.model.observations.Observations`, for one instant.
+# Fields as in `compd.model.effects.observations.Observations`, for one instant.
 ROW = np.dtype(
     [
         ("links", np.int64),
@@ -37,7 +37,7 @@ ROW = np.dtype(
     ]
 )
 
-# Fields as in `compd.model.observations.MachineConstants`; links and axes: of its kinematics, 0 where that is unknown.
+# Fields as in `compd.model.effects.observations.MachineConstants`; links and axes: of its kinematics, 0 where that is unknown.
 MACHINE = np.dtype(
     [
         ("links", np.int64),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
+from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
 from compd.model.kernels.linear import all_finite
 from compd.model.kernels.reason_codes import NOT_FINITE, OK
 

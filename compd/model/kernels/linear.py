@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.jit import helper
+from compd.jit import helper
 
 # No machine has a coordinate of 1e12 mm: a value beyond is a lost decimal point.
 LARGEST = 1e12

@@ -9,18 +9,18 @@ from __future__ import annotations
 from typing import Any
 
 from compd.arrays import FloatArray
-from compd.model.kernels.forward import solve_forward
-from compd.model.kernels.inverse import solve_inverse
-from compd.model.kernels.jit import helper
-from compd.model.kernels.octahedron import solve_octahedron
-from compd.model.kernels.rotation import to_inner_frame, to_outer_frame
+from compd.model.kernels.forward_solver import solve_forward
+from compd.model.kernels.inverse_solver import solve_inverse
+from compd.jit import helper
+from compd.model.kernels.octahedron_frame import solve_octahedron
+from compd.rotation import to_inner_frame, to_outer_frame
 
 
 @helper
 def solve_frame(
     model: Any, plate_points_M_mm: FloatArray, distances_mm: FloatArray, guess_M_mm: FloatArray, frame: Any
 ) -> None:
-    """Equation (3); see `compd.model.frame.solve_frame`."""
+    """Equation (3); see `compd.model.kinematics.frame.solve_frame`."""
     n = model.links
     solve_octahedron(
         distances_mm,
@@ -99,7 +99,7 @@ def inverse_pose(
 
 @helper
 def set_contact(model: Any, pose: Any, tool_mm: FloatArray, tip_M_mm: FloatArray, tip_P_mm: FloatArray) -> None:
-    """Where the tool touches at a pose; see `compd.model.tool`."""
+    """Where the tool touches at a pose; see `compd.model.kinematics.tool`."""
     if model.tool_on_plate:
         tip_M_mm[:] = tool_mm
         to_inner_frame(pose.rotation_M_P, pose.origin_M_mm, tool_mm, tip_P_mm)

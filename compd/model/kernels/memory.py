@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from compd.model.kernels.jit import helper
+from compd.jit import helper
 
 
 @helper

@@ -1,4 +1,4 @@
-"""How the links move, from one snapshot to the next, as a kernel; see `compd.model.motion`.
+"""How the links move, from one snapshot to the next, as a kernel; see `compd.model.kinematics.motion`.
 
 A motion is one row of numbers: the time, and for n links and k joint comparators the last readings of the scales (n)
 and the comparators (k), the turning points (n), the directions (n), and the velocities of scales (n) and comparators
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from compd.arrays import FloatArray
-from compd.model.kernels.jit import NUMBERS, ROWS, helper, loop
+from compd.jit import NUMBERS, ROWS, helper, loop
 from compd.model.kernels.linear import all_finite
 from compd.travel_direction import Travel, advance
 

@@ -1,8 +1,8 @@
-"""The reasons of `compd.model.solve_status` as plain integers, which compiled code takes as constants."""
+"""The reasons of `compd.model.kernels.solve_status` as plain integers, which compiled code takes as constants."""
 
 from __future__ import annotations
 
-from compd.model.solve_status import Reason
+from compd.model.kernels.solve_status import Reason
 
 OK = int(Reason.OK)
 NOT_FINITE = int(Reason.NOT_FINITE)

@@ -67,7 +67,7 @@ LENGTHS, MECHANISM, FRAME = range(3)
 # Number of an effect without a kernel: what it adds is given.
 GIVEN = -1
 
-# The frame, of `compd.model.frame.Frame`, with what is on it.
+# The frame, of `compd.model.kinematics.frame.Frame`, with what is on it.
 SOLVED_FRAME = np.dtype(
     [
         ("supports_M_mm", *_MATRIX),
@@ -82,7 +82,7 @@ SOLVED_FRAME = np.dtype(
     ]
 )
 
-# The platform, of `compd.model.kinematics.Pose`.
+# The platform, of `compd.model.kinematics.link_kinematics.Pose`.
 SOLVED_POSE = np.dtype(
     [
         ("origin_M_mm", *_VECTOR),

@@ -1,6 +1,6 @@
 """How one snapshot's tip moves with what its uncertainty comes from: lengths, fitted numbers, quantities.
 
-`compd.model.tip_derivatives` calls it. In NumPy the same takes milliseconds, more than a cycle at 1 kHz has.
+`compd.model.tip_derivative` calls it. In NumPy the same takes milliseconds, more than a cycle at 1 kHz has.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from compd.arrays import FloatArray, IntArray
 from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.effect_row import EFFECT_MACHINE
 from compd.model.kernels.effects_on_machine import set_row
-from compd.model.kernels.jit import INDEX_ROWS, INDICES, NUMBERS, ROWS, SCALAR, helper, loop
+from compd.jit import INDEX_ROWS, INDICES, NUMBERS, ROWS, SCALAR, helper, loop
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import forward_pose, set_contact, solve_frame
 from compd.model.kernels.reason_codes import OK

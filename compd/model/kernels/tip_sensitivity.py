@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.closure import evaluate_closure
-from compd.model.kernels.jit import helper
+from compd.model.kernels.loop_closure import evaluate_closure
+from compd.jit import helper
 from compd.model.kernels.linear import lu_factor, lu_solve
 from compd.model.kernels.machine_solver import solve_frame
 
@@ -68,7 +68,7 @@ def set_tip_by_ports(
     moved_frame: Any,
     tip: FloatArray,
 ) -> None:
-    """tip (3, size), mm per unit of what is added, in the order of `compd.model.effect_program.LIVE_PORTS`.
+    """tip (3, size), mm per unit of what is added, in the order of `compd.model.effects.effect_program.LIVE_PORTS`.
 
     row : of `set_row` at this pose.  targets : places to which effects add; the port `plate` is 0 where none does.
     moved_frame : room for a solved frame.

@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import Any
 
 from compd.errors import PluginError, Problem
-from compd.model.effect import PORTS, Effect
+from compd.model.effects.effect import PORTS, Effect
 from compd.model.formula.declaration import formula_effect
 from compd.plugins import EFFECTS, OWN_CODE, Code, load, names
 
@@ -89,7 +89,7 @@ def _require_effect(thing: Any, where: str) -> Effect:
                 where=where,
                 what="is not an effect",
                 value=type(thing).__name__,
-                allowed="an object of compd.model.effect.Effect",
+                allowed="an object of compd.model.effects.effect.Effect",
             )
         )
     return thing

@@ -11,7 +11,7 @@ from compd.configuration.section import unknown_key
 from compd.configuration.shipped import shipped_effects
 from compd.errors import CompdError, ConfigurationError, PluginError, Problem
 from compd.files.file_kind import FileKind
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.model.formula.declaration import formula_effect
 from compd.model.formula.keys import FormulaDeclaration
 from compd.model.library import find_effect, load_library

@@ -2,12 +2,12 @@
 
 A tool that the moving platform carries has its vector in {P} and feels the load on the tip. A tool that stands on the
 plate has it in {M}, whatever the platform's attitude, and feels the reaction of the work. Effects take vector and force
-from the arrangement (`compd.model.tool`), so that a parameter has the same meaning and sign in both.
+from the arrangement (`compd.model.kinematics.tool`), so that a parameter has the same meaning and sign in both.
 """
 
 from __future__ import annotations
 
-from compd.model.effect import Effect, KernelBasis, Parameter
+from compd.model.effects.effect import Effect, KernelBasis, Parameter
 from compd.model.kernels.effects import tool
 
 EFFECTS = (

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.comparison import Comparison
 from compd.comparison.thinning import thinned
-from compd.diagnosis.candidate_results import candidate_results
+from compd.diagnosis.candidate_result import candidate_results
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.diagnose import MOST_ROWS, candidate_pool
+from compd.diagnosis.recording_diagnosis import MOST_ROWS, candidate_pool
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep
 from compd.diagnosis.search.gross_rows import RowWeights
 from compd.diagnosis.search.problem import DiagnosisProblem, build_problem, fitted_along_columns
 from compd.diagnosis.search.rivals import collinearity
 from compd.diagnosis.search.subset_losses import SubsetLosses
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.page.workbench.trial import Trial, trial
 from compd.text.json_text import nan_to_null
 from compd.units import UM_PER_MM

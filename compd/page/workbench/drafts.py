@@ -6,7 +6,7 @@ import hashlib
 import json
 
 from compd.comparison.comparison import Comparison
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.page.workbench.candidates import Candidates
 
 # So many browsers can write at once.

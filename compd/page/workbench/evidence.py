@@ -24,7 +24,7 @@ from compd.report.diagnosis_evidence import (
 )
 from compd.report.page_table import PageTable
 from compd.text.json_text import nan_to_null
-from compd.text.number_text import estimate_text, fall_text, number_text, percent_text
+from compd.text.numbers_as_text import estimate_text, fall_text, number_text, percent_text
 
 
 def evidence(diagnosis: Diagnosis) -> dict[str, Any]:

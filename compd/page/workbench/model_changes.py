@@ -9,7 +9,7 @@ from typing import Any
 from compd.api.models import add_effect
 from compd.diagnosis.model_changes import refit, remove, undo
 from compd.errors import Problem, StateError
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.model_file.model_document import read_stored, write_stored
 from compd.model_file.model_file import EffectNumber, ModelFile
 from compd.page.workbench.opened_recording import OpenedRecording, model_of

@@ -12,7 +12,7 @@ import numpy as np
 from compd.api.long_recordings import open_whole_or_sample
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.comparison import Comparison
 from compd.configuration.shipped import Machine
 from compd.model_file.model_file import ModelFile, read_model_file

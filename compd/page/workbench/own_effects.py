@@ -10,7 +10,7 @@ from pathlib import Path
 from compd.configuration.yaml_reader import read_text
 from compd.errors import CompdError, Problem, StateError
 from compd.files.atomic_files import file_stamp, write_files
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.model.formula.declaration import formula_effect
 from compd.model.library import load_library
 from compd.model.library.effects_file import gather_effects

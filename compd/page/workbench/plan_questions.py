@@ -10,17 +10,17 @@ import numpy as np
 
 from compd.api.measurements import plan_measurement
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.diagnosis.planning.measurement_plan import MeasurementPlan
-from compd.diagnosis.planning.measurement_programmes import recorded_limits
-from compd.diagnosis.planning.plan_formats import DWELL_S, PlanFormat
-from compd.diagnosis.planning.setting_programmes import recorded_settings
+from compd.planning.measurement_plan import MeasurementPlan
+from compd.planning.measurement_programmes import recorded_limits
+from compd.planning.plan_formats import DWELL_S, PlanFormat
+from compd.planning.setting_programmes import recorded_settings
 from compd.errors import CompdError
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from compd.page.workbench.formula_check import words
 from compd.page.workbench.plan_endings import ENDINGS
 from compd.page.workbench.plan_request import PlanRequest, field_of, read_request
 from compd.page.workbench.workbench import Workbench
-from compd.recording.plan_file import TIP_COLUMNS
+from compd.plan_file import TIP_COLUMNS
 
 # Plans whose files can still be downloaded.
 _MOST_KEPT = 8

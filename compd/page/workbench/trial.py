@@ -18,7 +18,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.comparison import Comparison
-from compd.model.effect import ConstantValues
+from compd.model.effects.effect import ConstantValues
 from compd.page.packed import packed
 
 

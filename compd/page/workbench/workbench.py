@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from compd.diagnosis.planning.measurement_plan import MeasurementPlan
+from compd.planning.measurement_plan import MeasurementPlan
 from compd.errors import CompdError, Problem, RecordingError, StateError
 from compd.files.atomic_files import file_stamp, write_files
 from compd.live.loop.model_loader import ModelText
-from compd.model.effect_needs import can_concern
+from compd.model.effects.effect_needs import can_concern
 from compd.model.library import load_library
 from compd.page.recording_machine import machine_of
 from compd.page.workbench.candidates import Candidates

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from compd.errors import CompdError
-from compd.live.processes.memory_limit import limit_memory
+from compd.live.system.memory_limit import limit_memory
 from compd.text.json_text import nan_to_null
 
 _NICE = 10

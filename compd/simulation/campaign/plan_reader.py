@@ -10,8 +10,8 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, KinematicsError, Problem
-from compd.recording.columns import approach_columns
-from compd.recording.plan_file import SPEED_COLUMN, TIP_COLUMNS, PlanFile, PlanLine, read_plan_file
+from compd.tables.columns import approach_columns
+from compd.plan_file import SPEED_COLUMN, TIP_COLUMNS, PlanFile, PlanLine, read_plan_file
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.motion import SPEED_MM_PER_S
 from compd.simulation.truth.planned_row import PlannedRow

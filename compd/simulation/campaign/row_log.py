@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration.operation import Wiring
-from compd.recording.columns import (
+from compd.tables.columns import (
     ATTITUDE_COLUMNS,
     DISTANCE_COLUMN,
     POSITION_COLUMNS,

@@ -10,7 +10,7 @@ from pathlib import Path
 from compd.configuration.shipped import Machine, load_machine
 from compd.errors import CompdError, Problem
 from compd.recording.ball_plate import write_plate
-from compd.recording.table_file import written_path
+from compd.tables.table_file import written_path
 from compd.recording.writer import write_recording
 from compd.simulation.campaign.plan_reader import read_plan
 from compd.simulation.campaign.simulated_recording import FIXED, simulate_recording

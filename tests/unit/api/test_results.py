@@ -12,12 +12,12 @@ import pytest
 import compd
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import Comparison
-from compd.diagnosis.planning.measurement_plan import MeasurementPlan
+from compd.planning.measurement_plan import MeasurementPlan
 from compd.diagnosis.verdict import Diagnosis
 from compd.errors import CompdError, ConfigurationError, PluginError, RecordingError, StateError
-from compd.model.effect import Effect, Parameter
+from compd.model.effects.effect import Effect, Parameter
 from compd.model_file.model_file import ModelFile
-from compd.tables import MOST_ROWS, data_frame, html_table
+from compd.result_tables import MOST_ROWS, data_frame, html_table
 from tests.support.measured import SIGMA_UM, gauges, hidden, record
 
 ROWS = 300

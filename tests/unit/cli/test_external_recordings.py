@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from plotly.graph_objects import Figure
 
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.open import open_recording
 from compd.model.library import load_library
 from compd.report.figures import plot_residual_vectors, plot_workspace_map

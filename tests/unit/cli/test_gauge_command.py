@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 from compd.cli.live import driver as driver_cli
 from compd.cli.live import gauge as gauge_cli
 from compd.clock import MonotonicClock
-from compd.commissioning.gauge_description.capture import read_capture
-from compd.commissioning.open_gauge import open_tapped_line
-from compd.commissioning.probe import PresetCandidate, preset_candidates, probe_port
+from compd.gauge_description.capture import read_capture
+from compd.gauge_tools.open_gauge import open_tapped_line
+from compd.gauge_tools.probe import PresetCandidate, preset_candidates, probe_port
 from compd.configuration import load as load_machine
 from compd.configuration.lines import ModbusRtuLine, SerialLine
 from compd.errors import CompdError

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from compd.cli.main import app
-from compd.diagnosis.planning.plan_formats import MARKS, target_name
+from compd.planning.plan_formats import MARKS, target_name
 from compd.errors import CompdError
 from compd.files.output_file import check_replaceable
 from compd.simulation.truth.mechanism import Mechanism

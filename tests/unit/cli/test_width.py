@@ -9,10 +9,10 @@ from typer.testing import CliRunner
 
 from compd.cli.main import app
 from compd.cli.reflow import reflowed
-from compd.commissioning.catalogue import catalogue
+from compd.gauge_tools.driver_catalogue import catalogue
 from compd.configuration import load
 from compd.report.terminal_table import keep_words_whole
-from compd.text.number_text import number_text
+from compd.text.numbers_as_text import number_text
 from tests.support.paths import CONFIG
 
 CUT = "…"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from compd.commissioning.gauge_file import gauge_of_file
-from compd.commissioning.open_gauge import STALE_AFTER_S, PortArguments, aged, gauge_of_driver
+from compd.gauge_tools.gauge_file import gauge_of_file
+from compd.gauge_tools.open_gauge import STALE_AFTER_S, PortArguments, aged, gauge_of_driver
 from compd.gauge import Quality, bad, good
 from tests.support.paths import CONFIG
 

@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from compd.cli.main import app
-from compd.commissioning.daemon_status import Health, daemon_status, worst_gauges
+from compd.commissioning.daemon_health import Health, daemon_status, worst_gauges
 from compd.live.loop.states import State
 from tests.unit.live.test_client import scripted
 

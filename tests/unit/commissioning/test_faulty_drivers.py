@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from compd.cli.main import app
-from compd.commissioning.catalogue import polled_drivers
-from compd.commissioning.conformance.case_result import CaseResult
-from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
+from compd.gauge_tools.driver_catalogue import polled_drivers
+from compd.conformance.case_result import CaseResult
+from compd.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.gauge import Channel
 from compd_drivers.modbus import Modbus
 from compd_drivers.modbus_description import ModbusOptions

@@ -11,7 +11,7 @@ import pytest
 
 from compd.commissioning.blind_spots import BLIND_SPOTS, drift_costs, figures_of
 from compd.commissioning.cycle_time import CycleTime, cycle_warnings, measure_cycle, python_effect_times
-from compd.commissioning.feigned_jumps import (
+from compd.commissioning.jump_trials import (
     LATE_BUSY_S,
     LATE_S,
     feigned_jumps,
@@ -21,7 +21,7 @@ from compd.commissioning.feigned_jumps import (
 )
 from compd.commissioning.line_budget import line_budgets
 from compd.configuration import Configuration, load
-from compd.configuration.stated_noise import tolerance_mm
+from compd.stated_noise import tolerance_mm
 from compd.gauge import DataSheetNoise, Gauge, GaugeOptions, Quality, Reading, good
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample, MotionLimits, unseen_jump_mm
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
@@ -217,7 +217,7 @@ def test_what_an_effect_in_plain_python_takes_of_a_cycle_is_said(tmp_path: Path)
     code.write_text(
         "from dataclasses import replace\n"
         "import numpy as np\n"
-        "from compd.model.effect import memoryless_basis\n"
+        "from compd.model.effects.effect import memoryless_basis\n"
         "from compd.model.library import load_library\n"
         "MINE = replace(load_library()['link_zero'], id='mine',\n"
         "    basis=memoryless_basis(lambda rows, _: np.ones((len(rows), rows.links, 1)) * np.eye(rows.links)))\n"

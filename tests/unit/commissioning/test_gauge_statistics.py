@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from compd.commissioning.gauge_statistics import GaugeStatistics
+from compd.gauge_tools.gauge_statistics import GaugeStatistics
 from compd.gauge import Channel, Quality, bad, good
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.commissioning.probe import PresetCandidate, announcements, preset_candidates, probe_port
+from compd.gauge_tools.probe import PresetCandidate, announcements, preset_candidates, probe_port
 from compd.configuration.lines import ModbusRtuLine, SerialLine
 from compd.gauge import Quality
 from compd.lines import open_stream

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from compd.comparison.alignment.align_recording import align_recording
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
 from compd.errors import CompdError, RecordingError

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.comparison import Comparison
-from compd.comparison.covariates import covariates
+from compd.comparison.covariate import covariates
 from compd.comparison.display_unit import format_error
 from compd.comparison.open import open_recording
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.model.library import load_library
 from compd.report.comparison_page import write_comparison_page
 from tests.support.command import run_in_process

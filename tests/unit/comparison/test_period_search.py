@@ -9,7 +9,7 @@ import pytest
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.period_search import promising_constants
 from compd.comparison.shape_search import search_constants
 from compd.model.library import find_effect

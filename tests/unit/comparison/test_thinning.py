@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.thinning import thinned
 from tests.support.external_recordings import record_external
 

@@ -8,10 +8,10 @@ import pytest
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.errors import KinematicsError
-from compd.model.kernels.rotation import rotation_matrix, rotation_vector, to_inner
+from compd.rotation import rotation_matrix, rotation_vector, to_inner
 from compd.model.machine import MachineModel, machine_model
-from compd.model.solve_status import Reason, require
-from compd.model.tool import Contact, ToolOnPlate
+from compd.model.kernels.solve_status import Reason, require
+from compd.model.kinematics.tool import Contact, ToolOnPlate
 from tests.support.model_machines import (
     Floats,
     hexapod,

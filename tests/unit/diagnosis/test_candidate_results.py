@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.diagnosis.candidate_results import explained_fraction
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.candidate_result import explained_fraction
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.findings import CandidateResult
 from tests.support.external_recordings import along, record_external
 

@@ -14,7 +14,7 @@ import compd
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from tests.support.external_recordings import along, record_external
 
 ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis")]

@@ -11,7 +11,7 @@ import pytest
 
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.open import read_with_machine
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.holdout import evaluate_holdout
 from compd.diagnosis.verdict import Diagnosis
 from tests.support.hidden_effects import LIBRARY, record_with_effects

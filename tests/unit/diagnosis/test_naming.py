@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from compd.diagnosis.candidates.candidates import Candidate
-from compd.diagnosis.naming import named_members, with_fewest_numbers
+from compd.diagnosis.rival_selection import named_members, with_fewest_numbers
 from compd.model.library import load_library
 from tests.support.candidate_sets import COORDINATES, ROWS, candidate, columns, noise, subset_losses
 

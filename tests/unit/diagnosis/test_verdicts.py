@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
-from compd.model.effect import Effect
+from compd.model.effects.effect import Effect
 from tests.support.external_recordings import SIGMA_UM, along, record_external
 from tests.support.sampled import sampled
 
@@ -239,7 +239,7 @@ def test_an_instruments_frame_with_two_axes_is_turned_along(tmp_path: Path) -> N
 
 
 def test_a_long_recording_is_thinned_and_gets_the_same_verdict(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compd.diagnosis.diagnose.MOST_ROWS", 120)
+    monkeypatch.setattr("compd.diagnosis.recording_diagnosis.MOST_ROWS", 120)
     diagnosis = verdict(tmp_path, 3 * MOVED)
     assert (diagnosis.verdict, ids(diagnosis)) == ("identified", ["play"])
     assert len(diagnosis.before.used) == 120

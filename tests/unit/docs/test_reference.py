@@ -21,14 +21,14 @@ from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.states import Mode, State
 from compd.live.service.messages import ErrorCode
 from compd.live.service.requests import REQUESTS, SENT_MESSAGES
-from compd.model.effect_needs import NEEDS
+from compd.model.effects.effect_needs import NEEDS
 from compd.model.formula.declaration import FormulaDeclaration, FormulaParameter
 from compd.model.formula.functions import FUNCTIONS
 from compd.model.library import BUNDLED
 from compd.model_file.model_document import EffectEntry, ModelDocument, ModelStep, ParameterEntry
 from compd.plugins import GAUGES, load, names
 from compd.recording.checks import LIMITS
-from compd.recording.columns import COLUMN_KINDS, parse_name
+from compd.tables.columns import COLUMN_KINDS, parse_name
 from compd.recording.reference import Reference
 from compd.recording.sidecar import SECTIONS as SIDECAR
 from compd.recording.sidecar import Exclusion

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from compd.commissioning.conformance.report import driver_under_test, run_conformance
+from compd.conformance.report import driver_under_test, run_conformance
 from compd.gauge import LineFault, Quality, RegisterReply
 from compd.lines.modbus_rtu import RtuMaster, crc16
 from compd.lines.stream import StreamLine

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from compd.commissioning.catalogue import catalogue, driver_description
-from compd.commissioning.conformance.report import driver_under_test, run_conformance
+from compd.gauge_tools.driver_catalogue import catalogue, driver_description
+from compd.conformance.report import driver_under_test, run_conformance
 from compd.errors import PluginError
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd_drivers.preset_directory import PresetDirectory

@@ -19,9 +19,9 @@ from typer.testing import CliRunner
 from compd.cli.main import app
 from compd.cli.problems import print_problems
 from compd.clock import MonotonicClock
-from compd.commissioning.gauge_description.capture import read_capture
-from compd.commissioning.gauge_file import gauge_of_file
-from compd.commissioning.open_gauge import PortArguments
+from compd.gauge_description.capture import read_capture
+from compd.gauge_tools.gauge_file import gauge_of_file
+from compd.gauge_tools.open_gauge import PortArguments
 from compd.configuration import load
 from compd.errors import CompdError
 from compd.fleet.recordings import find_recordings
@@ -45,7 +45,7 @@ from compd.page.workbench.effects_text import entries_of
 from compd.recording.ball_plate import read_plate
 from compd.recording.exclusions import exclude_rows
 from compd.recording.open_part import OpenPart
-from compd.recording.plan_file import read_plan_file
+from compd.plan_file import read_plan_file
 from compd.recording.reader import read_recording
 from compd.recording.sidecar import read_sidecar
 from compd_drivers.preset_directory import PresetDirectory

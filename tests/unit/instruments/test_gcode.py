@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from compd.diagnosis.planning.plan_formats import plan_targets, target_bytes
+from compd.planning.plan_formats import plan_targets, target_bytes
 from compd.errors import CompdError
 from compd.instruments.writers.gcode import FeedAndDwell
 from compd.instruments.writers.target import Way

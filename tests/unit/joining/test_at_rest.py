@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.open import open_recording
 from compd.configuration.shipped import load_machine
 from compd.errors import RecordingError

@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import compd
-from compd.model.effect import Effect
-from compd.model.effect_basis import evaluate_basis
+from compd.model.effects.effect import Effect
+from compd.model.effects.effect_basis import evaluate_basis
 from tests.support.external_recordings import external_rows
 from tests.support.model_machines import Floats
 from tests.support.paths import SHARED

@@ -23,7 +23,7 @@ from compd.errors import DaemonError
 from compd.gauge import Quality, bad, good
 from compd.live import daemon as daemon_module
 from compd.live.daemon import Daemon
-from compd.live.systemd import Notifier
+from compd.live.system.systemd import Notifier
 from tests.support.paths import CONFIG
 from tests.support.running_daemon import supervised
 

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from compd.clock import Clock
-from compd.commissioning.conformance.faults import Piece
-from compd.commissioning.conformance.virtual import VirtualWire
+from compd.conformance.faults import Piece
+from compd.conformance.virtual import VirtualWire
 from compd.commissioning.line_budget import USUAL_TURNAROUND_S, character_bits, line_budgets
 from compd.configuration import load
-from compd.configuration.stated_noise import tolerance_mm
+from compd.stated_noise import tolerance_mm
 from compd.gauge import Reading
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.acquisition.possible_motion import MotionLimits

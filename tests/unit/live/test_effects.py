@@ -20,7 +20,7 @@ from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
 from compd.live.loop.directions import Directions
 from compd.live.loop.model_loader import Models
-from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker
+from compd.live.loop.ring_entries import CyclePacker, CycleUnpacker
 from compd.live.loop.states import State
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine

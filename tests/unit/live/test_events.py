@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from compd.live.events import EVENTS, KEYS, name_event
-from compd.live.journal import RECORD_SEPARATOR, Journal, entry, text_of
+from compd.live.system.events import EVENTS, KEYS, name_event
+from compd.live.system.journal import RECORD_SEPARATOR, Journal, entry, text_of
 from tests.support.paths import ROOT
 
 LEVELS = ("debug", "info", "warning", "error", "exception")
@@ -43,11 +43,11 @@ def _is_logger(function: ast.expr) -> bool:
 def test_every_event_of_the_daemon_is_in_the_list_with_its_keys() -> None:
     known = {event.text: event for event in EVENTS}
     unknown = [f"{place} {text!r}" for place, text, _, keys in logged() if text not in known]
-    assert unknown == [], "add them to compd/live/events.py"
+    assert unknown == [], "add them to compd/live/system/events.py"
     extra = [
         f"{place} {keys - set(known[text].keys)}" for place, text, _, keys in logged() if keys - set(known[text].keys)
     ]
-    assert extra == [], "name these keys in compd/live/events.py"
+    assert extra == [], "name these keys in compd/live/system/events.py"
 
 
 @pytest.mark.long

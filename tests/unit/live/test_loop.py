@@ -16,7 +16,7 @@ from compd.live.loop.commands import Commands
 from compd.live.loop.loop import Loop
 from compd.live.loop.states import State
 from compd.live.loop.timing import Histogram, LoopTiming
-from compd.live.realtime import sleep_until
+from compd.live.system.realtime import sleep_until
 from tests.support.live_machine import machine
 
 PERIOD_S = 1 / 128  # exact in binary: tick times compare with ==

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import pytest
 
 from compd.errors import DaemonError
-from compd.live.process_limits import exhaustion_named, require_descriptors, require_limits
+from compd.live.system.process_limits import exhaustion_named, require_descriptors, require_limits
 from tests.support.paths import CONFIG
 
 SMALL = {

@@ -10,11 +10,11 @@ import pytest
 from compd.configuration.operation import QuantityWire, VoteSettings
 from compd.gauge import Quality, good
 from compd.live.acquisition.quantity_trust import QuantityTrust
-from compd.live.acquisition.votes.machine_view import MachineView
-from compd.live.acquisition.votes.standing_temperature import StandingTemperature
+from compd.live.acquisition.cross_checks.machine_view import MachineView
+from compd.live.acquisition.cross_checks.standing_temperature import StandingTemperature
 from compd.live.loop.states import State
 from compd.live.memory.trust_memory import Doubt, TrustMemory
-from compd.live.quantity_limits import quantity_limits
+from compd.live.acquisition.quantity_limits import quantity_limits
 from compd.units import unit_of
 from tests.support.thermometers import warm_machine
 

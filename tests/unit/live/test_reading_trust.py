@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from compd.configuration.stated_noise import tolerance_mm
+from compd.stated_noise import tolerance_mm
 from compd.gauge import Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, good
 from compd.live.acquisition.polled_gauge import PolledGauge
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm

@@ -10,7 +10,7 @@ import pytest
 
 from compd.configuration.operation import LoopSettings
 from compd.live.processes.loop_process import wake_latency_us
-from compd.live.realtime import limit_wake_latency
+from compd.live.system.realtime import limit_wake_latency
 
 LOOP = {"stale_after_s": 0.5, "on_stale": "hold", "hold_s": 1}
 

@@ -19,7 +19,7 @@ from compd.live.record.recorder import Recorder
 from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.recording.convert import convert_recording
 from compd.recording.reader import read_recording
-from compd.recording.tables.table_format import TableFormat
+from compd.tables.table_format import TableFormat
 from tests.support.live_machine import machine
 from tests.support.recorded_run import ROOMY, Run
 from tests.support.small_disk import room_for

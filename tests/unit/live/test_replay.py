@@ -22,7 +22,7 @@ from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.live.service.readings_message import parse_readings
 from compd.live.service.state_json import from_plain, to_plain
 from compd.model.effect_memory import EffectMemory
-from compd.model.motion import Motion
+from compd.model.kinematics.motion import Motion
 from tests.support.live_machine import CONFIG, machine
 from tests.support.live_models import file_with
 from tests.support.recorded_run import ROOMY, Run

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from compd.clock import Clock
-from compd.commissioning.conformance.faults import Piece
-from compd.commissioning.conformance.virtual import TURNAROUND_S, VirtualClock, VirtualWire
+from compd.conformance.faults import Piece
+from compd.conformance.virtual import TURNAROUND_S, VirtualClock, VirtualWire
 from compd.gauge import Gauge, Quality, Reading, replies_tell_whose
 from compd.live.acquisition.acquisition import LineThread
 from compd.plugins import GAUGES, load

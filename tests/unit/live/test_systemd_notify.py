@@ -7,7 +7,7 @@ import socket
 
 import pytest
 
-from compd.live.systemd import Notifier
+from compd.live.system.systemd import Notifier
 
 
 @pytest.fixture

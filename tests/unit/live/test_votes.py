@@ -9,12 +9,12 @@ from collections.abc import Callable
 import numpy as np
 
 from compd.configuration.operation import FrameVote, VoteSettings
-from compd.configuration.stated_noise import tolerance_mm
+from compd.stated_noise import tolerance_mm
 from compd.gauge import good
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
-from compd.live.acquisition.votes.machine_view import WiredLength
-from compd.live.acquisition.votes.votes import LOOK_EVERY_S, Votes
+from compd.live.acquisition.cross_checks.machine_view import WiredLength
+from compd.live.acquisition.cross_checks.cross_checks import LOOK_EVERY_S, Votes
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
 

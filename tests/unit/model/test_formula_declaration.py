@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from compd.errors import ConfigurationError
-from compd.model.deltas import effect_deltas
-from compd.model.effect import Effect, FittedEffect
-from compd.model.effect_basis import evaluate_basis
-from compd.model.effect_needs import unmet_needs
+from compd.model.effects.deltas import effect_deltas
+from compd.model.effects.effect import Effect, FittedEffect
+from compd.model.effects.effect_basis import evaluate_basis
+from compd.model.effects.effect_needs import unmet_needs
 from compd.model.formula.declaration import formula_effect
 from compd.model.library import find_effect
 from compd.model.prediction import predict

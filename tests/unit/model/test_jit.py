@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.model.kernels import jit
+from compd import jit
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_kernels_work_where_nothing_can_be_kept(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
     code = (
-        "import numpy as np; from compd.model.kernels import jit; from compd.model.kernels.rotation import to_outer;"
+        "import numpy as np; from compd.model.kernels import jit; from compd.rotation import to_outer;"
         "print(repr(jit.CACHE_DIRECTORY), to_outer(np.eye(3), np.ones(3), np.zeros(3)).tolist())"
     )
     done = subprocess.run(
@@ -78,7 +78,7 @@ def test_kernels_work_where_nothing_can_be_kept(tmp_path: Path) -> None:
 def test_processes_that_start_together_do_not_spoil_each_others_kernels(tmp_path: Path) -> None:
     """numba names a kernel by what its process compiled before, so these two do not agree on the name."""
     ours = (
-        "import numpy as np; from compd.model.kernels.rotation import compose;"
+        "import numpy as np; from compd.rotation import compose;"
         "print(compose(np.eye(3), np.eye(3)).sum())"
     )
     other = f"import numba; numba.njit(lambda x: x + 1)(1); {ours}"
@@ -96,7 +96,7 @@ def test_processes_that_start_together_do_not_spoil_each_others_kernels(tmp_path
 def _on_a_terminal(cache: Path) -> str:
     """What a process that uses a kernel prints on the terminal of its standard error."""
     ours, theirs = pty.openpty()
-    code = "import numpy as np; from compd.model.kernels.rotation import compose; compose(np.eye(3), np.eye(3))"
+    code = "import numpy as np; from compd.rotation import compose; compose(np.eye(3), np.eye(3))"
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     subprocess.run([sys.executable, "-c", code], env=environment, stderr=theirs, check=True)
     os.close(theirs)

@@ -11,10 +11,10 @@ from numba.core import event
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import GaugeValues, WarmStart
 from compd.errors import CompdError
-from compd.model.effect import ConstantValues, Effect, FittedEffect, Memory
-from compd.model.effect_basis import evaluate_basis
+from compd.model.effects.effect import ConstantValues, Effect, FittedEffect, Memory
+from compd.model.effects.effect_basis import evaluate_basis
 from compd.model.machine import MachineModel, machine_constants
-from compd.model.observations import Observations
+from compd.model.effects.observations import Observations
 from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD, constants_of, random_inputs
 from tests.support.formulas import written
 from tests.support.model_machines import Floats

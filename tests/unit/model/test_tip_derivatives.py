@@ -10,16 +10,16 @@ import pytest
 from compd.arrays import FloatArray
 from compd.compensation.compensation import compensate_cmm
 from compd.compensation.values import GaugeValues, WarmStart
-from compd.model.effect import Effect, FittedEffect
-from compd.model.effect_basis import evaluate_basis
+from compd.model.effects.effect import Effect, FittedEffect
+from compd.model.effects.effect_basis import evaluate_basis
 from compd.model.effect_memory import EffectMemory
 from compd.model.library import load_library
 from compd.model.machine import MachineModel
-from compd.model.motion import Movement
-from compd.model.observations import Observations
-from compd.model.observe import observe
+from compd.model.kinematics.motion import Movement
+from compd.model.effects.observations import Observations
+from compd.model.observer import observe
 from compd.model.sensitivity import sensitivities
-from compd.model.tip_derivatives import TipDerivatives, tip_derivatives
+from compd.model.tip_derivative import TipDerivatives, tip_derivatives
 from compd.model.uncertainty import GAUGE_PORTS
 from tests.support.effect_derivatives import effect_sensitivity
 from tests.support.live_machine import machine

@@ -9,11 +9,11 @@ import pytest
 
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import GaugeValues, WarmStart
-from compd.model.frame import solve_frame
-from compd.model.kinematics import forward_kinematics, inverse_kinematics
+from compd.model.kinematics.frame import solve_frame
+from compd.model.kinematics.link_kinematics import forward_kinematics, inverse_kinematics
 from compd.model.machine import MachineModel, machine_model
-from compd.model.statics import link_forces
-from compd.model.tool import Contact, ToolOnPlatform
+from compd.model.kinematics.statics import link_forces
+from compd.model.kinematics.tool import Contact, ToolOnPlatform
 from tests.support.model_machines import TRIPOD_WEIGHTS, Floats, column, worked_cases
 
 LENGTH_MM = 1e-9

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from compd.page.moments import Moments
+from compd.page.event_history import Moments
 
 
 def noted(seconds, step_s=0.1):

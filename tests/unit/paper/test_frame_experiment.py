@@ -16,7 +16,7 @@ from compd.configuration import Configuration, load
 from compd.configuration.shipped import shipped_configuration
 from compd.gauge import DataSheetNoise
 from compd.machine_builder import build_model
-from compd.model.frame import FrameGeometry, solve_frame
+from compd.model.kinematics.frame import FrameGeometry, solve_frame
 from compd.model.machine import MachineModel
 from compd.paper import frame_experiment, frame_page
 from compd.paper.frame_experiment import SIZES_MM, FrameResult

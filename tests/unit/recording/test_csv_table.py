@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compd.recording.tables import csv_table
-from compd.recording.tables.csv_table import parse_table
-from compd.recording.tables.problem_list import ProblemList
-from compd.recording.tables.table import Table
+from compd.tables import csv_table
+from compd.tables.csv_table import parse_table
+from compd.tables.problem_list import ProblemList
+from compd.tables.table import Table
 
 NAMES = ("time_s", "scale_1_mm", "humidity_pct")
 NUMBERS = st.one_of(

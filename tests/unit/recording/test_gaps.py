@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.open import open_recording
 from compd.comparison.residual_trends import Trend
 from compd.recording.gaps import MOST_EMPTY, filled

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.errors import CompdError, Problem, RecordingError
-from compd.recording.plan_file import SPEED_COLUMN, plan_row, plan_text, read_plan_file, write_text_file
+from compd.plan_file import SPEED_COLUMN, plan_row, plan_text, read_plan_file, write_text_file
 
 LIMITS = {"force_x_N": (-100.0, 100.0), SPEED_COLUMN: (0.0, 50.0)}
 ROWS = [

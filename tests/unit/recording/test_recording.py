@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from compd.cli.measurements.recording import recording as recording_command
 from compd.configuration import load
 from compd.errors import RecordingError
-from compd.recording.columns import is_covariate
+from compd.tables.columns import is_covariate
 from compd.recording.reader import check_against, read_recording
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording

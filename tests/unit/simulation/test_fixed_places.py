@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.configuration import load
 from compd.configuration.shipped import shipped_configuration
 from compd.errors import CompdError

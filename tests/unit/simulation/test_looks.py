@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.errors import CompdError
-from compd.simulation.wires.looks import LEAST_LOOKS, Looks
+from compd.simulation.wires.instrument_sampling import LEAST_LOOKS, Looks
 
 
 def seen(time_s: float, x_mm: float, moving: bool) -> dict[str, Any]:

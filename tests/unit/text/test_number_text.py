@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from compd.text.number_text import (
+from compd.text.numbers_as_text import (
     chance_text,
     estimate_text,
     estimates_text,

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from compd.arrays import FloatArray
 from compd.model.kernels.effect_row import EffectMachine, EffectRow
-from compd.model.kernels.jit import helper
+from compd.jit import helper
 
 PPM = 1e-6
 UM = 1e-3  # mm

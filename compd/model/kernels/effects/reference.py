@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from compd.arrays import FloatArray
 from compd.model.kernels.effect_row import EffectMachine, EffectRow
-from compd.model.kernels.jit import helper
-from compd.model.reference_conditions import REFERENCE_PRESSURE_hPa, REFERENCE_TEMPERATURE_degC
+from compd.jit import helper
+from compd.reference_conditions import REFERENCE_PRESSURE_hPa, REFERENCE_TEMPERATURE_degC
 
 PPM = 1e-6
 UM = 1e-3  # mm

@@ -6,9 +6,9 @@ import math
 
 from compd.arrays import FloatArray
 from compd.model.kernels.effect_row import EffectMachine, EffectRow
-from compd.model.kernels.jit import helper
+from compd.jit import helper
 from compd.model.kernels.memory import friction_step
-from compd.model.reference_conditions import REFERENCE_TEMPERATURE_degC
+from compd.reference_conditions import REFERENCE_TEMPERATURE_degC
 from compd.travel_direction import REVERSAL_MM
 
 PPM = 1e-6

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.commissioning.gauge_description.capture import CapturedReply, capture_live, read_capture, saved_capture
+from compd.gauge_description.capture import CapturedReply, capture_live, read_capture, saved_capture
 from compd.configuration.lines import SerialLine
 from compd.errors import CompdError
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import pytest
 
-from compd.commissioning.gauge_description.answers import Answers
-from compd.commissioning.gauge_description.capture import CapturedReply
-from compd.commissioning.gauge_description.describe import learn_gauge
+from compd.gauge_description.answers import Answers
+from compd.gauge_description.capture import CapturedReply
+from compd.gauge_description.describe import learn_gauge
 from compd.errors import CompdError
 from compd.gauge import LineFault
 from compd_drivers.serial_ascii import SerialAscii

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import compd
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.covariates import covariates
+from compd.comparison.covariate import covariates
 from compd.errors import CompdError, RecordingError
 from compd.model.formula.declaration import formula_effect
 from compd.recording.reader import read_recording

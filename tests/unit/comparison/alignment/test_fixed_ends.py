@@ -11,10 +11,10 @@ import pytest
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.alignment.aligned_recording import effect_deltas
 from compd.comparison.alignment.fixed_ends import FixedEnds, place_balls, place_pins
-from compd.comparison.compare import compare
-from compd.comparison.fit import fit, initial_effect
-from compd.diagnosis.planning.measurement_programmes import recorded_limits
-from compd.diagnosis.planning.next_measurement import plan_measurement
+from compd.comparison.recording_comparison import compare
+from compd.comparison.effect_fit import fit, initial_effect
+from compd.planning.measurement_programmes import recorded_limits
+from compd.planning.next_measurement import plan_measurement
 from compd.errors import CompdError, RecordingError
 from compd.model.library import find_effect
 from compd.recording.reader import read_recording

@@ -10,9 +10,9 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from compd.comparison.statistics import cluster_covariance, least_squares, robust
-from compd.comparison.statistics.cluster_covariance import cluster_covariance as covariance_of
-from compd.comparison.statistics.least_squares import (
+from compd.statistics import cluster_covariance, least_squares, robust
+from compd.statistics.cluster_covariance import cluster_covariance as covariance_of
+from compd.statistics.least_squares import (
     determined,
     normal_inverse,
     ridge_inverse,

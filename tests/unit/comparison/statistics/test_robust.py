@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compd.comparison.alignment.registration import register
-from compd.comparison.statistics.robust import (
+from compd.statistics.robust import (
     HUBER,
     SCALE_EFFICIENCY,
     huber_weights,

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from compd.comparison.alignment.align_recording import align_recording
-from compd.comparison.compare import compare
+from compd.comparison.recording_comparison import compare
 from compd.comparison.stream.block_comparison import compare_blocks
 from compd.comparison.stream.sample import draw_sample
 from compd.errors import RecordingError
-from compd.model.effect import FittedEffect
+from compd.model.effects.effect import FittedEffect
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
 from tests.support.external_recordings import record_external

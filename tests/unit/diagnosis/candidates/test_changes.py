@@ -10,7 +10,7 @@ import pytest
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, library_pool
 from compd.diagnosis.candidates.changes import MOMENTS, MOST_STARTS, change_candidates, moments_s
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.words.summary_lines import summary_lines
 from tests.support.external_recordings import along, record_external
 from tests.support.hidden_effects import LIBRARY, record_with_effects

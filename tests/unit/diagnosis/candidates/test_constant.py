@@ -9,10 +9,10 @@ import pytest
 
 import compd
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.fit import fit, initial_effect
+from compd.comparison.effect_fit import fit, initial_effect
 from compd.diagnosis.candidates.candidates import library_pool
 from compd.diagnosis.candidates.constant import constant_candidate, constant_effect, makes_only, split_constants
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
 from compd.units import UM_PER_MM
 from tests.support.external_recordings import along, record_external

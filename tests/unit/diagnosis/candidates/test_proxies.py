@@ -12,7 +12,7 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.open import open_recording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT
 from compd.diagnosis.candidates.proxies import proxy_candidates
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.units import UM_PER_MM
 from tests.support.external_recordings import along, record_external
 from tests.support.hidden_effects import LIBRARY, record_with_effects

@@ -10,7 +10,7 @@ import pytest
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.candidates.candidates import library_pool, variant
 from compd.diagnosis.candidates.refined_constants import BETWEEN, refined_variants
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from tests.support.external_recordings import along, record_external
 from tests.support.hidden_effects import LIBRARY, record_with_effects
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.diagnosis.planning.measurement_settings import MOST_LEVELS, settings_of
+from compd.planning.measurement_settings import MOST_LEVELS, settings_of
 from compd.errors import CompdError
 
 ROWS = 60

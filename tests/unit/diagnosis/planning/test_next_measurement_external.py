@@ -15,15 +15,15 @@ import compd
 from compd.arrays import FloatArray
 from compd.cli.measurements.plan import plan as plan_command
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.fit import fit, initial_effect
-from compd.diagnosis.planning.next_measurement import (
+from compd.comparison.effect_fit import fit, initial_effect
+from compd.planning.next_measurement import (
     measurement_of_constant,
     measurement_to_test,
     next_measurement,
     plan_measurement,
 )
 from compd.errors import CompdError
-from compd.model.effect import Effect, FittedEffect
+from compd.model.effects.effect import Effect, FittedEffect
 from compd.model.formula.declaration import formula_effect
 from compd.model.library import load_library
 from tests.support.external_recordings import SIGMA_UM, along, record_external

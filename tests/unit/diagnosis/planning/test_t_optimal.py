@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.diagnosis.planning.t_optimal import Predictions, RivalRefit, choose_programmes
+from compd.planning.t_optimal import Predictions, RivalRefit, choose_programmes
 
 LENGTHS = np.array([1, 3, 2, 1, 1])
 ENDS = np.cumsum([0, *LENGTHS])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.diagnosis.planning.tip_ways import LONGEST_MM, STEADY_S, TRAVEL_MM, TipWays, plan_ways
+from compd.planning.tip_ways import LONGEST_MM, STEADY_S, TRAVEL_MM, TipWays, plan_ways
 from compd.machine_builder import build_model
 from compd.simulation.truth.mechanism import Mechanism
 from tests.support.simulated import HEXAPOD, hexapod, tripod, wiring

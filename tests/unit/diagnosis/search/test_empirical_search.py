@@ -11,8 +11,8 @@ import pytest
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.fit import fit, initial_effect
-from compd.diagnosis.diagnose import diagnose
+from compd.comparison.effect_fit import fit, initial_effect
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import error_fall
 from compd.model.library import find_effect

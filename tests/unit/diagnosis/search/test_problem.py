@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.compare import compare
-from compd.comparison.fit import fit, initial_effect
+from compd.comparison.recording_comparison import compare
+from compd.comparison.effect_fit import fit, initial_effect
 from compd.diagnosis.candidates.candidates import CandidatePool, library_pool
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.search.problem import DiagnosisProblem, build_problem

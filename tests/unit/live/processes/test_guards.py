@@ -14,16 +14,16 @@ from types import SimpleNamespace
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.ring_entries import SentSetpoint
 from compd.live.loop.states import Mode, State
 from compd.live.memory.shared_ring import SharedRing
-from compd.live.processes.child_process import OUT_OF_MEMORY, ChildProcess
-from compd.live.processes.control import Control, Phase
+from compd.live.system.child_process import OUT_OF_MEMORY, ChildProcess
+from compd.live.memory.control import Control, Phase
 from compd.live.processes.heartbeat import Heartbeat, RestartDelay
 from compd.live.processes.loop_process import ModelChange
-from compd.live.processes.loop_succession import LoopSuccession
+from compd.live.loop_succession import LoopSuccession
 from compd.live.processes.service_process import StateLog
-from compd.live.realtime import RationedPriority, thread_time_s
+from compd.live.system.realtime import RationedPriority, thread_time_s
 from compd.live.service.loop_watch import LoopWatch
 
 
@@ -208,9 +208,9 @@ def test_a_request_is_answered_where_the_successor_ends_with_the_turn_and_withou
 
 def test_priority_is_given_up_while_a_thread_takes_more_than_half_a_processor(monkeypatch):
     now, used, policies = [0.0], [0.0], []
-    monkeypatch.setattr("compd.live.realtime.time.thread_time", lambda: used[0])
+    monkeypatch.setattr("compd.live.system.realtime.time.thread_time", lambda: used[0])
     monkeypatch.setattr(
-        "compd.live.realtime.os.sched_setscheduler", lambda _, policy, parameters: policies.append(policy)
+        "compd.live.system.realtime.os.sched_setscheduler", lambda _, policy, parameters: policies.append(policy)
     )
     priority = RationedPriority(20, SimpleNamespace(monotonic=lambda: now[0]))
     had = []
@@ -228,9 +228,9 @@ def test_priority_is_given_up_while_a_thread_takes_more_than_half_a_processor(mo
 
 def test_the_thread_of_a_line_has_its_priority_from_another_thread_and_loses_it_when_it_never_waits(monkeypatch):
     now, used, policies = [0.0], [0.0], []
-    monkeypatch.setattr("compd.live.realtime.thread_time_s", lambda thread_id: used[0])
+    monkeypatch.setattr("compd.live.system.realtime.thread_time_s", lambda thread_id: used[0])
     monkeypatch.setattr(
-        "compd.live.realtime.os.sched_setscheduler",
+        "compd.live.system.realtime.os.sched_setscheduler",
         lambda thread, policy, _: policies.append((thread, policy & ~os.SCHED_RESET_ON_FORK)),
     )
     priority = RationedPriority(10, SimpleNamespace(monotonic=lambda: now[0]), 4711, 0.25)
@@ -267,7 +267,7 @@ def test_where_priority_is_not_permitted_it_is_asked_for_once(monkeypatch):
         asked.append(arguments)
         raise PermissionError
 
-    monkeypatch.setattr("compd.live.realtime.os.sched_setscheduler", refuse)
+    monkeypatch.setattr("compd.live.system.realtime.os.sched_setscheduler", refuse)
     now = [0.0]
     priority = RationedPriority(20, SimpleNamespace(monotonic=lambda: now[0]))
     for _ in range(5):

@@ -6,10 +6,10 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.errors import StateError
-from compd.live.processes import loop_succession
-from compd.live.processes.control import Control
+from compd.live import loop_succession
+from compd.live.memory.control import Control
 from compd.live.processes.loop_process import ModelChange
-from compd.live.processes.loop_succession import LoopSuccession
+from compd.live.loop_succession import LoopSuccession
 from compd.model_file.model_document import read_document
 
 

@@ -9,7 +9,7 @@ from compd.compensation.compensation import compensate_cmm
 from compd.compensation.values import GaugeValues, WarmStart
 from compd.live.loop.model_loader import Models
 from compd.live.service.budget_message import BudgetMessage
-from compd.model.kernels.rotation import rotation_matrix
+from compd.rotation import rotation_matrix
 from tests.support.live_machine import machine
 from tests.support.live_models import file_with, thermal
 

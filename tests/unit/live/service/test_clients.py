@@ -10,7 +10,7 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.live.memory.shared_ring import ENTRIES
-from compd.live.service import seats
+from compd.live.service import connection_limits as seats
 from tests.support.service import PERIOD_S, TIMEOUT_S, setpoint
 
 STATUS = b'{"class":"STATUS"}\n'

@@ -14,7 +14,7 @@ import pytest
 
 from compd.client import connect
 from compd.errors import DaemonError
-from compd.live.processes.control import Control
+from compd.live.memory.control import Control
 from compd.live.service import descriptor_bin, model_switch
 from compd.live.service.client_session import ClientSession
 from compd.live.service.descriptor_bin import DescriptorBin

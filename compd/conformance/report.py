@@ -1,0 +1,176 @@
+"""A driver under test, found by its name, and all its cases on all its wires."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from compd.conformance.case_result import CaseResult, Subject
+from compd.conformance.cases import FIRST_CASES, run_cases
+from compd.conformance.harness import ConformanceSession, ConformanceWire
+from compd.conformance.peer import Peer, SensorValues
+from compd.conformance.talker_cases import CHARACTER_S, opened_within_a_line, seldom_read
+from compd.conformance.virtual import VirtualWire
+from compd.conformance.wire import CHARACTER_BITS, Kind, RealWire
+from compd.conformance.wire_cases import slowest_line
+from compd.errors import PluginError, Problem
+from compd.gauge import Gauge, Quality
+from compd.plugins import GAUGES, SIMULATED_GAUGES, load
+from compd.pushed_gauge import PushedGauge
+
+SLOWEST_BAUD = 1200  # of every device in the shipped table
+SLOW_TIMEOUT_S = 0.3
+
+
+@dataclass(frozen=True)
+class DriverUnderTest:
+    """A driver with its simulated device and the options that it is tried with."""
+
+    name: str
+    gauge: type[Gauge[Any]]
+    simulator: Any
+    options: Any
+
+    @property
+    def registers(self) -> bool:
+        return self.gauge.line_kind == "registers"
+
+    @property
+    def error_replies(self) -> Mapping[bytes, Quality]:
+        """Whole replies by which the device reports an error, and the quality of each, as its simulator has them."""
+        device = self.simulator(self.options, lambda channel: math.nan)
+        replies = getattr(device, "error_replies", {})
+        return {reply: Quality(quality) for reply, quality in replies.items()}
+
+    @property
+    def by_dtr(self) -> bool:
+        """Whether its device is asked by DTR."""
+        return "DTR" in self.gauge(self.options).serial_signals
+
+    @property
+    def unasked(self) -> bool:
+        """Whether its device speaks without being asked."""
+        device = self.simulator(self.options, lambda channel: 0.0)
+        return not self.registers and not self.by_dtr and bool(device.speak())
+
+    def kinds(self) -> tuple[Kind, ...]:
+        """The kinds of line of this computer on which it can be tried."""
+        if self.by_dtr or self.unasked:
+            return ()
+        return ("modbus_rtu", "modbus_tcp") if self.registers else ("serial", "tcp")
+
+    def subject(self, over_tcp: bool, exact: bool) -> Subject:
+        checksum = self.registers or self.gauge.integrity == "checksum"
+        errors = self.error_replies
+        return Subject(
+            self.registers, over_tcp, checksum, exact, errors, self.unasked, self.options, self._with_options
+        )
+
+    def peer(self, over_tcp: bool = False) -> tuple[Peer, SensorValues]:
+        """The simulated device at the far end, and the values of its sensors. `over_tcp`: Modbus in TCP framing."""
+        sensors = SensorValues(self.gauge(self.options).channels, self.gauge.sample_range)
+        return Peer(self.simulator, self.options, sensors, over_tcp), sensors
+
+    def virtual(self, character_s: float = 0.0) -> ConformanceSession:
+        """On a wire in virtual time."""
+        return self.virtual_with_wire(character_s)[0]
+
+    def virtual_with_wire(self, character_s: float = 0.0) -> tuple[ConformanceSession, VirtualWire]:
+        """The same, and the wire, whose time can pass between polls."""
+        peer, sensors = self.peer()
+        wire = VirtualWire(peer, self.registers, character_s=character_s, unasked=self.unasked)
+        return self._session(wire, sensors), wire
+
+    def real(self, kind: Kind, directory: Path, **settings: Any) -> ConformanceSession:
+        """On a pty or TCP port; `settings`: baud, timeout_s."""
+        peer, sensors = self.peer(over_tcp=kind == "modbus_tcp")
+        return self._session(RealWire(peer, kind, directory, **settings), sensors)
+
+    def _with_options(self, options: Any) -> ConformanceSession:
+        return replace(self, options=options).virtual()
+
+    def _session(self, wire: ConformanceWire, sensors: SensorValues) -> ConformanceSession:
+        return ConformanceSession(self.gauge(self.options), wire, sensors)
+
+
+def driver_under_test(
+    name: str, options: Mapping[str, Any] | None = None, simulator: str | None = None
+) -> DriverUnderTest:
+    """The driver `name` (entry point, or /file.py:ClassName), ready to be tried.
+
+    `options` : without `driver` and `line`; the driver's own `sample_options` if None.
+    `simulator` : the simulated device's entry point or file; `name` if None.
+    Raises PluginError when there is no driver, no simulated device, or no options.
+    """
+    gauge = load(GAUGES, name, f"driver {name}")
+    if issubclass(gauge, PushedGauge):
+        raise PluginError(
+            Problem(
+                where=f"driver {name}",
+                what="its device speaks by itself: there are no requests whose replies could be damaged",
+                next_step="try it with `compd gauge read` on a server or broker of yours",
+            )
+        )
+    device = load(SIMULATED_GAUGES, simulator or name, f"simulated device of {name}")
+    chosen = (gauge.sample_options if options is None else options) or {}
+    try:
+        checked = gauge.Options.model_validate({"driver": name, "line": "test", **chosen})
+    except ValidationError as error:
+        raise PluginError(
+            [
+                Problem(
+                    where=f"driver {name}, options.{'.'.join(map(str, detail['loc']))}",
+                    what=detail["msg"],
+                    next_step="give the driver `sample_options`, or name a file with --options",
+                )
+                for detail in error.errors(include_url=False)
+            ]
+        ) from error
+    return DriverUnderTest(name, gauge, device, checked)
+
+
+def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iterator[tuple[str, CaseResult]]:
+    """Every case on every kind of wire, as they come: (wire, result).
+
+    First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; once at SLOWEST_BAUD. A driver that fails
+    in one of FIRST_CASES is tried no further.
+    """
+    with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
+        for wire, result in _cases_on("virtual time", driver.virtual(), driver.subject(False, True)):
+            yield wire, result
+            if result.verdict == "FAIL" and result.case in FIRST_CASES:
+                return
+        slow = driver.virtual(CHARACTER_BITS / SLOWEST_BAUD)
+        yield "virtual time", slowest_line(slow, SLOWEST_BAUD)
+        if driver.unasked:
+            yield "virtual time", opened_within_a_line(*driver.virtual_with_wire(CHARACTER_S))
+            yield "virtual time", seldom_read(*driver.virtual_with_wire())
+        if not on_real_wires:
+            return
+        if not driver.kinds():
+            why = "a pty and TCP have no DTR" if driver.by_dtr else "a device that speaks unasked: in virtual time"
+            yield "ptys, ports", CaseResult("on ptys and TCP ports", "", why, "-")
+            return
+        for kind in driver.kinds():
+            session = driver.real(kind, Path(temporary))
+            subject = driver.subject(kind in ("tcp", "modbus_tcp"), False)
+            yield from _cases_on(kind, session, subject)
+        session = driver.real(driver.kinds()[0], Path(temporary), baud=SLOWEST_BAUD, timeout_s=SLOW_TIMEOUT_S)
+        try:
+            yield driver.kinds()[0], slowest_line(session, SLOWEST_BAUD)
+        finally:
+            session.close()
+
+
+def _cases_on(wire: str, session: ConformanceSession, subject: Subject) -> Iterator[tuple[str, CaseResult]]:
+    try:
+        for result in run_cases(session, subject):
+            yield wire, result
+    finally:
+        session.close()

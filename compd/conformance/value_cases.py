@@ -1,0 +1,225 @@
+"""Values without faults of the wire: both signs, from one digit to the ends of the device, again and again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from compd.conformance.case_result import (
+    GOOD,
+    IN_VIRTUAL_TIME,
+    NO_ANSWER,
+    NO_NUMBER,
+    NO_VALUE,
+    Case,
+    CaseResult,
+    Subject,
+    complaints_of,
+    result_of,
+)
+from compd.conformance.clock_calls import clock_calls
+from compd.conformance.harness import ConformanceSession, Poll
+from compd.conformance.peer import GOLDEN
+
+LARGEST = 1e7  # in the channel's unit: no gauge shows more
+STEPS_PER_DECADE = (1.0, 2.0, 5.0)
+BISECTIONS = 60  # from one step of a decade to the next, down to the last digit
+MOST_POWERS = 32  # of 2 digits, where counters and signs roll over
+MANY_EXCHANGES = 10_000
+FEWEST_POLLS = 3000  # a driver that is wrong every thousandth time is wrong three times
+WATCHED_POLLS = 300  # of them, in which no clock must be called
+MOST_WITHOUT_VALUE = 0.02  # of them: single numbers that mean something else, such as 85.0 degC of a DS18B20
+SMALL_STEPS = 20
+
+
+def _ends_of_range(session: ConformanceSession, _: Subject) -> CaseResult:
+    complaints = []
+    for end in (0, 1):
+        session.sensors.set_to_end(end)
+        complaints += complaints_of(session.poll(new_values=False), GOOD)
+    return result_of("range: lowest and highest value", GOOD, "ok", complaints)
+
+
+def _sensor_off(session: ConformanceSession, _: Subject) -> CaseResult:
+    """Each sensor off in turn: it must have no number, the others none that is wrong."""
+    observed: set[str] = set()
+    complaints = []
+    for place, channel in enumerate(session.gauge.channels):
+        session.sensors.advance()
+        session.sensors.values[channel.name] = math.nan
+        poll = session.poll(new_values=False)
+        complaints += [f"{channel.name} off: {text}" for text in poll.wrong]
+        if place >= len(poll.readings):
+            continue
+        quality = poll.readings[place].quality
+        observed.add(str(quality))
+        if quality not in NO_VALUE | NO_ANSWER:
+            complaints.append(f"{channel.name} off: {poll}")
+    complaints += complaints_of(session.recover()[1], GOOD)
+    return result_of("a sensor is off", NO_VALUE, ", ".join(sorted(observed)), complaints)
+
+
+def _whole_range(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """Each channel by itself, from one digit to the largest number that the device shows, both signs.
+
+    It leaves the range in which every channel is right with the sensors.
+    """
+    case, required = "range: all that the device can show", "each number right to one digit, or none"
+    if not subject.exact:
+        return CaseResult(case, required, IN_VIRTUAL_TIME, "-")
+    complaints: list[str] = []
+    shown = []
+    for channel in session.gauge.channels:
+        name = channel.name
+        ends = []
+        for sign in (-1.0, 1.0):
+            end, wrong = _end_of(session, name, sign)
+            complaints += wrong
+            ends.append(end)
+        lowest, highest = ends
+        session.sensors.whole[name] = (lowest, highest)
+        for value in _special_values(session.replies.digit[name], lowest, highest):
+            complaints += _complaints_at(session, name, value)[1]
+        shown.append(f"{name} {lowest:.7g} to {highest:.7g} {channel.unit}")
+    digits = ", ".join(sorted({f"{digit:.2g}" for digit in session.replies.digit.values()}))
+    text = f"{'; '.join(shown)}; digit {digits}"
+    result = result_of(case, GOOD | NO_NUMBER, text, complaints)
+    return CaseResult(case, required, result.observed, result.verdict)
+
+
+def _end_of(session: ConformanceSession, channel: str, sign: float) -> tuple[float, list[str]]:
+    """The largest value of this sign that has a right number, and what was wrong on the way there and beyond."""
+    complaints = []
+    end, beyond = 0.0, math.inf
+    decade = math.floor(math.log10(session.replies.digit[channel]))
+    largest = round(math.log10(LARGEST))
+    for value in (sign * step * 10.0**k for k in range(decade, largest) for step in STEPS_PER_DECADE):
+        right, wrong = _complaints_at(session, channel, value)
+        complaints += wrong
+        if right:
+            end, beyond = value, math.inf
+        elif math.isinf(beyond):
+            beyond = value
+    for _ in range(BISECTIONS if math.isfinite(beyond) else 0):
+        middle = (end + beyond) / 2
+        right, wrong = _complaints_at(session, channel, middle)
+        complaints += wrong
+        end, beyond = (middle, beyond) if right else (end, middle)
+        if abs(beyond - end) < session.replies.digit[channel] / 4:
+            break
+    return end, complaints
+
+
+def _complaints_at(session: ConformanceSession, channel: str, value: float) -> tuple[bool, list[str]]:
+    """Whether the channel has a right number for this value, the others being as ever, and what is wrong."""
+    session.sensors.advance()
+    session.sensors.values[channel] = value
+    if session.exchanges and session.replies.at(session.exchanges) is None:
+        return False, []  # the simulated device has no form for it
+    poll = session.poll(new_values=False)
+    complaints = complaints_of(poll, GOOD | NO_NUMBER) or list(poll.undetectable)
+    if complaints:
+        return False, complaints
+    place = [c.name for c in session.gauge.channels].index(channel)
+    reading = poll.readings[place]
+    if not reading.ok:
+        return False, []
+    if abs(reading.value - value) <= 2 * session.replies.digit[channel]:
+        return True, []
+    lowest, highest = session.replies.interval(channel, session.exchanges)
+    if math.isfinite(highest - lowest):
+        return True, []
+    end = lowest if math.isinf(highest) else highest
+    if abs(reading.value - end) <= 2 * session.replies.digit[channel]:
+        return False, []  # it shows its end for all beyond it, and nobody can tell that from its end
+    text = f"{channel}: {reading.value:.9g} as ok, the sensor had {value:.9g}: the device shows the same for all"
+    return False, [f"{text} beyond {end:.9g}, so that it is no measurement"]
+
+
+def _special_values(digit: float, lowest: float, highest: float) -> Iterator[float]:
+    """0, and numbers of digits where a carry, a counter or a sign rolls over, inside the range."""
+    numbers = {0.0, 1.0, 2.0}
+    for power in range(MOST_POWERS):
+        numbers |= {2.0**power - 1, 2.0**power, 10.0**power - 1, 10.0**power, 5 * 10.0**power}
+    for number in sorted(numbers):
+        for value in (number * digit, -number * digit):
+            if lowest <= value <= highest:
+                yield value
+
+
+def _small_steps(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """Each sensor moves by one digit from poll to poll, then stands still."""
+    case = "small steps, then standstill"
+    if not subject.exact:
+        return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
+    session.sensors.advance()
+    complaints = []
+    for step in (*[1.0] * SMALL_STEPS, *[-1.0] * SMALL_STEPS, *[0.0] * SMALL_STEPS):
+        for name, value in session.sensors.values.items():
+            session.sensors.values[name] = value + step * session.replies.digit[name]
+        poll = session.poll(new_values=False)
+        complaints += [*complaints_of(poll, GOOD), *poll.undetectable]
+    return result_of(case, GOOD, f"ok, {3 * SMALL_STEPS} polls", complaints)
+
+
+def _many_polls(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """Thousands of polls, all over the range: even and logarithmic in turn."""
+    case = "thousands of polls"
+    if not subject.exact:
+        return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
+    complaints: list[str] = []
+    without = 0
+    session.recover()
+    polls = max(FEWEST_POLLS, MANY_EXCHANGES // max(1, len(session.exchanges)))
+    for number in range(polls):
+        for place, name in enumerate(session.sensors.values):
+            share = (number * GOLDEN + place * 0.0719) % 1.0
+            session.sensors.values[name] = share_of(session, name, share, logarithmic=number % 2 == 1)
+        if number < WATCHED_POLLS:
+            with clock_calls() as called:
+                poll = session.poll(new_values=False)
+            complaints += [f"poll {number + 1}: `read` calls {name}" for name in called]
+        else:
+            poll = session.poll(new_values=False)
+        complaints += [f"poll {number + 1}: {text}" for text in complaints_of(poll, GOOD | NO_VALUE)]
+        complaints += [f"poll {number + 1}: {text}" for text in poll.undetectable]
+        without += poll.qualities != GOOD
+    if without > MOST_WITHOUT_VALUE * polls:
+        complaints.append(f"{without} of them without a value, in a range where each number was read before")
+    session.recover()
+    return result_of(case, GOOD | NO_VALUE, f"ok; {without} of {polls} without a value", complaints)
+
+
+def share_of(session: ConformanceSession, channel: str, share: float, logarithmic: bool) -> float:
+    """The value at a share (0 to 1) of the channel's whole range."""
+    lowest, highest = session.sensors.whole.get(channel, session.sensors.extents[channel])
+    if not logarithmic or lowest * highest >= 0:
+        return lowest + share * (highest - lowest)
+    end = highest if share >= 0.5 else lowest
+    smallest = min(session.replies.digit[channel], abs(end))
+    return math.copysign(smallest * (abs(end) / smallest) ** abs(2 * share - 1), end)
+
+
+def _two_of_them(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """A second gauge of the same kind, with other values, polled in turn with the first."""
+    case = "two of them at once"
+    if subject.another is None or not subject.exact:
+        return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
+    second = subject.another(subject.options)
+    complaints: list[str] = []
+    second.sensors.advance()
+    for _ in range(SMALL_STEPS):
+        polls: Sequence[Poll] = (second.poll(), session.poll())
+        complaints += [text for poll in polls for text in [*complaints_of(poll, GOOD), *poll.undetectable]]
+    second.close()
+    return result_of(case, GOOD, "ok", complaints)
+
+
+VALUE_CASES: tuple[Case, ...] = (
+    _ends_of_range,
+    _whole_range,
+    _small_steps,
+    _many_polls,
+    _sensor_off,
+    _two_of_them,
+)

@@ -1,0 +1,93 @@
+"""What a driver waits for: its replies alone, by the line's clock; and that it asks no more than once."""
+
+from __future__ import annotations
+
+import resource
+import time
+
+from compd.conformance import faults
+from compd.conformance.case_result import (
+    IN_VIRTUAL_TIME,
+    Case,
+    CaseResult,
+    Subject,
+    every_reply,
+)
+from compd.conformance.clock_calls import clock_calls
+from compd.conformance.harness import ConformanceSession
+from compd.conformance.virtual import GAP_S, TURNAROUND_S
+
+LOOKS = 5
+LONGEST_BLOCK_S = 0.05  # by the computer's clock, in each of LOOKS polls; other threads take less of it
+IDLE_TIMEOUTS = 0.5  # in line timeouts: waiting in a poll whose replies come at once
+EXCHANGE_S = GAP_S + TURNAROUND_S  # of a virtual line
+LONGEST_WAIT_S = 10.0  # for a reply that does not come
+FAULTS = (
+    faults.SILENT, faults.cut(0.5), faults.garbage_before(), faults.garbage_inside(), faults.late(1.5),
+    faults.replaced(b"ERR\r\n"),
+)  # fmt: skip
+
+
+def waits(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """First of all cases, without faults: a driver that waits by itself would take for ever in the others."""
+    case, required = "waits", "for its replies alone, by the line's clock"
+    if not subject.exact:
+        return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
+    blocked_s = []
+    for _ in range(LOOKS):
+        started_s, gave_up = time.perf_counter(), resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
+        with clock_calls() as called:
+            poll = session.poll()
+        # a thread that waits gives the processor up; one from which it is taken has no part in that
+        waited = resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw > gave_up
+        blocked_s.append(time.perf_counter() - started_s if waited else 0.0)
+        if called:
+            return CaseResult(case, required, f"`read` calls {called[0]}", "FAIL")
+        pauses_s = sum(exchange.pause_s for exchange in session.exchanges)
+        idle_s = poll.duration_s - pauses_s - EXCHANGE_S * max(1, len(session.exchanges))
+        if poll.ok and idle_s > IDLE_TIMEOUTS * session.wire.timeout_s:
+            text = f"a poll takes {poll.duration_s:.3g} s although its replies come at once: it waits {idle_s:.3g} s"
+            return CaseResult(case, required, text, "FAIL")
+    if min(blocked_s) > LONGEST_BLOCK_S:
+        text = f"`read` stands still for {min(blocked_s):.3g} s while the line does not wait"
+        return CaseResult(case, required, text, "FAIL")
+    return CaseResult(case, required, f"{poll.duration_s:.3g} s on the line's clock", "pass")
+
+
+def waits_after_faults(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """The same where replies do not come, or are damaged."""
+    case, required = "waits after faults", "for its replies alone, by the line's clock"
+    if not subject.exact:
+        return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
+    longest_s = 0.0
+    for fault in subject.possible(FAULTS):
+        with clock_calls() as called:
+            poll = session.poll(every_reply(fault))
+        if called:
+            return CaseResult(case, required, f"{fault.name}: `read` calls {called[0]}", "FAIL")
+        longest_s = max(longest_s, poll.duration_s)
+        session.settle()
+        session.recover()
+    if longest_s > LONGEST_WAIT_S:
+        return CaseResult(case, required, f"waits {longest_s:.3g} s for a reply that does not come", "FAIL")
+    return CaseResult(case, required, f"at most {longest_s:.3g} s on the line's clock", "pass")
+
+
+def _retries(session: ConformanceSession, subject: Subject) -> CaseResult:
+    """No more requests in a poll that fails than in one that does not."""
+    case, required = "no request twice", "as many requests as without a fault, or fewer"
+    if not subject.exact:
+        return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
+    for fault in FAULTS:
+        session.poll(every_reply(fault))
+        requests = len(session.exchanges)
+        session.settle()
+        session.recover()
+        if requests > session.most_requests:
+            text = f"asks {requests} times in one poll, {session.most_requests} without a fault"
+            observed = f"{fault.name}: {text}: the line's thread asks again, not the driver"
+            return CaseResult(case, required, observed, "FAIL")
+    return CaseResult(case, required, f"{session.most_requests} in a poll", "pass")
+
+
+CASES_OF_ANSWERS: tuple[Case, ...] = (_retries,)

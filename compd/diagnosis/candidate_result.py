@@ -1,0 +1,97 @@
+"""Every effect of the library with its status, and the reason why it is named or not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from compd.diagnosis.candidates.plausibility import estimate_parameters, is_undetermined
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep, ParameterEstimate, Status
+from compd.diagnosis.search.problem import DiagnosisProblem
+from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
+from compd.text.numbers_as_text import number_text
+
+
+def candidate_results(
+    problem: DiagnosisProblem, losses: SubsetLosses, steps: Sequence[DiagnosisStep], p_values: Mapping[str, float]
+) -> tuple[CandidateResult, ...]:
+    """One result per effect, tried alone at its best nonlinear constants: the best first, then those not testable.
+
+    steps : the effects that were named.  p_values : by effect, corrected for all that were tried.
+    """
+    results = [
+        _result_alone(problem, losses, subset, steps, p_values.get(name, float("nan")))
+        for name, subset in losses.best_variants.items()
+        if losses.candidates[subset.members[0]].kind == "effect"
+    ]
+    names = dict.fromkeys(candidate.name for candidate in losses.candidates if candidate.kind == "effect")
+    why = "acts in one session or sector only: what it does there predicts no other"
+    results += [CandidateResult(name, "not_testable", why) for name in names if name not in losses.best_variants]
+    why = why_nothing_else(problem)
+    results += [CandidateResult(candidate.name, "not_testable", why) for candidate in problem.same_as_nuisance]
+    results += [CandidateResult(name, "not_testable", reason) for name, reason in problem.pool.untestable.items()]
+    return tuple(results)
+
+
+def why_nothing_else(problem: DiagnosisProblem) -> str:
+    """Why effects cannot be seen that do nothing but what is fitted along in any case."""
+    if (ends := problem.aligned.ends) is None:
+        return "makes nothing on these rows but a constant, which is fitted along"
+    fixed = "fixed balls" if ends.of_lengths else "pins"
+    return f"makes nothing on these rows but a shift of the {fixed}, which is fitted along"
+
+
+def explained_fraction(before: float, after: float, floor: float) -> float:
+    """phi = (SSE0 - SSE1) / (SSE0 - n sigma^2), from losses in squares of the noise floor; 0 where nothing is above.
+
+    floor : 1, or 0 where the noise is not known.
+    At most 1: the floor is known to some per cent only, so that more than what is above it can be explained::
+
+        explained_fraction(5.0, 2.0, 1.0)  # 0.75
+    """
+    return min((before - after) / (before - floor), 1.0) if before > floor else 0.0
+
+
+def _result_alone(
+    problem: DiagnosisProblem, losses: SubsetLosses, subset: Subset, steps: Sequence[DiagnosisStep], p_value: float
+) -> CandidateResult:
+    """The result of one effect at its best nonlinear constants."""
+    member = subset.members[0]
+    candidate = losses.candidates[member]
+    theta, covariance = losses.estimates(subset.members)[0]
+    links = problem.aligned.rows.links
+    parameters = tuple(estimate_parameters(candidate.effect, links, theta, covariance, problem.criteria))
+    fraction = explained_fraction(losses.baseline, subset.cv_loss, 1.0 if problem.floor_known else 0.0)
+    rms_um = problem.unit_um * float(np.sqrt(max(subset.cv_loss, 0.0)))
+    gain = losses.log_loss(losses.baseline) - losses.log_loss(subset.cv_loss)
+    unit = problem.aligned.unit
+    status: Status
+    if (named := _reason_of_explaining(candidate.name, candidate.effect.separated_by, steps)) is not None:
+        status, why = "explains", named
+    elif is_undetermined(candidate.limits, np.sqrt(np.diag(covariance))):
+        status, why = "not_testable", "its numbers stay less certain than their plausible ranges are wide"
+    elif gain < losses.price(member):
+        status, why = "no_gain", f"takes {100 * max(fraction, 0.0):.0f} % of the error away: not worth a name"
+    elif implausible := [parameter for parameter in parameters if not parameter.plausible]:
+        status, why = "partial", f"only with implausible numbers: {_values(implausible[:3])}"
+    elif steps:
+        status, why = "partial", "nothing more beside what is named"
+    else:
+        status, why = "partial", f"leaves {number_text(rms_um, unit)}: others or descriptions do better"
+    return CandidateResult(candidate.name, status, why, rms_um, fraction, p_value, parameters)
+
+
+def _reason_of_explaining(name: str, separated_by: str, steps: Sequence[DiagnosisStep]) -> str | None:
+    """Why an effect explains the recording: it is named, or a rival of one that is; None where it is neither."""
+    for number, step in enumerate(steps, start=1):
+        if step.effect.id == name:
+            return f"named, number {number}"
+    for step in steps:
+        if name in [rival.name for rival in step.rivals]:
+            return f"as good as {step.effect.id} on these rows; apart by {separated_by}"
+    return None
+
+
+def _values(parameters: Sequence[ParameterEstimate]) -> str:
+    return ", ".join(f"{parameter.name} = {parameter.value:.3g} {parameter.unit}" for parameter in parameters)

@@ -1,0 +1,255 @@
+"""Which physical effect a model lacks: from a recording and a model to a verdict with its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.recording_comparison import compare
+from compd.comparison.comparison import Comparison
+from compd.comparison.effect_fit import fit, initial_effect
+from compd.comparison.thinning import thinned
+from compd.diagnosis import stages
+from compd.diagnosis.candidate_result import candidate_results, explained_fraction, why_nothing_else
+from compd.diagnosis.candidates.candidates import CandidatePool, library_pool, periodic_candidates
+from compd.diagnosis.candidates.plausibility import estimate_parameters
+from compd.diagnosis.candidates.proxies import proxy_candidates
+from compd.diagnosis.constant_finding import describe_constant
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.empirical_findings import describe_remainder
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep, Rival, UntestedEffect
+from compd.diagnosis.rival_selection import named_members
+from compd.diagnosis.proposed_measurement import propose_measurement
+from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
+from compd.diagnosis.search.gross_rows import gross_rows
+from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
+from compd.diagnosis.search.rivals import find_rivals
+from compd.diagnosis.search.significance import Family, OrthogonalComplement, p_values
+from compd.diagnosis.search.subset_losses import SubsetLosses
+from compd.diagnosis.unmodelled import with_disturbances
+from compd.diagnosis.verdict import Diagnosis, Verdict
+from compd.diagnosis.words.summary import summary
+from compd.model.effects.effect import Effect, FittedEffect
+
+# A longer recording is thinned to so many rows: effects of a fiftieth of the noise still show in them.
+MOST_ROWS = 5000
+
+
+def diagnose(
+    aligned: AlignedRecording,
+    fitted: Sequence[FittedEffect],
+    covariance: FloatArray | None,
+    effects: Sequence[Effect],
+    progress: Progress = lambda status: None,
+    criteria: Criteria = Criteria(),
+) -> Diagnosis:
+    """Learn which effects the model lacks on this recording.
+
+    The residual is explained by the effects that predict rows which were left out, each for its own evidence; what no
+    effect explains is described by the covariates that it follows. Effects that are named are then fitted on the
+    forward model.
+
+    fitted, covariance : the model's effects and the joint covariance of their parameters, None where not known; they
+        are refitted along.
+    effects : the library.
+    progress : called with a text when a stage begins.
+    criteria : numbers of the verdict.
+
+    A recording of more than MOST_ROWS rows is thinned evenly; the result is of the rows that were kept.
+
+    Raises CompdError as `compare` does.
+
+    Example::
+
+        diagnosis = diagnose(aligned, (), None, list(load_library().values()))
+        diagnosis.verdict  # "identified"
+        [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
+    """
+    progress(stages.COMPARISON)
+    aligned = thinned(aligned, MOST_ROWS)
+    before = compare(aligned, fitted, covariance)
+    explanation = explain_residual(before, effects, progress, criteria)
+    progress(stages.FIT)
+    return _diagnosis(explanation, covariance)
+
+
+def candidate_pool(before: Comparison, effects: Sequence[Effect]) -> CandidatePool:
+    """What may explain the residual of a comparison: effects that its model has not, also at periods that the residual
+    suggests, and what stands for effects that were not measured.
+
+    effects : the library.
+    """
+    aligned = before.aligned
+    present = [effect.effect.id for effect in before.fitted]
+    pool = library_pool(aligned, effects, present)
+    tried = {candidate.name: candidate.effect for candidate in pool.candidates}.values()
+    return replace(
+        pool,
+        candidates=(*pool.candidates, *periodic_candidates(aligned, tried, before.residual_um, before.used)),
+        proxies=proxy_candidates(aligned, effects, present),
+    )
+
+
+def explain_residual(
+    before: Comparison,
+    effects: Sequence[Effect],
+    progress: Progress = lambda status: None,
+    criteria: Criteria = Criteria(),
+) -> Explanation:
+    """What explains the residual of a comparison: effects, descriptions, the constant; nothing is fitted yet.
+
+    effects, progress, criteria : as of `diagnose`.
+    """
+    progress(stages.CANDIDATES)
+    pool = candidate_pool(before, effects)
+    problem = build_problem(before, pool, criteria)
+    explanation = explain(problem, progress)
+    # which rows are gross, and what explains the others, depend on one another: both are determined twice
+    members = [explanation.losses.candidates[k] for k in explanation.members]
+    weights = explanation.problem.weigh_beside(members)
+    problem = build_problem(before, pool, criteria, weights)
+    explanation = explain_again(problem, explanation, progress)
+    return replace(explanation, members=named_members(explanation.losses, explanation.members))
+
+
+def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:
+    """Fit the effects that are named, and state the verdict with its evidence."""
+    problem = explanation.problem
+    losses, aligned, criteria = explanation.losses, problem.aligned, problem.criteria
+    before = compare(aligned, problem.comparison.fitted, covariance, outlier=problem.gross)
+    before = replace(before, floor=problem.comparison.floor)
+    p_value_by_effect = _p_values(losses, explanation.members)
+    after = before
+    if explanation.named:
+        links = aligned.rows.links
+        new = [losses.candidates[k] for k in explanation.named]
+        initial = [*before.fitted, *(initial_effect(c.effect, c.constants, links) for c in new)]
+        result = fit(aligned, initial, problem.sigma_um, outlier=problem.gross)
+        result = with_disturbances(result, aligned, problem.sigma_um, problem.pool.candidates, criteria)
+        after = compare(aligned, result.fitted, result.covariance, outlier=problem.gross)
+        after = replace(after, floor=before.floor)
+    named = dict(zip(explanation.named, after.fitted[len(before.fitted) :], strict=True))
+    steps = _steps(problem, explanation, named, p_value_by_effect)
+    candidates = candidate_results(problem, losses, steps, p_value_by_effect)
+    verdict = _verdict(problem, explanation, steps, candidates)
+    above = verdict in ("partial", "unexplained", "not_testable")
+    diagnosis = Diagnosis(
+        verdict,
+        before,
+        after,
+        steps,
+        candidates,
+        describe_remainder(problem, explanation) if above else (),
+        constant=describe_constant(problem, explanation, named, after.constant_um),
+        gross=gross_rows(problem.gross, aligned.recording.row),
+        untested=_untested(problem, explanation, steps),
+        heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
+        heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
+    )
+    return replace(
+        diagnosis,
+        next_measurement=propose_measurement(problem, explanation, diagnosis),
+        summary=summary(diagnosis),
+    )
+
+
+def _verdict(
+    problem: DiagnosisProblem,
+    explanation: Explanation,
+    steps: Sequence[DiagnosisStep],
+    candidates: Sequence[CandidateResult],
+) -> Verdict:
+    """At the floor nothing, one or several effects are missing; above it, or where it is not known, the rest remains.
+
+    Beside effects that are named the unnamed ones may leave what their standard errors allow for. Where the noise is
+    not known, whether something is missing can be told only by finding it.
+    """
+    found = bool(explanation.described)
+    unnamed = problem.criteria.disturbance**2 if steps else 0.0
+    if not found and problem.may_be_noise(explanation.reduced_chi_squared - unnamed):
+        if not steps:
+            return "adequate"
+        return "ambiguous" if any(step.rivals for step in steps) else "identified"
+    if steps:
+        return "partial"
+    if not found and (not problem.floor_known or all(c.status == "not_testable" for c in candidates)):
+        return "not_testable"
+    return "unexplained"
+
+
+def _steps(
+    problem: DiagnosisProblem,
+    explanation: Explanation,
+    named: Mapping[int, FittedEffect],
+    p_value_by_effect: Mapping[str, float],
+) -> tuple[DiagnosisStep, ...]:
+    """One effect after another, with what each adds to those before it.
+
+    The constant, where it is a member, stands before all: what it takes is no effect's.
+    """
+    losses, floor = explanation.losses, 1.0 if problem.floor_known else 0.0
+    before = tuple(k for k in explanation.named if k not in explanation.effects)
+    steps = []
+    for k in explanation.effects:
+        loss_before, loss = losses.loss(before), losses.loss((*before, k))
+        before = (*before, k)
+        fitted = named[k]
+        links = problem.aligned.rows.links
+        parameters = estimate_parameters(fitted.effect, links, fitted.theta, fitted.covariance, problem.criteria)
+        steps.append(
+            DiagnosisStep(
+                fitted=fitted,
+                rivals=_rivals(explanation, k),
+                heldout_rms_um=problem.unit_um * float(np.sqrt(loss)),
+                explained_fraction=explained_fraction(loss_before, loss, floor),
+                p_value=p_value_by_effect[fitted.effect.id],
+                parameters=tuple(parameters),
+            )
+        )
+    return tuple(steps)
+
+
+def _rivals(explanation: Explanation, member: int) -> tuple[Rival, ...]:
+    """Effects that would do in a member's place, with the descriptions or without: these settle no contest."""
+    rivals = find_rivals(explanation.losses, explanation.members, member)
+    if explanation.described:
+        known = {rival.name for rival in rivals}
+        others = find_rivals(explanation.losses, explanation.named, member)
+        rivals += tuple(rival for rival in others if rival.name not in known)
+    return rivals
+
+
+def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float]:
+    """p-value of each effect of the library, corrected for all of them and for their nonlinear constants.
+
+    Of an effect among the members of the set: beside the other members; of any other: alone, beside the constant.
+    """
+    library = [k for k, candidate in enumerate(losses.candidates) if candidate.kind == "effect"]
+    member_by_name = {losses.name(k): k for k in members if k in library}
+    constant = [k for k in members if losses.candidates[k].kind == "constant"]
+    families = {}
+    for name in dict.fromkeys(losses.name(k) for k in library):
+        beside = [k for k in members if k != member_by_name[name]] if name in member_by_name else constant
+        complement = OrthogonalComplement(losses.nuisance_with(beside).values)
+        own = [k for k in library if losses.name(k) == name]
+        variants = [complement(losses.values[k]) for k in own]
+        best_of = [losses.candidates[k].best_of for k in own]
+        families[name] = Family(variants, complement(losses.data.y), best_of)
+    return dict(zip(families, p_values(list(families.values()), losses.data.block).tolist(), strict=True))
+
+
+def _untested(
+    problem: DiagnosisProblem, explanation: Explanation, steps: Sequence[DiagnosisStep]
+) -> tuple[UntestedEffect, ...]:
+    """Effects that cannot be tried, first those that may be what was found: by a proxy, or as a rival."""
+    likely = {explanation.losses.candidates[k].effect.id for k in explanation.proxies}
+    likely |= {rival.name for step in steps for rival in step.rivals}
+    reasons = dict(problem.pool.untestable)
+    if problem.aligned.ends is not None:
+        reasons |= {candidate.effect.id: why_nothing_else(problem) for candidate in problem.same_as_nuisance}
+    untested = [UntestedEffect(name, why, name in likely) for name, why in reasons.items()]
+    return tuple(sorted(untested, key=lambda effect: not effect.likely))

@@ -1,0 +1,97 @@
+"""One request of a capture with its replies: their columns, their decimal mark, their checksum."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from compd.gauge_description.ambiguities import decimal_mark_of
+from compd.gauge_description.answers import Answers, factor_words
+from compd.gauge_description.checksum_search import checksum_end
+from compd.gauge_description.reply_columns import DescriptionError, ReplyColumn, columns_of
+from compd.gauge_description.unit_words import unit_before, unit_behind
+from compd.errors import Problem
+
+FEWEST_REPLIES = 3
+
+
+class ObservedExchange:
+    """A request, and the columns of its replies.
+
+    request : as bytes; b"" for a device that speaks unasked. columns : text and numbers in turn. numbers : the columns
+    that may be channels. mark : the decimal mark. end : the converter of what ends every reply, a checksum, or "".
+    problems : what is to be asked of the replies as a whole. notes : on what was taken for granted.
+    """
+
+    def __init__(self, request: bytes, bodies: Sequence[bytes], answers: Answers) -> None:
+        """`bodies`: the replies without terminator, without those that are errors.
+
+        Raises DescriptionError for too few that differ, and for one that is built differently.
+        """
+        if len(set(bodies)) < FEWEST_REPLIES:
+            raise DescriptionError(
+                Problem(
+                    where=f"replies to {request!r}" if request else "replies",
+                    what="too few that differ",
+                    value=str(len(set(bodies))),
+                    allowed=f"{FEWEST_REPLIES} or more",
+                    next_step="move the gauge between two captures: near zero, far out, and to the other side",
+                )
+            )
+        self.request = request
+        self.end = ""
+        self.notes: list[str] = []
+        self._answers = answers
+        if answers.skipped_end:
+            self.end = f"%*{answers.skipped_end}c"
+            bodies = [body[: -answers.skipped_end] for body in bodies]
+        elif not answers.plain and (checksum := checksum_end(bodies)):
+            self.end = checksum.converter
+            bodies = [body[: -checksum.length] for body in bodies]
+            self.notes.append(f"every reply ends in the checksum {checksum.converter}; --plain if that is measured")
+        words = [factor_words(table) for table in answers.factors]
+        columns = columns_of(bodies, ".", words, answers.constants)
+        self.mark, self.problems = decimal_mark_of(columns, answers)
+        self.columns = columns if self.mark == "." else columns_of(bodies, self.mark, words, answers.constants)
+        self.numbers = [k for k, column in enumerate(self.columns) if _may_be_channel(column)]
+        if not self.numbers:
+            raise DescriptionError(Problem(where="replies", what="no number in them", value=repr(bodies[0])))
+
+    def texts(self, k: int) -> list[str]:
+        """Column `k` of every reply."""
+        return [part.text.decode("latin-1") for part in self.columns[k]]
+
+    def is_whole(self, k: int) -> bool:
+        """Whether the numbers in column `k` have neither a point nor an exponent."""
+        return not any(self.mark in text or "e" in text.lower() for text in self.texts(k))
+
+    def units(self, k: int) -> list[str]:
+        """The units that the replies say of the number in column `k`, "" among them where one says none."""
+        behind = {self._unit(unit_behind(text)) for text in self.texts(k + 1)}
+        if behind != {("", "")}:
+            return sorted({unit for unit, _ in behind})
+        if k > 1 and any(unit_behind(text)[0] for text in self.texts(k - 1)):
+            return [""]  # it is that of the number before
+        return sorted({self._unit(unit_before(text))[0] for text in self.texts(k - 1)})
+
+    def in_a_clock(self, k: int) -> bool:
+        """Whether the two digits in column `k`, which never changed, are hours or minutes, which will."""
+        return all(len(text) == 2 for text in self.texts(k)) and any(
+            0 < other < len(self.columns)
+            and set(self.texts((k + other) // 2)) == {":"}
+            and all(len(text) == 2 and text.isdigit() for text in self.texts(other))
+            for other in (k - 2, k + 2)
+        )
+
+    def _unit(self, unit_and_word: tuple[str, str]) -> tuple[str, str]:
+        """None where the person has said what the word means."""
+        unit, word = unit_and_word
+        explained = any(word in factor_words(table) for table in self._answers.factors)
+        return ("", "") if explained or set(word) <= set(self._answers.ignored) else (unit, word)
+
+
+def _may_be_channel(column: ReplyColumn) -> bool:
+    """A number with a point or a sign always counts; a bare whole number (an address, a name) if it changed."""
+    if not column[0].is_number:
+        return False
+    bare = all(part.text.isdigit() for part in column)
+    return not bare or len({part.text for part in column}) > 1

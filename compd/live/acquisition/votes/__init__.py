@@ -1,1 +1,0 @@
-"""What the length gauges of a machine say of each other: one module for each kind of contradiction."""

@@ -1,0 +1,139 @@
+"""Link lengths by equation (1), and forward and inverse kinematics of the tripod (3-SPR) and the hexapod (6-UPS).
+
+Everything is in {M}, with the base joints where the frame measurement finds them now: the same as working in {B} and
+transforming by equations (8) and (9), one transformation shorter.
+
+The machine closes where the contact is made: p + R tip_P = tip_M. A tool on the platform has a fixed tip_P and a
+tip_M that moves; a tool on the plate (figure 15) has a fixed tip_M, and tip_P is the place on the work that it touches.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numpy.typing import ArrayLike
+
+from compd.arrays import FloatArray, IntArray
+from compd.model.kernels.loop_closure import closure
+from compd.model.kernels.forward_solver import forward
+from compd.model.kernels.inverse_solver import inverse
+
+
+class Mechanism(NamedTuple):
+    """The parts between base and platform; every array may have leading axes, one entry per row.
+
+    base_joints_M_mm : (..., n, 3), now, in {M}.
+    platform_joints_P_mm : (..., n, 3).
+    revolute_axes_P : (..., k, 3), along the revolute axis of link i; k = 3 for the tripod, 0 for the hexapod.
+    """
+
+    base_joints_M_mm: FloatArray
+    platform_joints_P_mm: FloatArray
+    revolute_axes_P: FloatArray
+
+
+class Pose(NamedTuple):
+    """Where the moving platform is.
+
+    origin_M_mm : (..., 3), origin of {P} in {M}.  rotation_M_P : (..., 3, 3), axes of {P} in {M}.
+    link_length_mm : (..., n), between joint centres.
+    iterations : (...), Newton's.  residual_mm : (...), the worst closing error.
+    reason : (...), a Reason; where it is not OK everything else is nan.
+    """
+
+    origin_M_mm: FloatArray
+    rotation_M_P: FloatArray
+    link_length_mm: FloatArray
+    iterations: IntArray
+    residual_mm: FloatArray
+    reason: IntArray
+
+
+class Closure(NamedTuple):
+    """The links at a pose, and how they change with it: by a displacement of {P} in {M}, in mm, and by a rotation
+    about {M}'s axes through the origin of {P}, in rad.
+
+    length_mm : (..., n), link lengths; by_displacement (..., n, 3), by_rotation_mm (..., n, 3), in mm per rad.
+    offset_mm : (..., k), how far each revolute axis is from square to its link, d_i . R e_i; zero where the
+    machine closes; likewise its derivatives (..., k, 3).
+    reason : (...), a Reason; where it is not OK everything else is nan.
+    """
+
+    length_mm: FloatArray
+    length_by_displacement: FloatArray
+    length_by_rotation_mm: FloatArray
+    offset_mm: FloatArray
+    offset_by_displacement: FloatArray
+    offset_by_rotation_mm: FloatArray
+    reason: IntArray
+
+
+def link_length_mm(zero_length_mm: FloatArray, scale_mm: FloatArray, joint_shortening_mm: FloatArray) -> FloatArray:
+    """Equation (1): l_i = l0_i + gL_i - gB_i - gS_i, (..., n), in mm.
+
+    zero_length_mm : (n,), l0, at machine zero.  scale_mm : (..., n), gL.  joint_shortening_mm : (..., n), gB + gS.
+    nan in, nan out.
+    """
+    return zero_length_mm + scale_mm - joint_shortening_mm
+
+
+def scale_for_length_mm(
+    zero_length_mm: FloatArray, length_mm: FloatArray, joint_shortening_mm: FloatArray
+) -> FloatArray:
+    """Equation (1) solved for gL, (..., n), in mm: what the scales show when the links have these lengths.
+
+    zero_length_mm : (n,).  length_mm : (..., n).  joint_shortening_mm : (..., n), gB + gS.  nan in, nan out.
+    """
+    return length_mm - zero_length_mm + joint_shortening_mm
+
+
+def check_mechanism(mechanism: Mechanism) -> Mechanism:
+    """The mechanism, if its arrays have the shapes of a tripod or a hexapod; else ValueError."""
+    base, axes = mechanism.base_joints_M_mm, mechanism.revolute_axes_P
+    if (base.shape[-2:], axes.shape[-2:]) not in (((3, 3), (3, 3)), ((6, 3), (0, 3))):
+        raise ValueError(
+            f"a tripod has base joints (3, 3) and revolute axes (3, 3), a hexapod (6, 3) and (0, 3); "
+            f"these are {base.shape[-2:]} and {axes.shape[-2:]}"
+        )
+    return mechanism
+
+
+def forward_kinematics(
+    mechanism: Mechanism, link_length_mm: ArrayLike, guess_origin_M_mm: ArrayLike, guess_rotation_M_P: ArrayLike
+) -> Pose:
+    """Pose from link lengths: the first step of equation (9).
+
+    Solves |p + R c_i - a_i| = l_i, and for the tripod (p + R c_i - a_i) . (R e_i) = 0, by Newton's method.
+
+    link_length_mm : (..., n).  guess_origin_M_mm : (..., 3), guess_rotation_M_P : (..., 3, 3), a pose in the same
+    assembly: the last cycle's, or machine zero's.
+    A row fails as NOT_FINITE; UNREACHABLE (no quadrilateral of two links closes, a length is not positive);
+    NO_CONVERGENCE; NEAR_SINGULAR (amplification above AMPLIFICATION_LIMIT); OTHER_ASSEMBLY (a singular pose lies
+    between guess and solution, or the platform has turned by more than a right angle).
+    Raises ValueError for arrays of a wrong shape.
+    """
+    return Pose(*forward(*check_mechanism(mechanism), link_length_mm, guess_origin_M_mm, guess_rotation_M_P))
+
+
+def inverse_kinematics(mechanism: Mechanism, tip_M_mm: ArrayLike, tip_P_mm: ArrayLike, rotation_M_P: ArrayLike) -> Pose:
+    """Pose and link lengths from the place of the contact: the second step of equation (8).
+
+    tip_M_mm : (..., 3), the contact in {M}.  tip_P_mm : (..., 3), the same place in {P}.
+    rotation_M_P : (..., 3, 3), for a hexapod the attitude wanted; a tripod's follows from the tip, and this is the
+    guess to start from.
+    A row fails as NOT_FINITE; UNREACHABLE (a base joint and its platform joint would coincide); NO_CONVERGENCE,
+    OTHER_ASSEMBLY (tripod: no attitude, or one turned over, lets the links meet their axes squarely);
+    NEAR_SINGULAR (the lengths exist, but would not hold the pose).
+    Raises ValueError for arrays of a wrong shape.
+    """
+    return Pose(*inverse(*check_mechanism(mechanism), tip_M_mm, tip_P_mm, rotation_M_P))
+
+
+def closure_at(mechanism: Mechanism, origin_M_mm: ArrayLike, rotation_M_P: ArrayLike) -> Closure:
+    """Link lengths, squareness of the revolute axes, and their derivatives, at any pose.
+
+    origin_M_mm : (..., 3).  rotation_M_P : (..., 3, 3).
+    A row fails as NOT_FINITE, or NEAR_SINGULAR where a link has no length.
+    Raises ValueError for arrays of a wrong shape.
+    """
+    return Closure(*closure(*check_mechanism(mechanism), origin_M_mm, rotation_M_P))

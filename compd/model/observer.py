@@ -1,0 +1,157 @@
+"""Observations from gauge values, through the nominal model: the rows from which effects are computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from compd.arrays import BoolArray, FloatArray
+from compd.model.kinematics.frame import solve_frame
+from compd.model.kernels.joints import joint_shortening
+from compd.rotation import to_outer
+from compd.model.kinematics.link_kinematics import Pose, forward_kinematics, link_length_mm
+from compd.model.machine import MachineModel
+from compd.model.kinematics.motion import Movement
+from compd.model.effects.observations import MachineConstants, Observations
+from compd.model.kinematics.tool import ToolOnPlatform
+
+
+def observe(
+    model: MachineModel,
+    constants: MachineConstants,
+    *,
+    scale_mm: FloatArray,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    quantities: Mapping[str, FloatArray],
+    time_s: ArrayLike,
+    session_start: BoolArray,
+    movement: Movement,
+    quantities_at_zero: Mapping[str, float] | None = None,
+) -> Observations:
+    """N rows by equations (1), (3) and forward kinematics; Newton starts at machine zero, so that no row needs another.
+
+    constants : of this machine, from `machine_constants`.
+    scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9): changes since machine zero.  quantities: (N,) each.
+    time_s (N,).  session_start (N,): True where a row has no history.  quantities_at_zero: as in `Observations`.
+    A row that has no pose is nan in everything that the pose gives.
+    Raises CompdError where a quantity is a column of the reference.
+    """
+    zero = model.zero
+    frame = solve_frame(model.frame, zero.distances_mm + frame_mm)
+    shortening_mm, _ = joint_shortening(model.joint_weights, joint_mm)
+    length_mm = link_length_mm(zero.link_length_mm, scale_mm, shortening_mm)
+    pose = forward_kinematics(
+        model.mechanism(frame.base_joints_M_mm), length_mm, zero.platform_origin_M_mm, zero.rotation_M_P
+    )
+    return observe_at_pose(
+        constants,
+        frame.base_joints_M_mm,
+        pose,
+        # a tool that stands on the plate is at the same place in every row
+        np.broadcast_to(model.arrangement.contact_at(pose).tip_M_mm, pose.origin_M_mm.shape),
+        scale_mm=scale_mm,
+        joint_mm=joint_mm,
+        frame_mm=frame_mm,
+        quantities=quantities,
+        time_s=np.asarray(time_s, dtype=np.float64),
+        session_start=session_start,
+        movement=movement,
+        quantities_at_zero=quantities_at_zero,
+    )
+
+
+def observe_at_pose(
+    constants: MachineConstants,
+    base_joints_M_mm: FloatArray,
+    pose: Pose,
+    tip_M_mm: FloatArray,
+    *,
+    scale_mm: FloatArray,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    quantities: Mapping[str, FloatArray],
+    time_s: FloatArray,
+    session_start: BoolArray,
+    movement: Movement,
+    quantities_at_zero: Mapping[str, float] | None,
+) -> Observations:
+    """N rows whose base joints (N, n, 3), pose and tip (N, 3) are solved already; the rest as in `observe`."""
+    joints_M = to_outer(pose.rotation_M_P[:, None], pose.origin_M_mm[:, None], constants.platform_joints_P_mm)
+    return Observations(
+        constants=constants,
+        scale_mm=scale_mm,
+        joint_mm=joint_mm,
+        frame_mm=frame_mm,
+        quantities=quantities,
+        time_s=time_s,
+        session_start=session_start,
+        direction=movement.direction,
+        velocity_mm_per_s=movement.velocity_mm_per_s,
+        joint_velocity_mm_per_s=movement.joint_velocity_mm_per_s,
+        link_mm=pose.link_length_mm,
+        directions_M=(joints_M - base_joints_M_mm) / pose.link_length_mm[:, :, None],
+        base_joints_M_mm=base_joints_M_mm,
+        origin_M_mm=pose.origin_M_mm,
+        rotation_M_P=pose.rotation_M_P,
+        tip_M_mm=tip_M_mm,
+        quantities_at_zero=quantities_at_zero,
+    )
+
+
+def observe_external(
+    tip_M_mm: FloatArray,
+    *,
+    scale_mm: FloatArray,
+    movement: Movement,
+    quantities: Mapping[str, FloatArray],
+    time_s: FloatArray,
+    session_start: BoolArray,
+    recorded: frozenset[str],
+) -> Observations:
+    """Observations of a machine that an external model computes, of whose kinematics nothing is known.
+
+    tip_M_mm : (N, 3), nan where link lengths are predicted.  scale_mm : (N, n), of the links whose length was measured,
+    nan where not recorded; n = 0 for a machine of which the tip was measured.  recorded : as in `Observations`.
+    """
+    count, links = scale_mm.shape
+    no_vectors = np.zeros((0, 3))
+    unknown = np.full(3, np.nan)
+    constants = MachineConstants(
+        platform_joints_P_mm=no_vectors,
+        revolute_axes_P=no_vectors,
+        arrangement=ToolOnPlatform(unknown),
+        zero_directions_M=no_vectors,
+        zero_axes_M=no_vectors,
+        zero_axial_force_N=np.zeros(0),
+        zero_axial_per_force=no_vectors,
+        weight_N=np.nan,
+        weight_at_P_mm=unknown,
+        frame_zero_mm=np.full(9, np.nan),
+        plate_points_M_mm=np.full((3, 3), np.nan),
+        plate_thickness_mm=np.nan,
+        scale_signal_period_mm=np.nan,
+        instrument_M_mm=np.zeros(3),
+        zero=None,
+    )
+    return Observations(
+        constants=constants,
+        scale_mm=scale_mm,
+        joint_mm=np.zeros((count, 0)),
+        frame_mm=np.full((count, 9), np.nan),
+        quantities=quantities,
+        time_s=time_s,
+        session_start=session_start,
+        direction=movement.direction,
+        velocity_mm_per_s=movement.velocity_mm_per_s,
+        joint_velocity_mm_per_s=movement.joint_velocity_mm_per_s,
+        link_mm=np.full((count, links), np.nan),
+        directions_M=np.full((count, links, 3), np.nan),
+        base_joints_M_mm=np.full((count, links, 3), np.nan),
+        origin_M_mm=np.full((count, 3), np.nan),
+        rotation_M_P=np.full((count, 3, 3), np.nan),
+        tip_M_mm=tip_M_mm,
+        recorded=recorded,
+    )

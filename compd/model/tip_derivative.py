@@ -1,0 +1,145 @@
+"""By how much the tip of one snapshot moves with each of what its uncertainty comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.model.effects.effect_basis import evaluate_basis
+from compd.model.effect_memory import EffectMemory
+from compd.model.kernels.solver_structures import RESULT, WORKSPACE
+from compd.model.kernels.tip_derivatives import set_tip_derivatives
+from compd.model.machine import MachineModel
+from compd.model.kinematics.motion import Movement
+from compd.model.effects.observations import Observations
+from compd.model.observer import observe
+
+
+class TipDerivatives(NamedTuple):
+    """Of the tip in {M}, with the tool on the plate of the touched place in {P}; nan where there is no pose.
+
+    by_gauge : (3, n + k + 9), mm per mm of scales, joint and frame comparators.
+    by_theta : (3, P), mm per unit of each fitted number of the live effects.
+    by_quantity : (3, q), mm for each quantity's standard deviation, in the order of the model's program.
+    """
+
+    by_gauge: FloatArray
+    by_theta: FloatArray
+    by_quantity: FloatArray
+
+
+def tip_derivatives(
+    model: MachineModel,
+    *,
+    scale_mm: FloatArray,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    quantities: Mapping[str, FloatArray],
+    quantities_at_zero: Mapping[str, float],
+    sigmas: Mapping[str, float],
+    time_s: float,
+    effects: EffectMemory,
+) -> TipDerivatives:
+    """Of one snapshot, at the pose without effects.
+
+    scale_mm (n,), joint_mm (k,), frame_mm (9,) : changes since machine zero.  quantities : those that the effects need.
+    quantities_at_zero : the same at machine zero.
+    sigmas : standard deviation of each, in its own unit; nan for one that is not named.
+    effects : what they remember after this snapshot.
+    The noise of the scales also changes what an effect at the port `scale` adds; that is left out: at most a few per
+    cent of the noise itself.
+    """
+    program = model.program
+    packed = effects.pack(model, len(joint_mm))
+    values = np.array([quantities[name] for name in program.quantities], dtype=np.float64)
+    references = [quantities_at_zero[name] if value is None else value for name, value in program.references]
+    raised = values + np.array([sigmas.get(name, np.nan) for name in program.quantities], dtype=np.float64)
+    by_port = np.empty((3, program.size))
+    by_theta, by_quantity = np.empty((3, len(program.theta))), np.empty((3, len(values)))
+    set_tip_derivatives(
+        model.structure,
+        program.machine,
+        program.effects,
+        program.theta,
+        program.numbers,
+        program.code,
+        program.quantity_places,
+        program.targets,
+        np.array(scale_mm),
+        np.array(joint_mm),
+        np.array(frame_mm),
+        np.concatenate([values, references]),
+        time_s,
+        raised,
+        model.zero.platform_origin_M_mm.copy(),
+        model.zero.rotation_M_P.copy(),
+        packed.motion,
+        packed.memories,
+        np.zeros(1, WORKSPACE),
+        np.zeros(1, RESULT),
+        by_port,
+        by_theta,
+        by_quantity,
+    )
+    derivatives = TipDerivatives(by_port[:, : model.links + len(joint_mm) + 9], by_theta, by_quantity)
+    if program.given:
+        rows = _rows(model, scale_mm, joint_mm, frame_mm, quantities, quantities_at_zero, time_s, effects)
+        _add_python_effects(model, rows, raised, effects, by_port, derivatives)
+    return derivatives
+
+
+def _rows(
+    model: MachineModel,
+    scale_mm: FloatArray,
+    joint_mm: FloatArray,
+    frame_mm: FloatArray,
+    quantities: Mapping[str, FloatArray],
+    quantities_at_zero: Mapping[str, float],
+    time_s: float,
+    effects: EffectMemory,
+) -> Observations:
+    """The snapshot as one row, for effects in plain Python."""
+    assert model.constants is not None, "a model with effects has its constants"
+    motion = effects.motion
+    return observe(
+        model,
+        model.constants,
+        scale_mm=scale_mm[None],
+        joint_mm=joint_mm[None],
+        frame_mm=frame_mm[None],
+        quantities={name: np.array([value]) for name, value in quantities.items()},
+        time_s=np.array([time_s]),
+        session_start=np.array([False]),
+        movement=Movement.unknown(scale_mm[None], joint_mm[None])
+        if motion is None
+        else Movement.from_motions([motion]),
+        quantities_at_zero=quantities_at_zero,
+    )
+
+
+def _add_python_effects(
+    model: MachineModel,
+    rows: Observations,
+    raised: FloatArray,
+    effects: EffectMemory,
+    by_port: FloatArray,
+    derivatives: TipDerivatives,
+) -> None:
+    """Add what the effects without a kernel give; by_port (3, size), raised (q,) as in the kernel."""
+    program = model.program
+    for place in program.given:
+        fitted, structure = model.live_effects[place], program.effects[place]
+        memory = effects.memories.get(fitted.effect.id)
+        basis = evaluate_basis(fitted.effect, rows, fitted.constants, memory)[0][0]
+        begin = structure["targets_begin"]
+        by_added = by_port[:, program.targets[begin : begin + structure["size"]]]
+        derivatives.by_theta[:, structure["theta_begin"] : structure["theta_end"]] = by_added @ basis
+        needed = program.quantity_places[structure["quantities_begin"] : structure["quantities_end"]]
+        for quantity in needed[: len(needed) // 2]:
+            changed = {**rows.quantities, program.quantities[quantity]: raised[quantity : quantity + 1]}
+            moved = evaluate_basis(fitted.effect, replace(rows, quantities=changed), fitted.constants, memory)[0][0]
+            derivatives.by_quantity[:, quantity] += by_added @ ((moved - basis) @ fitted.theta)

@@ -1,0 +1,226 @@
+"""The file of a planned measurement: `compd plan` writes it, `compd simulate` and `compd campaign` measure it.
+
+CSV with one row per measurement, a header, `.` decimal, UTF-8:
+
+| column | meaning |
+|---|---|
+| `row`, `purpose` | number from 1, and what the row is for; both for the reader |
+| `time_s` | seconds from the start of a programme; a time that does not rise begins a new programme |
+| `tip_x_mm`, `tip_y_mm`, `tip_z_mm` | where the tool's tip is to be, in {M} |
+| `<name>_<unit>` | a quantity that is held meanwhile: temperature_room_degC, force_x_N, ... |
+| `approach_<i>` | +1/-1: the direction in which link i comes to the place; 0: as it comes |
+| `speed_mm_per_s` | speed of the fastest link while it passes the place; 0: at rest |
+
+A plan for a machine of an external model has the columns of its recording that are to be set in place of the tip, the
+links and their speed. A person measures it; nothing in compd reads it.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from compd.errors import CompdError, Problem, RecordingError
+from compd.files.atomic_files import write_files
+from compd.tables.columns import approach_columns
+
+PURPOSE_COLUMN = "purpose"
+TIP_COLUMNS = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
+SPEED_COLUMN = "speed_mm_per_s"
+NEEDED_COLUMNS = ("time_s", *TIP_COLUMNS)
+# Columns that say nothing to set: when, and for the reader.
+NOT_SET = ("row", PURPOSE_COLUMN, "time_s")
+WRITTEN_BY = "`compd plan` writes such a file"
+
+
+def plan_row(
+    purpose: str,
+    time_s: float,
+    tip_M_mm: Sequence[float],
+    quantities: Mapping[str, float],
+    approach: Sequence[float],
+    speed_mm_per_s: float,
+) -> dict[str, Any]:
+    """One row by column, rounded to what a person can set.
+
+    tip_M_mm : (3,). quantities : name with unit -> value to hold. approach : (n,) +1, -1 or 0.
+    """
+    return {
+        PURPOSE_COLUMN: purpose,
+        "time_s": round(float(time_s), 1),
+        **{name: round(float(value), 3) for name, value in zip(TIP_COLUMNS, tip_M_mm, strict=True)},
+        **{name: round(float(value), 3) for name, value in quantities.items()},
+        **{name: int(sign) for name, sign in zip(approach_columns(len(approach)), approach, strict=True)},
+        SPEED_COLUMN: round(float(speed_mm_per_s), 2),
+    }
+
+
+def settings_row(purpose: str, time_s: float, settings: Mapping[str, float]) -> dict[str, Any]:
+    """One row for a machine of an external model. settings : column -> value; whole numbers are written as such."""
+    numbers = {name: float(value) for name, value in settings.items()}
+    return {
+        PURPOSE_COLUMN: purpose,
+        "time_s": round(float(time_s), 1),
+        **{name: int(value) if value.is_integer() else value for name, value in numbers.items()},
+    }
+
+
+def plan_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The file's text; the first row's keys are the header."""
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return stream.getvalue()
+
+
+def write_text_file(path: Path, text: str) -> None:
+    """Write a plan's text. Raises RecordingError where it cannot be written."""
+    try:
+        write_files({path: text})
+    except OSError as error:
+        raise RecordingError(Problem(where=str(path), what=f"cannot be written: {error.strerror}")) from error
+
+
+@dataclass(frozen=True)
+class PlanLine:
+    """One row of the file.
+
+    line : number in the file, for messages. purpose : "" where none is written.
+    values : column -> number, for the columns that the file has; nan where the cell is wrong, and a problem was noted.
+    """
+
+    line: int
+    purpose: str
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class PlanFile:
+    """header : the columns' names. lines : the rows that are not empty."""
+
+    path: Path
+    header: Sequence[str]
+    lines: Sequence[PlanLine]
+
+
+def read_plan_file(
+    path: Path, links: int, limits: Mapping[str, tuple[float, float]], problems: list[Problem]
+) -> PlanFile:
+    """Read a plan for a machine with so many links; what is wrong goes to `problems`.
+
+    limits : column -> (lowest, highest) of each quantity that the machine can hold, and of SPEED_COLUMN; other
+        columns are refused. Raises CompdError where there is no header that could be read.
+    """
+    return _PlanFileReader(path, links, limits, problems).read()
+
+
+class _PlanFileReader:
+    """One pass over one file; every problem with its line and column."""
+
+    def __init__(
+        self, path: Path, links: int, limits: Mapping[str, tuple[float, float]], problems: list[Problem]
+    ) -> None:
+        self._path, self._problems = path, problems
+        self._approaches = approach_columns(links)
+        self._limits: Mapping[str, tuple[float, float]] = {
+            "time_s": (0.0, math.inf),
+            **dict.fromkeys(TIP_COLUMNS, (-math.inf, math.inf)),
+            **limits,
+            **dict.fromkeys(self._approaches, (-1.0, 1.0)),
+        }
+
+    def read(self) -> PlanFile:
+        header, *rows = self._rows()
+        self._check_header(header[1])
+        if header[1] and not rows:
+            self._add("", "has no row", allowed="a header and at least one row", next_step=WRITTEN_BY)
+        lines = [self._plan_line(line, header[1], cells) for line, cells in rows]
+        return PlanFile(self._path, header[1], lines)
+
+    def _rows(self) -> list[tuple[int, list[str]]]:
+        """(line, stripped cells) of every row that is not empty; the header first."""
+        try:
+            with self._path.open(encoding="utf-8-sig", newline="") as stream:
+                reader = csv.reader(stream)
+                rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if any(cells)]
+        except (OSError, UnicodeDecodeError, csv.Error) as error:
+            reason = error.strerror if isinstance(error, OSError) else str(error)
+            raise CompdError(
+                Problem(where=str(self._path), what=f"cannot be read: {reason}", next_step=WRITTEN_BY)
+            ) from error
+        if not rows:
+            raise CompdError(
+                Problem(where=str(self._path), what="is empty", allowed="a header and rows", next_step=WRITTEN_BY)
+            )
+        if not set(NEEDED_COLUMNS) & set(rows[0][1]):
+            # nothing of a file is quoted that is no plan
+            raise CompdError(
+                Problem(
+                    where=f"{self._path}:1",
+                    what="is no header of a plan",
+                    allowed=", ".join(NEEDED_COLUMNS),
+                    next_step=WRITTEN_BY,
+                )
+            )
+        return rows
+
+    def _check_header(self, header: Sequence[str]) -> None:
+        names = ("row", PURPOSE_COLUMN, *self._limits)
+        for name in dict.fromkeys(header):
+            if header.count(name) > 1:
+                self._add(f":1 column {name}", "is there twice", next_step="delete one")
+            if name not in names:
+                close = difflib.get_close_matches(name, names, n=1)
+                next_step = f"did you mean {close[0]}?" if close else "delete the column, or plan for another pair"
+                what = "is nothing that this machine can be told"
+                self._add(f":1 column {name}", what, name, ", ".join(names), next_step)
+        for name in NEEDED_COLUMNS:
+            if name not in header:
+                self._add(f":1 column {name}", "is missing", allowed=", ".join(NEEDED_COLUMNS), next_step=WRITTEN_BY)
+
+    def _plan_line(self, line: int, header: Sequence[str], cells: Sequence[str]) -> PlanLine:
+        if len(cells) != len(header):
+            self._add(
+                f":{line}",
+                "has not as many cells as the header",
+                str(len(cells)),
+                str(len(header)),
+                "write a number with `.`, and no comma in a purpose without quotes",
+            )
+        by_column = dict(zip(header, cells, strict=False))
+        values = {
+            name: self._number(f":{line} column {name}", name, cell)
+            for name, cell in by_column.items()
+            if name in self._limits
+        }
+        return PlanLine(line, by_column.get(PURPOSE_COLUMN, ""), values)
+
+    def _number(self, place: str, name: str, cell: str) -> float:
+        low, high = self._limits[name]
+        allowed = f"{low:g} to {high:g}" if math.isfinite(high) else "a number" if low < 0 else "0 or more"
+        allowed = "-1, 0 or 1" if name in self._approaches else allowed
+        try:
+            value = float(cell)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            self._add(place, "is no number" if cell else "is empty", cell, allowed, "write a number")
+            return math.nan
+        if not low <= value <= high or (name in self._approaches and value not in (-1, 0, 1)):
+            too_fast = name == SPEED_COLUMN and value > high
+            what = "is faster than this machine's drives" if too_fast else "is out of range"
+            self._add(place, what, cell, allowed, "change the row, or give `compd plan` the limit")
+            return math.nan
+        return value
+
+    def _add(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
+        self._problems.append(
+            Problem(where=f"{self._path}{place}", what=what, value=value, allowed=allowed, next_step=next_step)
+        )

@@ -1,0 +1,209 @@
+"""A least-squares spectrum of unevenly spaced values: how much of them a sine of each period explains.
+
+At each frequency f a sine, a cosine and a constant are fitted to every series (generalized Lomb-Scargle periodogram;
+M. Zechmeister, M. Kuerster, Astronomy & Astrophysics 496 (2009) 577, equations (4) to (15)), and the mean squares that
+they explain are added up over the series. A parabola in the quantity is taken away before: what is slow has other
+causes. The sums over rows are computed for all frequencies f_k = first + k step at once. With k = a B + b each phase
+factor is a product, and the sums are one product of matrices,
+
+    sum_n y_n exp(2 pi i f_k q_n) = sum_n [y_n exp(2 pi i (first + a B step) q_n)] [exp(2 pi i b step q_n)]
+
+in single precision, which is exact to 1e-6 of the largest.
+
+Two limits bound the periods. Values at places that lie on an even grid (every 5 mm) repeat above half its frequency:
+the spectral window |mean exp(2 pi i f q)| is 1 there, and what is above half of such a frequency is an image of what
+is below (J. T. VanderPlas, Astrophysical Journal Supplement 236 (2018) 16, section 4.2). Uneven places have no such
+limit; there the number of frequencies ends the search.
+
+Example: which periods of a position fit a residual best::
+
+    search = strongest_periods(position_mm[:, None], residual_um[:, None], PeriodLimits(0.01, 50.0))
+    search.periods      # (1.370, 0.685, ...), the strongest first
+    search.independent  # 5000 frequencies that do not resemble one another were searched
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compd.arrays import FloatArray, IntArray
+from compd.statistics.least_squares import solve_least_squares
+from compd.statistics.robust import robust_sigma
+
+# Frequencies per 1 / span: the power between two of them is at least 0.95 of a peak's (sinc(1/8)^2).
+OVERSAMPLING = 4
+# A peak has side lobes (4.7 and 1.6 % of it, 1.4 and 2.5 / span away on even rows): so many times 1 / span about a
+# peak, lower ones are not peaks of their own.
+LOBES = 3
+# What is slow along the quantity is another cause's, and is taken away first: a parabola.
+SLOW_DEGREE = 2
+# A quantity that changes less does not change.
+LEAST_SPAN = 1e-300
+# Robust standard deviations from which a value counts no more than one there: it would be noise at every frequency.
+OUTLIER_SIGMAS = 4.0
+# Values of a finer grid about a peak, on which it is refined: the phase at the ends is then right within 3 degrees.
+REFINED = 33
+# A spectral window (rms over the series) from which on frequencies are images of one another: 0.81 of the square.
+IMAGE = 0.9
+# So many multiples of an image's frequency are images too, where values lie on an even grid.
+MULTIPLES = 5
+# A sine and a cosine of which so little is left beside each other and a constant (1 on even rows) explain nothing.
+LEAST_DETERMINANT = 1e-3
+
+_Complex = NDArray[np.complex64]
+
+
+class PeriodLimits(NamedTuple):
+    """Which periods are searched.
+
+    shortest, longest : in the unit of the quantity.
+    fewest_turns : a period must fit so many times into the span of the quantity.
+    most_turns : and not more often.
+    """
+
+    shortest: float
+    longest: float
+    fewest_turns: float = 2.0
+    most_turns: float = 5000.0
+
+
+class PeriodSearch(NamedTuple):
+    """The strongest periods, and among how many of them they are.
+
+    periods : in the unit of the quantity, the strongest first; none where the rows resolve none.
+    explained : mean square that a sine of each explains, summed over the series.
+    independent : number of searched frequencies that do not resemble one another: their range times the span.
+    """
+
+    periods: tuple[float, ...]
+    explained: tuple[float, ...]
+    independent: int
+
+
+def strongest_periods(quantity: FloatArray, series: FloatArray, limits: PeriodLimits, count: int = 5) -> PeriodSearch:
+    """The periods in `quantity` (N, S), or (N, 1) for all series, that explain most of `series` (N, S).
+
+    One period for all series, an amplitude and a phase for each. Only peaks of the spectrum inside the limits count.
+    """
+    span = float(np.ptp(quantity, axis=0).max()) if len(quantity) else 0.0
+    if not span > 0:
+        return PeriodSearch((), (), 0)
+    first = max(1.0 / limits.longest, limits.fewest_turns / span)
+    step = 1.0 / (OVERSAMPLING * span)
+    last = min(1.0 / limits.shortest, limits.most_turns / span)
+    size = int((last - first) / step) + 1
+    if size < 3:
+        return PeriodSearch((), (), 0)
+    y = _without_slow(quantity, series)
+    explained, window = _spectrum(quantity, y, first, step, size)
+    size = min(size, _frequencies_below_images(window, first, step, span))
+    frequencies = first + step * _peaks(explained[:size], int(LOBES / (span * step)), count)
+    refined = sorted((_refined(quantity, y, peak, step) for peak in frequencies.tolist()), key=lambda peak: -peak[1])
+    return PeriodSearch(
+        tuple(1.0 / frequency for frequency, _ in refined),
+        tuple(square for _, square in refined),
+        int(np.ceil(size * step * span)),
+    )
+
+
+def _without_slow(quantity: FloatArray, series: FloatArray) -> FloatArray:
+    """The series (N, S) without a parabola in their quantity, about their means; outliers held before and after."""
+    y = _outliers_held(series)
+    for k in range(y.shape[1]):
+        q = quantity[:, min(k, quantity.shape[1] - 1)]
+        powers = np.vander((q - q.mean()) / max(float(np.ptp(q)), LEAST_SPAN), SLOW_DEGREE + 1)
+        y[:, k] -= powers @ solve_least_squares(powers, y[:, k])
+    y = _outliers_held(y)
+    return np.asarray(y - y.mean(axis=0))
+
+
+def _outliers_held(series: FloatArray) -> FloatArray:
+    """The series (N, S) about their medians; a value beyond OUTLIER_SIGMAS counts as one there."""
+    y = series - np.median(series, axis=0)
+    limit = OUTLIER_SIGMAS * robust_sigma(y)
+    return np.asarray(np.clip(y, -limit, limit))
+
+
+def _peaks(explained: FloatArray, apart: int, count: int) -> IntArray:
+    """Places of the `count` highest local maxima, the highest first; none is nearer than `apart` to a higher one."""
+    inner = explained[1:-1]
+    places = 1 + np.flatnonzero((inner >= explained[:-2]) & (inner > explained[2:]))
+    chosen: list[int] = []
+    for place in places[np.argsort(-explained[places], kind="stable")].tolist():
+        if len(chosen) < count and all(abs(place - higher) > apart for higher in chosen):
+            chosen.append(place)
+    return np.array(chosen, dtype=np.int64)
+
+
+def _frequencies_below_images(window: FloatArray, first: float, step: float, span: float) -> int:
+    """How many frequencies are below half of the first at which the spectral window shows images.
+
+    Below 1 / span, where the window falls from 1, there is none. The images of an even grid come again at every
+    multiple; those of a few sessions, far apart, fade.
+    """
+    frequency = first + step * np.arange(len(window))
+    for image in frequency[(window > IMAGE) & (frequency > 1.0 / span)].tolist():
+        multiples = np.arange(1, MULTIPLES + 1) * image
+        places = np.rint((multiples[multiples <= frequency[-1]] - first) / step).astype(np.int64)
+        if (window[places] > IMAGE).all():
+            return max(int((image / 2 - first) / step) + 1, 0)
+    return len(window)
+
+
+def _refined(quantity: FloatArray, y: FloatArray, frequency: float, step: float) -> tuple[float, float]:
+    """The best frequency within a step of this one, and what it explains."""
+    fine = 2 * step / (REFINED - 1)
+    explained, _ = _spectrum(quantity, y, frequency - step, fine, REFINED)
+    best = int(np.argmax(explained))
+    return frequency - step + best * fine, float(explained[best])
+
+
+def _spectrum(
+    quantity: FloatArray, y: FloatArray, first: float, step: float, size: int
+) -> tuple[FloatArray, FloatArray]:
+    """At each of `size` frequencies: the mean square explained, summed over the series; and the spectral window.
+
+    y : (N, S) of mean 0.  The window is the rms over the series of |mean exp(2 pi i f q)|.
+    """
+    explained, window = np.zeros(size), np.zeros(size)
+    for k in range(quantity.shape[1]):
+        coarse, fine = _phase_factors(quantity[:, k], first, step, size)
+        mean = _sums(coarse, fine, None, size) / len(y)
+        double = _sums(coarse * coarse, fine * fine, None, size) / len(y)
+        window += np.abs(mean) ** 2 / quantity.shape[1]
+        # mean squares and product of cosine and sine about their means
+        cc = (1 + double.real) / 2 - mean.real**2
+        ss = (1 - double.real) / 2 - mean.imag**2
+        cs = double.imag / 2 - mean.real * mean.imag
+        determinant = cc * ss - cs**2
+        usable = determinant > LEAST_DETERMINANT
+        for values in y.T if quantity.shape[1] == 1 else y.T[k : k + 1]:
+            product = _sums(coarse, fine, values, size) / len(y)
+            yc, ys = product.real, product.imag
+            power = ss * yc**2 + cc * ys**2 - 2 * cs * yc * ys
+            explained += np.divide(power, determinant, out=np.zeros(size), where=usable)
+    return explained, np.sqrt(window)
+
+
+def _phase_factors(quantity: FloatArray, first: float, step: float, size: int) -> tuple[_Complex, _Complex]:
+    """(A, N) and (B, N) factors whose products are exp(2 pi i f q) at A B >= size frequencies."""
+    width = int(np.ceil(np.sqrt(size)))
+    turns = quantity - quantity.mean()
+    coarse = np.outer(first + step * width * np.arange(-(-size // width)), turns)
+    fine = np.outer(step * np.arange(width), turns)
+    return _unit_circle(coarse), _unit_circle(fine)
+
+
+def _unit_circle(turns: FloatArray) -> _Complex:
+    """exp(2 pi i turns); whole turns are taken off in double precision."""
+    phase_rad = (2 * np.pi * (turns - np.rint(turns))).astype(np.float32)
+    return np.asarray(np.cos(phase_rad) + np.complex64(1j) * np.sin(phase_rad))
+
+
+def _sums(coarse: _Complex, fine: _Complex, values: FloatArray | None, size: int) -> NDArray[np.complex128]:
+    """(size,) sum over rows of the factors' products, times `values` (N,) where given."""
+    weighted = coarse if values is None else coarse * values.astype(np.float32)
+    return np.asarray((weighted @ fine.T).ravel()[:size], dtype=np.complex128)

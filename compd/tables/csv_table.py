@@ -1,0 +1,259 @@
+"""A CSV file as columns of numbers with the rows that a spreadsheet shows; every wrong cell is reported.
+
+Tolerated, because it can mean one thing only: a byte order mark, Windows line ends, spaces around a cell, quotes,
+empty rows and columns at the end. Everything else that a spreadsheet may write is refused in words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+from compd.tables.csv_cells import (
+    AMBIGUOUS_COMMA,
+    DECIMAL_COMMA,
+    CellProblem,
+    CsvCells,
+    HeaderTest,
+    cell_problem,
+    read_cells,
+)
+from compd.tables.problem_list import ProblemList, column_letters, rows_text, values_text
+from compd.tables.table import FIRST_ROW, Table, id_codes, id_labels
+
+# A file of these alone can be parsed fast: nothing in it can be anything but numbers, commas and line ends.
+_PLAIN = b"0123456789eE+-.,\r\n"
+# Python alone parses fewer in a tenth of a second, which is as long as the import of pyarrow takes.
+_LEAST_BYTES_FOR_ARROW = 1 << 20
+
+
+def read_table(
+    path: Path, problems: ProblemList, is_header: HeaderTest, id_columns: Collection[str] = ()
+) -> Table | None:
+    """Read `path`; what is wrong goes to `problems`, and reading goes on as far as it makes sense.
+
+    is_header : whether these cells are the header that is looked for.
+    id_columns : columns that may hold text; their cells become codes 0, 1, 2 ... in sorted order.
+
+    Returns None where there is no table at all.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        problems.add("", f"cannot be read: {error.strerror}", next_step="give the path of a CSV file")
+        return None
+    return parse_table(path, content, problems, is_header, id_columns)
+
+
+def parse_table(
+    path: Path,
+    content: bytes,
+    problems: ProblemList,
+    is_header: HeaderTest,
+    id_columns: Collection[str] = (),
+    first_row: int = FIRST_ROW,
+    labels: Mapping[str, tuple[str, ...]] | None = None,
+) -> Table | None:
+    """The table in `content`: the whole file `path`, or its header with a block of its lines.
+
+    is_header, id_columns : as in `read_table`.
+    first_row : the row that the first line under the header has in the file.
+    labels : the texts of columns of ids in the whole file, where `content` is a block of it; None: those of `content`.
+    """
+    if not _is_text(content, problems):
+        return None
+    header, _, body = content.removeprefix(b"\xef\xbb\xbf").partition(b"\n")
+    names = [_without_quotes(name.strip()) for name in header.decode("ascii", "replace").split(",")]
+    plain = is_plain(body) and header.isascii() and not any('"' in name for name in names) and is_header(names)
+    if plain and not labels and _names_are_valid(names):
+        lines = body.decode("ascii").splitlines()
+        if all(line.count(",") == len(names) - 1 or not line for line in lines):
+            table = _read_plain(path, names, body, lines, first_row)
+            if table is not None:
+                return table
+    csv_cells = read_cells(content, problems, is_header, first_row)
+    return None if csv_cells is None else _read_any(path, csv_cells, problems, id_columns, labels)
+
+
+def _without_quotes(name: str) -> str:
+    """A name as it is in quotes, as many programs write the header; others as they are."""
+    return name[1:-1].strip() if len(name) > 1 and name[0] == name[-1] == '"' else name
+
+
+def is_plain(body: bytes) -> bool:
+    """Whether there is nothing but numbers, commas and line ends, as far as the characters tell."""
+    return not body.translate(None, _PLAIN)
+
+
+def _is_text(content: bytes, problems: ProblemList) -> bool:
+    """Whether it can be text in UTF-8, and not another kind of file, which is a problem."""
+    if content.startswith(b"PK\x03\x04"):
+        problems.add("", "is a spreadsheet's own file, not CSV", next_step="in the spreadsheet: save as CSV (UTF-8)")
+        return False
+    if content.startswith(b"PAR1"):
+        problems.add("", "is a Parquet file, not CSV", next_step="name it NAME.parquet")
+        return False
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        problems.add("", "is written in UTF-16", allowed="UTF-8", next_step="in the spreadsheet: save as CSV (UTF-8)")
+        return False
+    if not content.strip():
+        problems.add("", "is empty", allowed="a header and at least two rows")
+        return False
+    return True
+
+
+def _names_are_valid(names: Sequence[str]) -> bool:
+    """Whether no name is empty and none comes twice."""
+    return all(names) and len(set(names)) == len(names)
+
+
+def _read_plain(path: Path, names: list[str], body: bytes, lines: list[str], first_row: int) -> Table | None:
+    """The table of a file that is nothing but plain numbers, parsed at once. lines : those of `body`.
+
+    None where a cell is no number after all: then `_read_any` reports which.
+    """
+    number = np.array([number for number, line in enumerate(lines, start=first_row) if line], dtype=np.int64)
+    values = _arrow_columns(body, names) if len(body) >= _LEAST_BYTES_FOR_ARROW else None
+    if values is None or len(values[0]) != len(number):
+        cells = _numbers(",".join(filter(None, lines)).split(",")) if len(number) else np.empty(0)
+        if cells is None:
+            return None
+        values = list(cells.reshape(len(number), len(names)).T)
+    filled = np.zeros(len(number), dtype=bool)
+    for column in values:
+        filled |= ~np.isnan(column)
+    columns = {name: np.ascontiguousarray(column[filled]) for name, column in zip(names, values, strict=True)}
+    letters = {name: column_letters(i) for i, name in enumerate(names)}
+    return Table(path, letters, columns, number[filled])
+
+
+def _arrow_columns(body: bytes, names: list[str]) -> list[FloatArray] | None:
+    """The columns of plain lines as Arrow parses them, to the same numbers as Python, in a fifth of its time.
+
+    None where it is not installed, and for a cell that it takes for no number, or an infinite one.
+    """
+    try:
+        import pyarrow
+        from pyarrow import csv
+    except ImportError:
+        return None
+    kinds = dict.fromkeys(names, pyarrow.float64())
+    try:
+        table = csv.read_csv(
+            pyarrow.py_buffer(body),
+            # blocks of a long recording are computed in threads of their own
+            read_options=csv.ReadOptions(use_threads=False, column_names=names),
+            convert_options=csv.ConvertOptions(column_types=kinds, null_values=[""]),
+        )
+    except pyarrow.ArrowException:
+        return None
+    columns = [column.to_numpy() for column in table.columns]
+    return None if any(np.isinf(column).any() for column in columns) else columns
+
+
+def _read_any(
+    path: Path,
+    csv_cells: CsvCells,
+    problems: ProblemList,
+    id_columns: Collection[str],
+    labels: Mapping[str, tuple[str, ...]] | None,
+) -> Table:
+    """The table of any other file: every cell was read as text first, and every wrong one is reported."""
+    row = np.array([number for number, _ in csv_cells.rows], dtype=np.int64)
+    columns: dict[str, FloatArray] = {}
+    own_labels: dict[str, tuple[str, ...]] = {}
+    wrong: set[str] = set()
+    commas = _CommaCells()
+    cells_by_column = list(zip(*(cells for _, cells in csv_cells.rows), strict=True))
+    for name, index in csv_cells.names.items():
+        cells = cells_by_column[index] if cells_by_column else ()
+        values = None if labels and name in labels else plain_numbers(cells)
+        if values is None and name in id_columns:
+            own_labels[name] = labels[name] if labels and name in labels else id_labels(cells)
+            values = id_codes(cells, own_labels[name])
+        if values is None:
+            place = f"column {name} ({column_letters(index)})"
+            values = _checked_numbers(place, cells, row, problems, commas)
+            wrong.add(name)
+        columns[name] = values
+    commas.report(problems)
+    letters = {name: column_letters(index) for name, index in csv_cells.names.items()}
+    return Table(path, letters, columns, row, own_labels, frozenset(wrong))
+
+
+def plain_numbers(cells: Sequence[str]) -> FloatArray | None:
+    """The column as numbers; None when any cell is something else."""
+    # Python's own conversion is exact, but also takes 1_000, nan and inf
+    if "".join(cells).encode("utf-8", "replace").translate(None, _PLAIN):
+        return None
+    return _numbers(cells)
+
+
+def _numbers(cells: Sequence[str]) -> FloatArray | None:
+    """Cells of nothing but _PLAIN as numbers; None when any is none after all, or not finite."""
+    try:
+        values = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
+    except ValueError:
+        return None
+    return None if np.isinf(values).any() else values
+
+
+class _CommaCells:
+    """Cells with a decimal comma. A spreadsheet writes it in every column, so one problem names them all."""
+
+    def __init__(self) -> None:
+        self.places: dict[str, None] = {}
+        self.rows: set[int] = set()
+        self.values: list[str] = []
+        self.problem = AMBIGUOUS_COMMA
+
+    def add(self, place: str, problem: CellProblem, rows: IntArray, values: Sequence[str]) -> None:
+        """Note cells of one column. One certain decimal comma decides what the ambiguous commas are."""
+        self.places[place] = None
+        self.rows.update(rows.tolist())
+        self.values += values
+        if problem is DECIMAL_COMMA:
+            self.problem = problem
+
+    def report(self, problems: ProblemList) -> None:
+        """Add the one problem, if there is any such cell."""
+        if self.places:
+            problems.add(
+                f"{', '.join(self.places)}, {rows_text(sorted(self.rows))}",
+                self.problem.what,
+                values_text(self.values),
+                self.problem.allowed,
+                self.problem.next_step,
+            )
+
+
+def _checked_numbers(
+    place: str, cells: Sequence[str], row: IntArray, problems: ProblemList, commas: _CommaCells
+) -> FloatArray:
+    """The column's numbers, nan where a cell is wrong; one problem for each kind of wrong cell."""
+    values = np.full(len(cells), np.nan)
+    wrong: dict[CellProblem, list[int]] = {}
+    for i, cell in enumerate(cells):
+        if not cell:
+            continue
+        problem = cell_problem(cell)
+        if problem is None:
+            values[i] = float(cell)
+        else:
+            wrong.setdefault(problem, []).append(i)
+    for problem, indices in wrong.items():
+        wrong_cells = [cells[i] for i in indices]
+        if problem in (DECIMAL_COMMA, AMBIGUOUS_COMMA):
+            commas.add(place, problem, row[indices], wrong_cells)
+        else:
+            problems.add(
+                f"{place}, {rows_text(row[indices].tolist())}",
+                problem.what,
+                values_text(wrong_cells),
+                problem.allowed,
+                problem.next_step,
+            )
+    return values

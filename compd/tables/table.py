@@ -1,0 +1,60 @@
+"""A recording's table, from whatever file: columns of numbers, and the rows as a spreadsheet numbers them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+from compd.tables.problem_list import ProblemList
+
+# The header is row 1, also of a file that has none.
+FIRST_ROW = 2
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of numbers of one file, or of a block of its rows.
+
+    Attributes
+    ----------
+    path : the file.
+    letters : column name -> the letters over it in a spreadsheet, "" for a file that no spreadsheet shows; in order.
+    columns : name -> (N,) float64, nan where the cell is empty (or was reported as wrong).
+    row : (N,) the row as a spreadsheet numbers it; the header is row 1. Empty rows are left out.
+    labels : name -> the different texts of a column of ids, in the order of their codes in `columns`.
+    wrong : names of columns with cells that were reported as wrong.
+    """
+
+    path: Path
+    letters: Mapping[str, str]
+    columns: dict[str, FloatArray]
+    row: IntArray
+    labels: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    wrong: frozenset[str] = frozenset()
+
+    def place(self, name: str) -> str:
+        """A column for a person: its name and the letters over it."""
+        return f"column {name} ({self.letters[name]})" if self.letters.get(name) else f"column {name}"
+
+
+class TableBlock(NamedTuple):
+    """Some rows of a table, and what was wrong with them as they were read. table : None where there is none at all."""
+
+    table: Table | None
+    problems: ProblemList
+
+
+def id_labels(cells: Iterable[str]) -> tuple[str, ...]:
+    """The different texts of a column of ids, in sorted order."""
+    return tuple(sorted({cell for cell in cells if cell}))
+
+
+def id_codes(cells: Sequence[str], labels: Sequence[str]) -> FloatArray:
+    """(N,) each cell's index among `labels`, nan where it is empty."""
+    code = {label: float(i) for i, label in enumerate(labels)}
+    return np.array([code.get(cell, np.nan) for cell in cells], dtype=np.float64)

@@ -1,0 +1,71 @@
+"""The file of a recording's table, CSV or Parquet by its suffix: read whole, or block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+from compd.errors import Problem, RecordingError
+from compd.tables.columns import ID_COLUMNS, is_header
+from compd.tables.csv_blocks import csv_blocks, csv_row_count
+from compd.tables.csv_table import read_table
+from compd.tables.parquet_table import ParquetTable
+from compd.tables.problem_list import ProblemList
+from compd.tables.table import Table, TableBlock
+
+CSV, PARQUET = ".csv", ".parquet"
+SUFFIXES = (CSV, PARQUET)
+
+
+def table_path(path: Path) -> Path:
+    """The table's file of a recording that is given by it or by its sidecar, NAME.yaml.
+
+    Raises RecordingError where two tables have this sidecar: a copy may have been changed since.
+    """
+    if path.suffix not in (".yaml", ".yml"):
+        return path
+    tables = [table for suffix in SUFFIXES if (table := path.with_suffix(suffix)).exists()]
+    if len(tables) > 1:
+        names = ", ".join(table.name for table in tables)
+        raise RecordingError(
+            Problem(where=str(path), what="is beside two tables", value=names, next_step=f"give one of them: {names}")
+        )
+    return tables[0] if tables else path.with_suffix(CSV)
+
+
+def written_path(path: Path) -> Path:
+    """Where a recording is written that is to be `path`: NAME.csv where that has no suffix of a table."""
+    return path if path.suffix in SUFFIXES else path.with_name(f"{path.name}{CSV}")
+
+
+def read_table_file(path: Path, problems: ProblemList, id_columns: Collection[str]) -> Table | None:
+    """All rows; what is wrong goes to `problems`. None where there is no table at all.
+
+    id_columns : columns that may hold text.
+    """
+    if path.suffix != PARQUET:
+        return read_table(path, problems, is_header, id_columns)
+    try:
+        return ParquetTable(path, id_columns).whole(problems)
+    except RecordingError as error:
+        problems.problems += error.problems
+        return None
+
+
+def table_blocks(path: Path, id_columns: Collection[str], rows: int) -> Iterator[TableBlock]:
+    """The rows, so many at a time at most, in the order of the file and in constant memory; one block at least.
+
+    Raises RecordingError for a file that cannot be read.
+    """
+    if path.suffix == PARQUET:
+        return ParquetTable(path, id_columns).blocks(rows)
+    return csv_blocks(path, is_header, id_columns, rows)
+
+
+def row_count(path: Path) -> int:
+    """Rows of values in the table, empty ones with the others: of Parquet as it says, of CSV lines under the header.
+
+    Raises RecordingError for a file that cannot be read.
+    """
+    path = table_path(path)
+    return ParquetTable(path, ID_COLUMNS).row_count if path.suffix == PARQUET else csv_row_count(path)
