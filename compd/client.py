@@ -42,8 +42,8 @@ from typing import Self
 
 from compd.client_connection import ClientConnection, Message, open_connection
 from compd.errors import DaemonError, Problem
-from compd.files.atomic_files import open_regular
-from compd.live.loop.states import state_named
+from compd.files import open_regular
+from compd.setpoint_states import state_named
 
 __all__ = ["DEFAULT_ADDRESS", "Client", "Message", "connect"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from compd.text.secrets import without_users
+from compd.text import without_users
 
 
 @dataclass(frozen=True, kw_only=True)

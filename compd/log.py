@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 import structlog
 
-from compd.text.secrets import hide_secrets, without_secrets
+from compd.text import hide_secrets, without_secrets
 
 
 def log_to_stderr(named: Sequence[Any] = ()) -> None:

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration.geometry import Geometry, ToolOnPlateSettings, ToolOnPlatformSettings
-from compd.configuration.operation import Wiring
+from compd.configuration import Geometry, ToolOnPlateSettings, ToolOnPlatformSettings, Wiring
+from compd.model import MachineModel, machine_constants, machine_model
+from compd.model.effects import MachineDetails
+from compd.model.kinematics import Arrangement, Contact, ToolOnPlate, ToolOnPlatform
 from compd.rotation import rotation_matrix, to_outer
-from compd.model.machine import MachineModel, machine_constants, machine_model
-from compd.model.effects.observations import MachineDetails
-from compd.model.kinematics.tool import Arrangement, Contact, ToolOnPlate, ToolOnPlatform
 
 # Equation (1): the two ball shanks of a revolute joint are averaged, gB = (Ra + Rb) / 2.
 WEIGHT_OF_ROLE: Mapping[str, float] = {"S": 1.0, "B": 1.0, "Ra": 0.5, "Rb": 0.5}

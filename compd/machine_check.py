@@ -12,18 +12,27 @@ from typing import TypeVar
 
 import numpy as np
 
-from compd.configuration import Configuration
-from compd.configuration.document import Document, Location
-from compd.configuration.effect_files import effect_file_problems
-from compd.configuration.geometry import Geometry
-from compd.configuration.machine_configuration import SECTIONS, Examined, examine, in_order
-from compd.configuration.operation import SocketSettings, StateSettings
-from compd.configuration.places import place_problems, place_warnings
-from compd.configuration.section import Section, readable
+from compd.configuration import (
+    SECTIONS,
+    Configuration,
+    Document,
+    Examined,
+    Geometry,
+    Location,
+    Section,
+    SocketSettings,
+    StateSettings,
+    effect_file_problems,
+    examine,
+    in_order,
+    place_problems,
+    place_warnings,
+    readable,
+)
 from compd.errors import ConfigurationError, KinematicsError, Problem
 from compd.machine_builder import build_model
 from compd.machine_slips import axes_along_links, slips
-from compd.model.machine import MachineModel
+from compd.model import MachineModel
 
 SectionT = TypeVar("SectionT", bound=Section)
 

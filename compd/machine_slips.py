@@ -14,10 +14,9 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
-from compd.configuration.document import Document, Location
-from compd.configuration.geometry import Geometry, ToolOnPlatformSettings
+from compd.configuration import Document, Geometry, Location, ToolOnPlatformSettings
 from compd.errors import Problem
-from compd.model.machine import MachineModel
+from compd.model import MachineModel
 
 # Squared lengths that are smaller by a hundredth: points as drawn are the nearest to their own, exactly.
 _CLEARLY = 0.99

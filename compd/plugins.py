@@ -19,8 +19,7 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from compd.errors import PluginError, Problem
-from compd.files.atomic_files import read_small_file
-from compd.files.file_trust import own_users, trust_problem
+from compd.files import own_users, read_small_file, trust_problem
 
 GAUGES = "compd.gauges"
 SIMULATED_GAUGES = "compd.simulated_gauges"

@@ -6,7 +6,7 @@ import math
 
 from compd.arrays import FloatArray
 from compd.jit import MATRIX, VECTOR, helper, kernel
-from compd.model.kernels.linear import all_finite
+from compd.linear import all_finite
 
 # Stands below a fraction whose numerator vanishes too: no angle is that small.
 SMALLEST = 1e-300

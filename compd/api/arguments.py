@@ -7,11 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.open import open_recording
+from compd.comparison import AlignedRecording, open_recording
 from compd.errors import Problem, StateError
-from compd.model.effects.effect import Effect
-from compd.model_file.model_file import ModelFile, read_model_file
+from compd.model.effects import Effect
+from compd.model_file import ModelFile, read_model_file
 
 # An opened recording, or the path of one whose machine is found by its name.
 Recorded: TypeAlias = AlignedRecording | str | Path

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.comparison.recording_comparison import compare as compare_aligned
-from compd.comparison.comparison import Comparison
-from compd.diagnosis.recording_diagnosis import diagnose as diagnose_aligned
-from compd.diagnosis.verdict import Diagnosis
-from compd.model.effects.effect_needs import can_concern
-from compd.model.library import load_library
-from compd.model.library.effects_file import gather_effects
+from compd.comparison import Comparison
+from compd.comparison import compare as compare_aligned
+from compd.diagnosis import Diagnosis
+from compd.diagnosis import diagnose as diagnose_aligned
+from compd.model.effects import can_concern
+from compd.model.library import gather_effects, load_library
 
 
 def compare(recording: Recorded, model: Model = None) -> Comparison:

@@ -9,15 +9,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
-from compd.comparison.shape_search import search_constants
-from compd.planning.measurement_plan import MeasurementPlan
-from compd.planning.measurement_programmes import ProgrammeLimits, recorded_limits
-from compd.planning.next_measurement import plan_measurement as plan_fitted_rivals
-from compd.planning.tip_ways import plan_ways
+from compd.comparison import AlignedRecording, compare, search_constants
 from compd.errors import CompdError, Problem
-from compd.model.library.effects_file import gather_effects, named_effect
+from compd.model.library import gather_effects, named_effect
+from compd.planning import MeasurementPlan, ProgrammeLimits, plan_ways, recorded_limits
+from compd.planning import plan_measurement as plan_fitted_rivals
 
 # Lowest and highest.
 Range: TypeAlias = tuple[float, float]

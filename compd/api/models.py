@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.configuration.shipped import Machine, load_machine, shipped_names
-from compd.diagnosis import model_changes
+from compd.configuration import Machine, load_machine, shipped_names
+from compd.diagnosis import Refinement, add_to_model, unrefined
 from compd.errors import CompdError, Problem, StateError
-from compd.model.effects.effect import Effect
-from compd.model.library import find_effect, load_library
-from compd.model.library.effects_file import gather_effects, named_effect
-from compd.model_file.model_document import read_stored
-from compd.model_file.model_file import ModelFile, read_model_file
-from compd.recording.sidecar import EXTERNAL
+from compd.model.effects import Effect
+from compd.model.library import find_effect, gather_effects, load_library, named_effect
+from compd.model_file import ModelFile, read_model_file, read_stored
+from compd.recording import EXTERNAL
 
 
 def open_model(path: str | Path, machine: Machine | None = None) -> ModelFile:
@@ -64,7 +62,7 @@ def add_effect(
     recording: Recorded,
     *,
     effects: Effects = (),
-    refine: model_changes.Refinement = model_changes.unrefined,
+    refine: Refinement = unrefined,
 ) -> ModelFile:
     """Add an effect to a model: all its effects are fitted together on a recording, and the ledger gets a line.
 
@@ -109,7 +107,7 @@ def add_effect(
     resolved = _resolve_effect(effect, gather_effects(effects))
     declared = resolved.declared if isinstance(resolved.declared, str) else dict(resolved.declared)
     aligned = opened_recording(recording)
-    return model_changes.add(opened_model(model, aligned), declared or resolved.id, resolved, aligned, refine)
+    return add_to_model(opened_model(model, aligned), declared or resolved.id, resolved, aligned, refine)
 
 
 def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapping[str, Effect]) -> Effect:

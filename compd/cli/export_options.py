@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from compd.instruments.export import ReadOptions
+    from compd.instruments import ReadOptions
 
 
 class Shape(StrEnum):
@@ -81,7 +81,7 @@ def read_options(
 
     names : role -> a column's name.
     """
-    from compd.instruments.export import ReadOptions
+    from compd.instruments import ReadOptions
 
     if decimal not in (None, ".", ","):
         raise typer.BadParameter("is . or ,", param_hint="--decimal")

@@ -17,19 +17,15 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.commissioning.jump_trials import FeignedJump, feigned_jumps, measured_lengths
 from compd.commissioning.line_budget import LineBudget, line_budgets
-from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation.values import Compensation, GaugeValues, WarmStart
-from compd.configuration import Configuration
-from compd.configuration.operation import FRAME_DISTANCES
-from compd.stated_noise import SCATTER_RATIO, tolerance_mm
+from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.configuration import FRAME_DISTANCES, Configuration
 from compd.errors import KinematicsError
-from compd.live.acquisition.reading_trust import LEAST_MOTION
-from compd.live.acquisition.way_evidence import LEAST_WAY_MM, WAY_SHARE
-from compd.live.loop.wired_readings import RESTED
-from compd.live.acquisition.quantity_limits import UNIT_LIMITS
+from compd.live.acquisition import LEAST_MOTION, LEAST_WAY_MM, UNIT_LIMITS, WAY_SHARE
+from compd.live.loop import RESTED
 from compd.machine_builder import build_model
-from compd.model.machine import MachineModel
-from compd.model.kinematics.tool import ToolOnPlate
+from compd.model import MachineModel
+from compd.model.kinematics import ToolOnPlate
+from compd.stated_noise import SCATTER_RATIO, tolerance_mm
 from compd.units import UM_PER_MM
 
 DRIFT_UM = 10.0

@@ -11,21 +11,25 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.clock import Clock, MonotonicClock
-from compd.compensation.compensation import compensate_cmm
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.configuration import Configuration
 from compd.errors import Problem
 from compd.gauge import good
-from compd.live.loop.commands import Commands
-from compd.live.loop.directions import Directions
-from compd.live.loop.loop import Loop
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import Models, ModelText, try_model
-from compd.live.loop.ring_entries import CyclePacker, SentSetpoint
-from compd.live.loop.setpoint import Setpoint
-from compd.live.loop.timing import LoopTiming
-from compd.live.loop.pipeline import build_pipeline
-from compd.model.machine import MachineModel
+from compd.live.loop import (
+    Commands,
+    CyclePacker,
+    Directions,
+    Loop,
+    LoopTiming,
+    MachineZero,
+    Models,
+    ModelText,
+    SentSetpoint,
+    Setpoint,
+    build_pipeline,
+    try_model,
+)
+from compd.model import MachineModel
 
 _CYCLES = 200
 # Half a second in all, also for a loop that is slower; between two cycles the processor does something else.

@@ -9,7 +9,7 @@ from typing import Any
 
 from compd.client import Message, connect
 from compd.errors import DaemonError
-from compd.live.loop.states import State, state_named
+from compd.setpoint_states import State, state_named
 
 # A setpoint that is good enough to look at; the daemon makes hundreds a second.
 _RATE_HZ = 10.0

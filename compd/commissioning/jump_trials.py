@@ -14,14 +14,11 @@ from typing import NamedTuple
 
 from compd.commissioning.line_budget import LineBudget
 from compd.commissioning.pushed_periods import longest_period_s
-from compd.configuration import Configuration
-from compd.configuration.crosscheck import resolve_channel
-from compd.configuration.lines import CARRIES
-from compd.stated_noise import tolerance_mm
+from compd.configuration import CARRIES, Configuration, resolve_channel
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
-from compd.live.acquisition.polled_round import FASTEST_ROUND_S
-from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
+from compd.live.acquisition import FASTEST_ROUND_S, MotionLimits, unseen_jump_mm
+from compd.stated_noise import tolerance_mm
 
 # By how much later than planned the next reading comes, and was perhaps sampled, s. Measured on the shipped tripod,
 # simulated, on two processors: quiet, by the jumps that were believed at load 1.2 (25 um of a joint); with other

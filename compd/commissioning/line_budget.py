@@ -20,13 +20,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from compd.configuration import Configuration
-from compd.configuration.lines import ModbusAsciiLine, ModbusRtuLine, ModbusTcpLine, PolledLine, SerialPortSettings
-from compd.configuration.pushed_lines import PushedLineSettings
-from compd.configuration.round_trigger import BROADCAST, WRITE_REGISTERS, TriggerBytes
+from compd.configuration import (
+    BROADCAST,
+    WRITE_REGISTERS,
+    Configuration,
+    ModbusAsciiLine,
+    ModbusRtuLine,
+    ModbusTcpLine,
+    PolledLine,
+    PushedLineSettings,
+    SerialPortSettings,
+    TriggerBytes,
+)
 from compd.gauge import replies_tell_whose
-from compd.lines.open import QUIET_CHARACTERS
-from compd.live.acquisition.reply_order import LATER_S, SLOWER
+from compd.lines import QUIET_CHARACTERS
+from compd.live.acquisition import LATER_S, SLOWER
 
 SHORTEST_QUIET_RTU_S = 1.75e-3  # the same, above 19200 baud
 SHORTEST_QUIET_ASCII_S = 1e-3

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from compd.commissioning.line_budget import LATENCY_TIMER_S, LineBudget, gauges_on
-from compd.configuration import Configuration
-from compd.configuration.lines import SerialPortSettings
+from compd.configuration import Configuration, SerialPortSettings
 from compd.errors import Problem
 
 # Lengths that are further apart, s, and nobody limits it or latches them: at 1 mm/s, which is slow for a machine that

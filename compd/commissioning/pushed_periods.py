@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from compd.configuration import Configuration
-from compd.configuration.lines import LineSettings
-from compd.configuration.pushed_lines import OpcUaLine, PushedLineSettings
+from compd.configuration import Configuration, LineSettings, OpcUaLine, PushedLineSettings
 from compd.errors import Problem
 from compd.gauge import Gauge
 from compd.pushed_gauge import PushedGauge

@@ -5,8 +5,7 @@ from __future__ import annotations
 import socket
 from collections.abc import Iterator
 
-from compd.configuration import Configuration
-from compd.configuration.lines import ModbusTcpLine, TcpLine
+from compd.configuration import Configuration, ModbusTcpLine, TcpLine
 from compd.errors import Problem
 
 

@@ -8,3 +8,7 @@ and a fit holds within its `quantity_ranges`.
 Methods that know arrays alone stand in `statistics`, among them how noise shows between replicates and in a last digit.
 Every threshold of a result stands in `criteria`.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -20,11 +20,11 @@ from compd.comparison.display_unit import format_error, residual_ending
 from compd.comparison.noise_floor import NoiseFloor
 from compd.comparison.prediction_uncertainty import Uncertainty
 from compd.comparison.residual_trends import Trend
-from compd.model.effects.effect import FittedEffect
-from compd.model.uncertainty import GaugeNoise
-from compd.recording.reference import sigma_key
+from compd.model import GaugeNoise
+from compd.model.effects import FittedEffect
+from compd.recording import sigma_key
 from compd.result_tables import data_frame, html_table
-from compd.text.json_text import nan_to_null
+from compd.text import nan_to_null
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,8 +10,7 @@ import numpy as np
 from compd.arrays import BoolArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.nuisance import fit_along
-from compd.model.effects.deltas import Deltas, sum_deltas
-from compd.model.effects.effect import FittedEffect
+from compd.model.effects import Deltas, FittedEffect, sum_deltas
 from compd.units import UM_PER_MM
 
 

@@ -10,7 +10,7 @@ number in um is shown as it is, with the recording's unit, and a place in mm is 
 from __future__ import annotations
 
 from compd.arrays import FloatArray
-from compd.text.numbers_as_text import number_text
+from compd.text import number_text
 from compd.units import REFERENCE_UNITS, UM_PER_MM
 
 

@@ -34,11 +34,9 @@ from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.nuisance import nuisance_beside
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.quantity_ranges import Ranges, quantity_ranges
-from compd.statistics.cluster_covariance import cluster_covariance
-from compd.statistics.least_squares import solve_least_squares
-from compd.statistics.robust import huber_weights
 from compd.errors import CompdError, Problem
-from compd.model.effects.effect import ConstantValues, Effect, FittedEffect
+from compd.model.effects import ConstantValues, Effect, FittedEffect
+from compd.statistics import cluster_covariance, huber_weights, solve_least_squares
 from compd.units import UM_PER_MM
 
 _LOOK_AT_FORMULA = (

@@ -21,9 +21,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.model.effects.effect import ConstantValues, Effect
-from compd.model.effects.effect_basis import evaluate_basis
-from compd.model.effects.observations import Observations
+from compd.model.effects import ConstantValues, Effect, Observations, evaluate_basis
 from compd.units import UM_PER_MM
 
 

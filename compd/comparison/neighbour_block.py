@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import IntArray
-from compd.recording.recording import Recording
+from compd.recording import Recording
 
 # Enough blocks for 15 % on a standard error, and long enough for temperatures to change from one to the next.
 BLOCKS = 24

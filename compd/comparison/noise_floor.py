@@ -26,9 +26,8 @@ from scipy.special import fdtr
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import format_error
-from compd.statistics.replicates import replicate_pairs
-from compd.statistics.robust import SCALE_EFFICIENCY, trimmed_scale
-from compd.recording.reference import sigma_key
+from compd.recording import sigma_key
+from compd.statistics import SCALE_EFFICIENCY, replicate_pairs, trimmed_scale
 
 # Variance of the estimate from N differences of neighbours, as a share of that of N independent values' (von
 # Neumann).

@@ -14,9 +14,8 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.initial_states import initial_state_columns
-from compd.statistics.least_squares import column_norms, solve_least_squares
-from compd.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
-from compd.model.effects.effect import FittedEffect
+from compd.model.effects import FittedEffect
+from compd.statistics import LEAST_SIGMA, column_norms, robust_regression, solve_least_squares, trimmed_scale
 from compd.units import UM_PER_MM
 
 # What is fitted along is an effect's own where the effect leaves less of it than this share.

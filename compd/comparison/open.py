@@ -15,12 +15,9 @@ from pathlib import Path
 
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.configuration import Configuration
-from compd.configuration.shipped import Machine, load_machine, shipped_names
+from compd.configuration import Configuration, Machine, load_machine, shipped_names
 from compd.errors import Problem, RecordingError
-from compd.recording.reader import read_recording
-from compd.recording.recording import Recording
-from compd.recording.sidecar import EXTERNAL, read_sidecar
+from compd.recording import EXTERNAL, Recording, read_recording, read_sidecar
 
 
 def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedRecording:

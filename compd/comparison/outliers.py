@@ -8,8 +8,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.criteria import ComparisonCriteria
-from compd.statistics.replicates import replicate_pairs
-from compd.statistics.robust import LEAST_SIGMA, robust_sigma, trimmed_scale
+from compd.statistics import LEAST_SIGMA, replicate_pairs, robust_sigma, trimmed_scale
 
 
 class OutlierLimits(NamedTuple):

@@ -22,11 +22,9 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.statistics.least_squares import solve_least_squares
-from compd.statistics.periodogram import PeriodLimits, strongest_periods
-from compd.model.effects.effect import Constant, ConstantValues, Effect
-from compd.model.effects.effect_basis import evaluate_basis, port_size
-from compd.model.formula.columns import column_values
+from compd.model.effects import Constant, ConstantValues, Effect, evaluate_basis, port_size
+from compd.model.formula import column_values
+from compd.statistics import PeriodLimits, solve_least_squares, strongest_periods
 from compd.units import UM_PER_MM
 
 # Periods that are tried with the effect's own columns; more would be chance.

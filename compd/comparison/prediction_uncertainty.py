@@ -10,12 +10,9 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.noise_floor import repeat_scatter
-from compd.statistics.last_digit import last_digit_um
-from compd.model.effects.deltas import Deltas, split_by_port, sum_deltas
-from compd.model.effects.effect import FittedEffect
-from compd.model.effects.effect_basis import evaluate_basis
-from compd.model.sensitivity import base_joints_by_distances
-from compd.model.uncertainty import GAUGE_PORTS, GaugeNoise, gauge_variance, parameter_variance
+from compd.model import GAUGE_PORTS, GaugeNoise, base_joints_by_distances, gauge_variance, parameter_variance
+from compd.model.effects import Deltas, FittedEffect, evaluate_basis, split_by_port, sum_deltas
+from compd.statistics import last_digit_um
 from compd.units import UM_PER_MM
 
 

@@ -8,9 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from compd.arrays import BoolArray
-from compd.model.effects.effect import FittedEffect
-from compd.model.effects.effect_needs import needed_quantities
-from compd.model.effects.observations import Observations
+from compd.model.effects import FittedEffect, Observations, needed_quantities
 
 # Lowest and highest value of each quantity, by its name.
 Ranges: TypeAlias = Mapping[str, tuple[float, float]]

@@ -18,12 +18,11 @@ from compd.comparison.nuisance import FittedAlong, fit_along
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import Uncertainty, first_order_uncertainty, gauge_noise
 from compd.comparison.residual_trends import find_trends
-from compd.statistics.last_digit import last_digit_um
 from compd.errors import Problem, RecordingError
-from compd.model.effects.effect import FittedEffect
-from compd.model.sensitivity import link_residuals
-from compd.model.uncertainty import GaugeNoise
-from compd.tables.columns import is_sensitivity
+from compd.model import GaugeNoise, link_residuals
+from compd.model.effects import FittedEffect
+from compd.statistics import last_digit_um
+from compd.tables import is_sensitivity
 from compd.units import UM_PER_MM
 
 # Outliers bend nuisance terms a little, and these decide which rows are outliers: two rounds settle it.

@@ -22,7 +22,7 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.effect_fit import FitResult, fit, initial_effect
 from compd.comparison.period_search import neighbouring_periods, promising_constants
-from compd.model.effects.effect import ConstantValues, Effect, FittedEffect
+from compd.model.effects import ConstantValues, Effect, FittedEffect
 
 # A constant is known well enough when an error of it moves the residual by less than its own standard error: 1 % is.
 FINE = 0.01

@@ -8,7 +8,7 @@ import numpy as np
 
 from compd.arrays import IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.recording.recording import Recording
+from compd.recording import Recording
 
 # The choice within each stretch is drawn, so that it does not keep step with a motion that repeats; the same each time.
 SEED = 1

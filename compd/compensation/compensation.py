@@ -1,7 +1,7 @@
 """From gauge values and a model to a compensated tip and a scale setpoint: pure functions, shared by daemon and replay.
 
 Both modes go the same way: machine frame (3), joints (1), kinematics, and then the effects of the model
-(`compd.model.effects.effect_program`), if it has any. In both, the correction is what is added to the command, and the command
+(`effect_program`), if it has any. In both, the correction is what is added to the command, and the command
 is what a controller that knows nothing of joints and frame would send to bring the tip to its target.
 """
 
@@ -19,15 +19,11 @@ from compd.arrays import FloatArray
 from compd.compensation.rows import Rows, kernel_rows
 from compd.compensation.values import Compensation, CorrectionShares, GaugeValues, Wanted, WarmStart
 from compd.errors import KinematicsError, Problem
-from compd.model.effects.effect import Memory
-from compd.model.effect_memory import EffectMemory, PackedMemory
-from compd.model.kinematics.frame import Frame
-from compd.model.kernels.compensation import compensate_rows
+from compd.model import EffectInputs, EffectMemory, MachineModel, PackedMemory, python_effects
+from compd.model.effects import Memory
+from compd.model.kernels import RESULT, WORKSPACE, compensate_rows
+from compd.model.kinematics import Frame, Pose
 from compd.rotation import compose, rotation_matrix
-from compd.model.kernels.solver_structures import RESULT, WORKSPACE
-from compd.model.kinematics.link_kinematics import Pose
-from compd.model.machine import MachineModel
-from compd.model.python_effect import EffectInputs, python_effects
 
 # In machine-tool mode effects are computed at the scale setpoint, which they shift themselves. After the first pass the
 # error left is at most a scale's cyclic error, 1 % of its period; the second leaves 2 pi times 1 % of that: nanometres.

@@ -11,7 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation.values import GaugeValues, Wanted, WarmStart
 from compd.errors import CompdError, Problem
-from compd.model.machine import MachineModel
+from compd.model import MachineModel
 from compd.reference_conditions import value_at_zero
 
 

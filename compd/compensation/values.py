@@ -8,9 +8,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.effect_memory import EffectMemory
-from compd.model.kinematics.frame import Frame
-from compd.model.machine import MachineModel
+from compd.model import EffectMemory, MachineModel
+from compd.model.kinematics import Frame
 
 
 class GaugeValues(NamedTuple):

@@ -1,5 +1,5 @@
 """The machine configuration: written by a person, checked whole, never rewritten by the program."""
 
-from compd.configuration.machine_configuration import Configuration, load
+import lazy_loader
 
-__all__ = ["Configuration", "load"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

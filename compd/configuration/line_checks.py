@@ -10,7 +10,7 @@ from compd.configuration.document import Location
 from compd.configuration.lines import CARRIES
 from compd.configuration.sections import Sections
 from compd.errors import Problem
-from compd.text.numbers_as_text import join_words
+from compd.text import join_words
 
 
 class _Library(NamedTuple):

@@ -29,12 +29,12 @@ from compd.configuration.operation import (
 from compd.configuration.plausible import implausible
 from compd.configuration.section import Text, readable, unknown_key, validate, validation_problems, value_text
 from compd.configuration.sections import Sections
-from compd.stated_noise import StatedNoise, stated_noise
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
 from compd.plugins import GAUGES
 from compd.plugins import load as load_plugin
 from compd.result_tables import Columns, data_frame, html_table
+from compd.stated_noise import StatedNoise, stated_noise
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from compd.configuration.section import Section, refusal
-from compd.text.escapes import unescape
+from compd.text import unescape
 
 SettleTime = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)]
 Register = Annotated[int, Field(ge=0, le=0xFFFF)]

@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from compd.configuration.document import Document, Location
 from compd.errors import Problem
-from compd.text.secrets import has_secret, holds_secret
+from compd.text import has_secret, holds_secret
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

@@ -21,9 +21,8 @@ except ImportError:
     from yaml import SafeLoader  # type: ignore[assignment]
 
 from compd.errors import ConfigurationError, Problem
-from compd.files.atomic_files import read_small_file
-from compd.files.file_kind import FileKind
-from compd.text.secrets import holds_secret
+from compd.files import FileKind, read_small_file
+from compd.text import holds_secret
 
 Location = tuple[str | int, ...]
 

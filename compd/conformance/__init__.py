@@ -1,1 +1,5 @@
 """Every driver against every fault that a wire can have: `compd driver test`."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

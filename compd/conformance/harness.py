@@ -12,7 +12,7 @@ from compd.conformance.device_replies import DeviceReplies
 from compd.conformance.faults import Fault
 from compd.conformance.peer import Exchange, Peer, SensorValues
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, bad
-from compd.live.acquisition.polled_round import NOTHING_UNDER_WAY
+from compd.live.acquisition import NOTHING_UNDER_WAY
 
 LOOKS = 24  # fault-free polls before all else
 DIGITS_FROM = 2  # of them, those from which the device's digit is taken

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from compd.conformance.faults import Piece
 from compd.conformance.peer import Peer
 from compd.gauge import LineFault, Quality
-from compd.lines.modbus_rtu import RtuMaster
-from compd.lines.stream import StreamLine
+from compd.lines import RtuMaster, StreamLine
 
 TURNAROUND_S = 1e-3  # from the last bit of a request to the first of the reply
 GAP_S = 2e-3  # silence before a request, as `open_line` keeps it at 19200 baud and below

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Literal
 
 from compd.clock import MonotonicClock
+from compd.configuration import ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
 from compd.conformance.peer import Peer
-from compd.configuration.lines import ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
 from compd.lines import Line, open_line
-from compd.simulation.wires.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
+from compd.simulation import LOOPBACK, End, PtyEnd, TcpEnd
 
 Kind = Literal["serial", "tcp", "modbus_rtu", "modbus_tcp"]
 FAST_BAUD = 115200

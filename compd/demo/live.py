@@ -12,7 +12,7 @@ from compd.demo.simulated_daemon import simulated_daemon
 from compd.errors import DaemonError
 
 # An hour of warming up in three minutes: what moves can be seen to move.
-SPEEDUP = 20.0
+LIVE_SPEEDUP = 20.0
 # The machine stands at machine zero for so long, s: zero is taken in it.
 ZERO_HOLD_S = 30.0
 ANSWER_TIMEOUT_S = 15.0
@@ -26,7 +26,7 @@ def run_live(configuration: Configuration, seed: int, serve: Callable[[str], Non
     serve : called with the daemon's Unix socket; returns when a person has had enough.
     Raises DaemonError where one does not start.
     """
-    with simulated_daemon(configuration, seed, SPEEDUP, ZERO_HOLD_S) as directory:
+    with simulated_daemon(configuration, seed, LIVE_SPEEDUP, ZERO_HOLD_S) as directory:
         take_zero(directory / "compd.sock")
         serve(str(directory / "compd.sock"))
 

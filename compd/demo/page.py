@@ -13,8 +13,7 @@ from rich.table import Table as TerminalTable
 
 from compd.arrays import rms
 from compd.demo.session import KINDS, DemoSession
-from compd.report.page import COLOURS, Panel, style_figure, write_page
-from compd.report.page_table import PageTable
+from compd.report import COLOURS, PageTable, Panel, style_figure, write_page
 from compd.units import UM_PER_MM
 
 LABELS = {"none": "no compensation", "joints": "joints only", "full": "joints and frame"}

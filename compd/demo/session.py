@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from compd.client import Client, connect
-from compd.configuration import Configuration
-from compd.configuration.geometry import ToolOnPlatformSettings
+from compd.configuration import Configuration, ToolOnPlatformSettings
 from compd.demo.simulated_daemon import simulated_daemon
-from compd.simulation.wires.control_client import ControlClient
+from compd.simulation import ControlClient
 
 # Kinds of compensation: of nothing, of the joints, of joints and frame.
 KINDS = ("none", "joints", "full")

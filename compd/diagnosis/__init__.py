@@ -6,3 +6,7 @@
 tell effects apart. `model_changes` writes what was found into a model file, `holdout` tries it on a recording that took
 no part. Every threshold stands in `criteria`.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,7 +10,7 @@ from compd.diagnosis.candidates.plausibility import estimate_parameters, is_unde
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, ParameterEstimate, Status
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
-from compd.text.numbers_as_text import number_text
+from compd.text import number_text
 
 
 def candidate_results(

@@ -11,7 +11,7 @@ from compd.diagnosis.findings import ConstantFinding
 from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.rivals import find_rivals
-from compd.model.effects.effect import FittedEffect
+from compd.model.effects import FittedEffect
 
 
 def describe_constant(

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from compd.model.effects.effect import Effect, FittedEffect
+from compd.model.effects import Effect, FittedEffect
 
 Status = Literal["explains", "partial", "no_gain", "not_testable"]
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
-from compd.comparison.comparison import Comparison
+from compd.comparison import AlignedRecording, Comparison, compare
 from compd.diagnosis.verdict import Diagnosis
 
 

@@ -10,21 +10,14 @@ from typing import TypeAlias
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
-from compd.comparison.comparison import Comparison
-from compd.comparison.effect_fit import FitResult, fit, initial_effect
-from compd.comparison.shape_search import search_constants
+from compd.comparison import AlignedRecording, Comparison, FitResult, compare, fit, initial_effect, search_constants
 from compd.diagnosis.candidates.candidates import library_pool
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.errors import Problem, StateError
-from compd.model.effects.effect import Effect, FittedEffect
-from compd.model.effects.effect_basis import counted_from, recounted
+from compd.model.effects import Effect, FittedEffect, Observations, counted_from, recounted
 from compd.model.library import load_library
-from compd.model.effects.observations import Observations
-from compd.model_file.model_document import Declaration, Kind, ModelStep, StoredModel
-from compd.model_file.model_file import ModelFile
+from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
 
 # What makes of a fit, and the standard deviations (m,) of the noise that it was weighed by, a better one.
 Refinement: TypeAlias = Callable[[FitResult, FloatArray], FitResult]
@@ -35,7 +28,7 @@ def unrefined(result: FitResult, sigma_um: FloatArray) -> FitResult:
     return result
 
 
-def add(
+def add_to_model(
     model: ModelFile,
     declared: Declaration,
     effect: Effect,
@@ -62,7 +55,9 @@ def add(
     return _changed(extended, model, refine(result, before.floor.by_axis_um), before, "add", effect.id)
 
 
-def remove(model: ModelFile, effect_id: str, aligned: AlignedRecording, refine: Refinement = unrefined) -> ModelFile:
+def remove_effect(
+    model: ModelFile, effect_id: str, aligned: AlignedRecording, refine: Refinement = unrefined
+) -> ModelFile:
     """Take an effect out and fit the others again, `refine` as of `add`.
 
     Raises StateError where the model has no such effect.
@@ -84,7 +79,7 @@ def remove(model: ModelFile, effect_id: str, aligned: AlignedRecording, refine: 
     return _changed(reduced, model, refine(result, before.floor.by_axis_um), before, "remove", effect_id)
 
 
-def refit(model: ModelFile, aligned: AlignedRecording, refine: Refinement = unrefined) -> ModelFile:
+def refit_model(model: ModelFile, aligned: AlignedRecording, refine: Refinement = unrefined) -> ModelFile:
     """Fit all effects again from zero, nonlinear constants as they are, `refine` as of `add`.
 
     They then count from machine zero where the recording has the quantities there, else from 20 degC.
@@ -102,7 +97,7 @@ def refit(model: ModelFile, aligned: AlignedRecording, refine: Refinement = unre
     return _changed(model, model, refine(result, before.floor.by_axis_um), before, "fit", "")
 
 
-def undo(stored: StoredModel, where: str) -> StoredModel:
+def undo_step(stored: StoredModel, where: str) -> StoredModel:
     """The model before its last step that is not undone yet; the file keeps the step and its undoing.
 
     where : the file, for messages. Raises StateError where there is no step to undo.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from compd.diagnosis.findings import EmpiricalFinding
-from compd.planning.next_measurement import measurement_of_constant, measurement_to_test, next_measurement
 from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.verdict import Diagnosis
+from compd.planning import measurement_of_constant, measurement_to_test, next_measurement
 
 # Covariates that the proposal names.
 MOST_COVARIATES = 2

@@ -8,11 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
-from compd.comparison.comparison import Comparison
-from compd.comparison.effect_fit import fit, initial_effect
-from compd.comparison.thinning import thinned
+from compd.comparison import AlignedRecording, Comparison, compare, fit, initial_effect, thinned
 from compd.diagnosis import stages
 from compd.diagnosis.candidate_result import candidate_results, explained_fraction, why_nothing_else
 from compd.diagnosis.candidates.candidates import CandidatePool, library_pool, periodic_candidates
@@ -22,8 +18,8 @@ from compd.diagnosis.constant_finding import describe_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, Rival, UntestedEffect
-from compd.diagnosis.rival_selection import named_members
 from compd.diagnosis.proposed_measurement import propose_measurement
+from compd.diagnosis.rival_selection import named_members
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
 from compd.diagnosis.search.gross_rows import gross_rows
 from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
@@ -33,7 +29,7 @@ from compd.diagnosis.search.subset_losses import SubsetLosses
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.diagnosis.words.summary import summary
-from compd.model.effects.effect import Effect, FittedEffect
+from compd.model.effects import Effect, FittedEffect
 
 # A longer recording is thinned to so many rows: effects of a fiftieth of the noise still show in them.
 MOST_ROWS = 5000

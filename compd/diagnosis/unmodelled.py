@@ -9,12 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.effect_fit import FitResult
-from compd.comparison.nuisance import nuisance_beside
-from compd.statistics.least_squares import normal_inverse
+from compd.comparison import AlignedRecording, FitResult, nuisance_beside
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
+from compd.statistics import normal_inverse
 from compd.units import UM_PER_MM
 
 # Combinations of scaled columns with a smaller singular value are undetermined: conditioning alone.

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from compd.comparison.comparison import Comparison
+from compd.comparison import Comparison
 from compd.diagnosis.findings import (
     CandidateResult,
     ConstantFinding,
@@ -16,7 +16,7 @@ from compd.diagnosis.findings import (
     UntestedEffect,
 )
 from compd.result_tables import Columns, data_frame, html_table
-from compd.text.json_text import nan_to_null
+from compd.text import nan_to_null
 
 if TYPE_CHECKING:
     import pandas as pd

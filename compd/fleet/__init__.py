@@ -1,1 +1,5 @@
 """Many machines and many recordings: each examined on Dask, the results in one table and on one page."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,8 +10,7 @@ from plotly.graph_objects import Figure, Heatmap
 
 from compd.fleet.drift import Drift
 from compd.fleet.overview import NOT_EXPLAINED, Overview
-from compd.report.page import COLOURS, style_figure
-from compd.report.page_table import PageTable
+from compd.report import COLOURS, PageTable, style_figure
 
 NO_EFFECTS = PageTable(("",), [("no effect was found, and the models have none",)])
 ROW_PX = 26

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from compd.errors import CompdError, Problem
-from compd.files.atomic_files import file_stamp
+from compd.files import file_stamp
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import Outcome, outcomes
-from compd.fleet.machine_examination import Examination
 from compd.fleet.fleet_recording import FleetRecording
+from compd.fleet.machine_examination import Examination
 from compd.fleet.recording_result import NOT_DONE, Command, RecordingResult
 
 # Recordings in one task: to compare 600 rows takes 0.1 s, to diagnose them seconds.

@@ -11,9 +11,7 @@ from plotly.subplots import make_subplots
 
 from compd.fleet.drift import Drift
 from compd.fleet.overview import Overview, short_name
-from compd.report.page import COLOURS, style_figure
-from compd.report.page_table import PageTable
-from compd.report.small_multiples import COLUMNS, SERIES_COLOURS
+from compd.report import COLOURS, COLUMNS, SERIES_COLOURS, PageTable, style_figure
 
 NO_DRIFTS = PageTable(("",), [("no parameter has been determined on enough campaigns of one machine",)])
 # More small figures nobody looks through; the table has all numbers.

@@ -10,8 +10,7 @@ from compd.fleet.effect_matrix import plot_effect_matrix
 from compd.fleet.fleet_figures import plot_drifts, plot_errors
 from compd.fleet.overview import Overview
 from compd.fleet.recording_result import RecordingResult
-from compd.report.page import Panel, write_page
-from compd.report.page_table import PageTable
+from compd.report import PageTable, Panel, write_page
 
 _CRITERIA = FleetCriteria()
 

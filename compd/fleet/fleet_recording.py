@@ -10,7 +10,7 @@ from pathlib import Path
 
 from compd.errors import CompdError
 from compd.fleet.name_date import date_in
-from compd.recording.sidecar import Sidecar, read_sidecar
+from compd.recording import Sidecar, read_sidecar
 
 
 @dataclass(frozen=True)

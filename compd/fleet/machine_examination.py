@@ -9,18 +9,12 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from compd.api.diagnosis import compare, diagnose
-from compd.api.long_recordings import LongRecording, open_long
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.comparison import Comparison
-from compd.comparison.open import open_recording
-from compd.comparison.stream.block_comparison import compare_blocks
-from compd.comparison.stream.recording_stream import is_long
-from compd.configuration import Configuration, load
-from compd.configuration.geometry import LINKS
-from compd.diagnosis.model_changes import refit
+from compd.api import LongRecording, compare, diagnose, open_long
+from compd.comparison import AlignedRecording, Comparison, compare_blocks, is_long, open_recording
+from compd.configuration import LINKS, Configuration, load
+from compd.diagnosis import refit_model
 from compd.errors import CompdError, Problem
-from compd.files.atomic_files import file_stamp
+from compd.files import file_stamp
 from compd.fleet.fleet_recording import FleetRecording, content_hash
 from compd.fleet.machine_files import MachineFiles, machine_files
 from compd.fleet.recording_result import (
@@ -31,9 +25,8 @@ from compd.fleet.recording_result import (
     FleetEstimate,
     RecordingResult,
 )
-from compd.model_file.model_document import read_stored
-from compd.model_file.model_file import ModelFile, read_model_file
-from compd.recording.sidecar import EXTERNAL
+from compd.model_file import ModelFile, read_model_file, read_stored
+from compd.recording import EXTERNAL
 from compd.release import __version__
 
 # Configurations, and models, that a process keeps: a fleet has hundreds of recordings of a few machines.
@@ -128,7 +121,7 @@ class Examination:
         estimates: list[FleetEstimate] = []
         after_um = math.nan
         if model is not None and model.fitted:
-            refitted = refit(model, aligned) if long is None else refit(model, aligned, long.refine)
+            refitted = refit_model(model, aligned) if long is None else refit_model(model, aligned, long.refine)
             after_um = refitted.steps[-1].rms_after_um
             estimates = [
                 FleetEstimate(number.effect, number.parameter, number.value, number.standard_error, number.unit)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from compd.errors import Problem
 from compd.fleet.name_date import is_date
-from compd.text.numbers_as_text import join_words
+from compd.text import join_words
 
 if TYPE_CHECKING:
     from compd.fleet.fleet_recording import RecordingFiles

@@ -10,14 +10,14 @@ from functools import cached_property
 from pathlib import Path
 from statistics import median
 
-from compd.comparison.display_unit import format_error
+from compd.comparison import format_error
 from compd.fleet.criteria import FleetCriteria
 from compd.fleet.drift import Drift, drifts, named_drifts
 from compd.fleet.outlying import ERROR, ERROR_LEFT, OutlyingMachine, outlying_machines
 from compd.fleet.recording_result import AT_FLOOR, RecordingResult
 from compd.fleet.steady_effects import LoneEffect, lone_effects, steady_effects
-from compd.report.page_table import PageTable
-from compd.text.numbers_as_text import estimate_text, join_words, number_text
+from compd.report import PageTable
+from compd.text import estimate_text, join_words, number_text
 
 # Verdicts of recordings that the model explains: of `diagnose`, and of `compare`.
 _NOTHING_MISSING = ("adequate", AT_FLOOR)

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compd.configuration.yaml_reader import parse_yaml, read_text
+from compd.configuration import parse_yaml, read_text
 from compd.errors import CompdError, Problem
 from compd.fleet.fleet_recording import FleetRecording, RecordingFiles
 from compd.fleet.machine_names import MachinesBy, machine_in, matches_of, name_machines
-from compd.recording.sidecar import SECTIONS, SIDECAR
+from compd.recording import SECTIONS, SIDECAR
 
 # What the table of a recording may end in. Where two tables have one sidecar, the first of these counts.
 TABLES = (".csv", ".parquet")

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from compd.errors import CompdError, Problem
-from compd.files.atomic_files import write_files
-from compd.files.output_file import check_replaceable
+from compd.files import check_replaceable, write_files
 from compd.fleet.recording_result import Command, FleetEstimate, RecordingResult
 
 if TYPE_CHECKING:

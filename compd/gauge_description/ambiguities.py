@@ -10,11 +10,11 @@ import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
+from compd.errors import Problem
 from compd.gauge_description.answers import Answers, factor_words
 from compd.gauge_description.reply_columns import ReplyColumn, varying_word
 from compd.gauge_description.unit_words import is_wire_unit
-from compd.errors import Problem
-from compd.lines.checksums import CHECKSUMS
+from compd.lines import CHECKSUMS
 
 # Decimals that a display of a length may have; more, and the last ones may be a checksum. In mm: 0.1 um.
 USUAL_DECIMALS: Mapping[str, int] = {"mm": 4, "um": 3, "nm": 3, "inch": 6, "mil": 4}

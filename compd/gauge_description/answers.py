@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from compd.gauge_description.capture import unescaped
 from compd.errors import CompdError, Problem
+from compd.gauge_description.capture import unescaped
 
 SKIPPED = "-"
 UNKNOWN: Literal["unknown"] = "unknown"

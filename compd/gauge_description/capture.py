@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from compd.clock import MonotonicClock
-from compd.gauge_tools.open_gauge import open_tapped_stream
-from compd.configuration.lines import ModbusRtuLine, SerialLine, TcpLine
+from compd.configuration import ModbusRtuLine, SerialLine, TcpLine
 from compd.errors import CompdError, Problem
 from compd.gauge import LineFault, Quality
-from compd.lines.stream import StreamLine
+from compd.gauge_tools import open_tapped_stream
+from compd.lines import StreamLine
 
 LONGEST_REPLY = 1024
 # What ends the lines of devices: CR, LF, ETX, EOT.

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
-from compd.lines.checksums import CHECKSUMS, ChecksumField
+from compd.lines import CHECKSUMS, ChecksumField
 
 # Bytes left out in front (STX, $) and behind (ETX, *). Manuals leave out none to three.
 MOST_LEFT_OUT = 3

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from compd.errors import Problem
 from compd.gauge_description.ambiguities import number_questions, text_questions
 from compd.gauge_description.answers import Answers
 from compd.gauge_description.capture import CapturedReply
@@ -18,7 +19,6 @@ from compd.gauge_description.observed_exchange import ObservedExchange
 from compd.gauge_description.read_back import read_back
 from compd.gauge_description.reply_columns import DescriptionError, terminator_of
 from compd.gauge_description.reply_form import escaped, reply_form
-from compd.errors import Problem
 from compd.plugins import GAUGES, load
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from compd.errors import Problem
 from compd.gauge_description.answers import SKIPPED, UNKNOWN, Answers
 from compd.gauge_description.observed_exchange import ObservedExchange
 from compd.gauge_description.unit_words import WIRE_UNITS
-from compd.errors import Problem
 from compd.units import unit_factor
 
 

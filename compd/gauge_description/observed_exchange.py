@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from compd.errors import Problem
 from compd.gauge_description.ambiguities import decimal_mark_of
 from compd.gauge_description.answers import Answers, factor_words
 from compd.gauge_description.checksum_search import checksum_end
 from compd.gauge_description.reply_columns import DescriptionError, ReplyColumn, columns_of
 from compd.gauge_description.unit_words import unit_before, unit_behind
-from compd.errors import Problem
 
 FEWEST_REPLIES = 3
 

@@ -8,11 +8,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from compd.gauge_description.capture import CapturedReply
-from compd.gauge_description.reply_columns import DescriptionError
-from compd.configuration.section import separate_errors
+from compd.configuration import separate_errors
 from compd.errors import Problem
 from compd.gauge import Gauge, LineFault, Quality
+from compd.gauge_description.capture import CapturedReply
+from compd.gauge_description.reply_columns import DescriptionError
 
 
 def read_back(options: Mapping[str, Any], driver: type[Gauge[Any]], captured: Sequence[CapturedReply]) -> list[str]:

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from compd.gauge_description.unit_words import is_wire_unit
 from compd.errors import CompdError, Problem
+from compd.gauge_description.unit_words import is_wire_unit
 
 _SIGNS = ("", "+", "-", " ")
 

@@ -11,15 +11,22 @@ from typing import Any
 
 import yaml
 
-from compd.gauge_tools.open_gauge import STALE_AFTER_S, GaugeTarget, PortArguments, line_settings
-from compd.configuration import load
-from compd.configuration.document import CONFIGURATION, Document, read_document
-from compd.configuration.lines import LineSettings, powered
-from compd.configuration.machine_configuration import SECTIONS, gauges_of, in_order
-from compd.configuration.section import validate
+from compd.configuration import (
+    CONFIGURATION,
+    SECTIONS,
+    Document,
+    LineSettings,
+    gauges_of,
+    in_order,
+    load,
+    powered,
+    read_document,
+    validate,
+)
 from compd.errors import ConfigurationError, Problem
-from compd.files.file_kind import FileKind
+from compd.files import FileKind
 from compd.gauge import Gauge, GaugeOptions
+from compd.gauge_tools.open_gauge import STALE_AFTER_S, GaugeTarget, PortArguments, line_settings
 
 LEARNED_GAUGE, LEARNED_LINE = "learned_gauge", "learned_line"
 _SECTIONS = {"gauges", "lines"}

@@ -11,25 +11,24 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from compd.clock import Clock
-from compd.configuration.lines import (
+from compd.configuration import (
     LineSettings,
     ModbusAsciiLine,
     ModbusRtuLine,
     ModbusTcpLine,
+    MqttLine,
+    OpcUaLine,
+    PushedLineSettings,
     SerialLine,
     TcpLine,
+    parse_yaml,
     powered,
+    separate_errors,
 )
-from compd.configuration.pushed_lines import MqttLine, OpcUaLine, PushedLineSettings
-from compd.configuration.section import separate_errors
-from compd.configuration.yaml_reader import parse_yaml
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, LineKind, Quality, Reading, bad
-from compd.lines import Line, open_line, open_stream
-from compd.lines.echo import explained
-from compd.lines.port import Port
-from compd.lines.stream import StreamLine
-from compd.live.acquisition.round_trigger import read_latched
+from compd.lines import Line, Port, StreamLine, explained, open_line, open_stream
+from compd.live.acquisition import read_latched
 from compd.plugins import GAUGES, load
 from compd.pushed_gauge import Message, PushedLine
 

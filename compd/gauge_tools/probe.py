@@ -12,13 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.clock import MonotonicClock
-from compd.gauge_tools.open_gauge import PortArguments, byte_line_settings, line_settings
-from compd.configuration.lines import powered
+from compd.configuration import powered
 from compd.gauge import Gauge, LineFault, Quality, Reading
-from compd.lines import open_line, open_stream
-from compd.lines.echo import explained
-from compd.lines.port import Port
-from compd.lines.stream import StreamLine, shown
+from compd.gauge_tools.open_gauge import PortArguments, byte_line_settings, line_settings
+from compd.lines import Port, StreamLine, explained, open_line, open_stream, shown
 from compd.plugins import GAUGES, load, names
 
 PROBE_TIMEOUT_S = 0.5

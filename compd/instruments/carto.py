@@ -21,7 +21,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.files.atomic_files import read_small_file
+from compd.files import read_small_file
 from compd.instruments.export import LENGTH_AXES, InstrumentExport, ReadOptions
 from compd.units import UNIT_KINDS, unit_factor
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from compd.errors import RecordingError
-from compd.files.file_kind import without_values
+from compd.files import without_values
 from compd.instruments.columns import to_export
 from compd.instruments.delimited import read_delimited
 from compd.instruments.export import SHAPES, InstrumentExport, ReadOptions

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from compd.errors import RecordingError
-from compd.files.atomic_files import read_small_file
+from compd.files import read_small_file
 from compd.instruments.export_problems import ExportProblems
 from compd.instruments.read_limits import ReadLimits
 

@@ -12,7 +12,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
-from compd.instruments.export import LENGTH_AXES, POSITION_AXES, InstrumentExport
+from compd.instruments import LENGTH_AXES, POSITION_AXES, InstrumentExport
 from compd.joining.assignment import Assignment, NoAssignment, repeat_distance_mm
 from compd.joining.by_distance import assign_by_distance
 from compd.joining.by_name import assign_by_name, check_names
@@ -24,8 +24,7 @@ from compd.joining.expected_places import expected_places_mm
 from compd.joining.joined_rows import joined_columns, joined_sidecar
 from compd.joining.misplaced_names import lines_text, listed, name_problems
 from compd.joining.plan_points import dwell_of_plan_rows, read_plan_points
-from compd.recording.recording import Recording
-from compd.recording.writer import write_recording
+from compd.recording import Recording, write_recording
 from compd.units import UM_PER_MM
 
 By = Literal["order", "name", "distance"]

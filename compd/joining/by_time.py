@@ -12,13 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.instruments.track import LENGTH, Track
+from compd.instruments import LENGTH, Track
 from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
-from compd.tables.columns import ATTITUDE_COLUMNS, DISTANCE_COLUMN, link_reference_column
-from compd.recording.recording import Recording
-from compd.recording.reference import Frame
-from compd.recording.sidecar import sidecar_contents
-from compd.recording.writer import write_recording
+from compd.recording import Frame, Recording, sidecar_contents, write_recording
+from compd.tables import ATTITUDE_COLUMNS, DISTANCE_COLUMN, link_reference_column
 
 # The machine stands still where the instrument shows less motion than this, or less than its own noise can imitate.
 STILL_MM = 0.001

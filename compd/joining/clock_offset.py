@@ -24,7 +24,7 @@ import numpy as np
 from scipy.signal import correlate, correlation_lags
 
 from compd.arrays import FloatArray
-from compd.instruments.track import Track
+from compd.instruments import Track
 from compd.joining.shared_motion import SharedMotion
 
 # The least that the scales must explain of the instrument's variance. On simulated tripods the right offset

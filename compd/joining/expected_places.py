@@ -9,10 +9,9 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.machine_builder import build_model
-from compd.model.kinematics.motion import Movement
-from compd.model.observer import observe
-from compd.model.prediction import predict
-from compd.tables.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.model import observe, predict
+from compd.model.kinematics import Movement
+from compd.tables import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.units import UM_PER_MM
 
 

@@ -8,14 +8,13 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from compd.comparison.open import read_with_machine
+from compd.comparison import read_with_machine
 from compd.errors import Problem, RecordingError
-from compd.instruments.export import InstrumentExport
-from compd.instruments.track import track_of
+from compd.instruments import InstrumentExport, track_of
 from compd.joining.assignment import REPEAT_MM
 from compd.joining.at_rest import RestJoin, match_at_rest
 from compd.joining.by_time import Instrument, JoinResult, match_by_time
-from compd.recording.reader import read_recording
+from compd.recording import read_recording
 
 JoinBy = Literal["time", "order", "name", "distance"]
 JOIN_BY: tuple[JoinBy, ...] = get_args(JoinBy)

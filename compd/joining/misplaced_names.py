@@ -8,7 +8,7 @@ import numpy as np
 
 from compd.arrays import IntArray
 from compd.errors import Problem
-from compd.instruments.export import InstrumentExport
+from compd.instruments import InstrumentExport
 from compd.joining.by_name import NameCheck
 from compd.joining.dwells import Dwell
 

@@ -11,8 +11,7 @@ from compd.errors import Problem, RecordingError
 from compd.joining.distances import LARGEST_RMS_MM
 from compd.joining.monotone_match import CLEAR_MARGIN, match_in_order
 from compd.plan_file import TIP_COLUMNS, WRITTEN_BY
-from compd.tables.csv_table import read_table
-from compd.tables.problem_list import ProblemList
+from compd.tables import ProblemList, read_table
 
 
 def read_plan_points(path: Path) -> FloatArray:

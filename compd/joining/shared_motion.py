@@ -8,7 +8,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.errors import Problem, RecordingError
-from compd.instruments.track import Track
+from compd.instruments import Track
 
 # Both must move by more than this for a pattern to be seen; ten times what counts as a reversal.
 MOTION_MM = 0.01

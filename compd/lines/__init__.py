@@ -3,6 +3,6 @@
 A port moves bytes (`port`); a line makes requests and replies of them (`stream`, `modbus_rtu`, `modbus_tcp`).
 """
 
-from compd.lines.open import Line, open_line, open_stream
+import lazy_loader
 
-__all__ = ["Line", "open_line", "open_stream"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

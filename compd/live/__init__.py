@@ -1,1 +1,5 @@
 """The daemon: gauges are read, setpoints computed at a fixed rate, clients served, runs recorded."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

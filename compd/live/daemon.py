@@ -20,47 +20,47 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock, MonotonicClock
-from compd.configuration import Configuration
-from compd.configuration.effect_files import listed_code
-from compd.configuration.lines import powered
-from compd.configuration.pushed_lines import PushedLineSettings
+from compd.configuration import Configuration, PushedLineSettings, listed_code, powered
 from compd.errors import DaemonError, StateError
-from compd.live.acquisition.acquisition import Acquisition
-from compd.live.acquisition.cross_checks.cross_checks import Votes
-from compd.live.loop.adopted_models import AdoptedModels
-from compd.live.loop.commands import Commands
-from compd.live.loop.machine_zero import MachineZero, load_zero
-from compd.live.loop.model_loader import ModelLoader, Models, try_model, warn_of_datum
-from compd.live.loop.ring_entries import SentSetpoint
-from compd.live.loop.timing import LoopTiming
-from compd.live.memory.poll_requests import PollRequests
-from compd.live.memory.shared_ring import SharedRing
-from compd.live.memory.trust_memory import TrustMemory
-from compd.live.loop.pipeline import build_pipeline
-from compd.live.system.port_names import changed_ports, port_names
-from compd.live.processes.acquisition_process import AcquisitionProcess
-from compd.live.memory.control import Control
-from compd.live.processes.loop_process import LoopProcess
-from compd.live.processes.service_process import ServiceProcess, StateLog
-from compd.live.service.acceptance import Acceptance
-from compd.live.service.budget_message import BudgetMessage
-from compd.live.service.last_readings import LastReadings
-from compd.live.service.listeners import Listeners
-from compd.live.service.loop_watch import LoopWatch
-from compd.live.service.machine_reply import machine_message
-from compd.live.service.messages import PROTOCOL
-from compd.live.service.model_keeping import ModelKeeping
-from compd.live.service.model_switch import ModelSwitch
-from compd.live.service.publisher import Publisher
-from compd.live.service.readings_message import ReadingsMessage
-from compd.live.service.request_context import RequestContext, TargetKeys
-from compd.live.service.requests import Requests
-from compd.live.service.status_message import StatusReport
-from compd.live.service.tcp_access import TcpAccess
-from compd.live.service.udp_sender import UdpSender
-from compd.live.service.zero_capture import ZeroCapture
+from compd.live.acquisition import Acquisition, Votes
+from compd.live.loop import (
+    AdoptedModels,
+    Commands,
+    LoopTiming,
+    MachineZero,
+    ModelLoader,
+    Models,
+    SentSetpoint,
+    build_pipeline,
+    load_zero,
+    try_model,
+    warn_of_datum,
+)
+from compd.live.memory import Control, PollRequests, SharedRing, TrustMemory
+from compd.live.processes import AcquisitionProcess, LoopProcess, ServiceProcess, StateLog
+from compd.live.service import (
+    PROTOCOL,
+    Acceptance,
+    BudgetMessage,
+    LastReadings,
+    Listeners,
+    LoopWatch,
+    ModelKeeping,
+    ModelSwitch,
+    Publisher,
+    ReadingsMessage,
+    RequestContext,
+    Requests,
+    StatusReport,
+    TargetKeys,
+    TcpAccess,
+    UdpSender,
+    ZeroCapture,
+    machine_message,
+)
+from compd.live.system import changed_ports, port_names
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
-from compd.model.machine import MachineModel
+from compd.model import MachineModel
 from compd.release import __version__
 
 _log = structlog.get_logger()

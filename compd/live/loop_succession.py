@@ -8,8 +8,8 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.live.system.child_process import ChildProcess
-from compd.live.processes.loop_process import LoopProcess, ModelChange
+from compd.live.processes import LoopProcess, ModelChange
+from compd.live.system import ChildProcess
 
 # For reading a model file and trying it; imports of an effect's author may take seconds.
 READY_WITHIN_S = 15.0

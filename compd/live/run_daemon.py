@@ -8,13 +8,11 @@ from compd.clock import MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import CompdError
 from compd.live.daemon import Daemon
-from compd.live.system.events import name_event
-from compd.live.system.journal import Journal
 from compd.live.supervisor import Ending, Supervisor
-from compd.live.system.systemd import Notifier
+from compd.live.system import Journal, Notifier, name_event
 from compd.log import hide_secrets_of_libraries, log_to_stderr
 from compd.machine_check import load_whole
-from compd.text.secrets import hide_secrets
+from compd.text import hide_secrets
 
 _log = structlog.get_logger()
 

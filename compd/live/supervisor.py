@@ -18,12 +18,10 @@ import structlog
 
 from compd.clock import Clock
 from compd.live.daemon import Daemon
-from compd.live.system.child_process import ChildProcess
-from compd.live.memory.control import Phase
-from compd.live.processes.heartbeat import Heartbeat, RestartDelay
-from compd.live.processes.loop_process import ModelChange
 from compd.live.loop_succession import LoopSuccession
-from compd.live.system.systemd import Notifier
+from compd.live.memory import Phase
+from compd.live.processes import Heartbeat, ModelChange, RestartDelay
+from compd.live.system import ChildProcess, Notifier
 
 # Between two looks at the beats of the processes.
 LOOK_EVERY_S = 0.1

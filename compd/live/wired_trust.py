@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from compd.configuration import Configuration
-from compd.configuration.operation import FRAME_DISTANCES
+from compd.configuration import FRAME_DISTANCES, Configuration
+from compd.live.acquisition import (
+    Judge,
+    MotionLimits,
+    QuantityLimits,
+    QuantityTrust,
+    ReadingTrust,
+    TrustSettings,
+    WiredLength,
+    quantity_limits,
+)
+from compd.live.loop import MachineWires, Wire
+from compd.live.memory import TrustMemory
+from compd.model import MachineModel
 from compd.stated_noise import SAME_VALUE_SIGMAS, tolerance_mm
-from compd.live.acquisition.gauge_trust import Judge
-from compd.live.acquisition.possible_motion import MotionLimits
-from compd.live.acquisition.quantity_trust import QuantityLimits, QuantityTrust
-from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
-from compd.live.acquisition.cross_checks.machine_view import WiredLength
-from compd.live.loop.wiring import MachineWires, Wire
-from compd.live.memory.trust_memory import TrustMemory
-from compd.live.acquisition.quantity_limits import quantity_limits
-from compd.model.machine import MachineModel
 from compd.units import UM_PER_MM, unit_of
 
 

@@ -6,10 +6,9 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from compd.arrays import FloatArray
-from compd.model.effects.deltas import Memories
-from compd.model.effects.effect_program import EffectProgram
+from compd.model.effects import EffectProgram, Memories
+from compd.model.kinematics import Motion, pack_motion, unpack_motion
 from compd.model.machine import MachineModel
-from compd.model.kinematics.motion import Motion, pack_motion, unpack_motion
 
 _NO_MEMORIES: Memories = {}
 

@@ -11,16 +11,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
-from compd.model.effects.effect import FittedEffect
-from compd.model.effects.effect_program import EffectProgram, build_program
-from compd.model.kinematics.frame import FrameGeometry, base_pose, distances_mm, solve_frame
+from compd.model.effects import AtZero, EffectProgram, FittedEffect, MachineConstants, MachineDetails, build_program
+from compd.model.kernels import MODEL, require
+from compd.model.kinematics import (
+    Arrangement,
+    Contact,
+    FrameGeometry,
+    Mechanism,
+    base_pose,
+    distances_mm,
+    forward_kinematics,
+    inverse_kinematics,
+    link_forces,
+    solve_frame,
+)
 from compd.rotation import compose, to_inner, to_outer
-from compd.model.kernels.solver_structures import MODEL
-from compd.model.kinematics.link_kinematics import Mechanism, forward_kinematics, inverse_kinematics
-from compd.model.effects.observations import AtZero, MachineConstants, MachineDetails
-from compd.model.kernels.solve_status import require
-from compd.model.kinematics.statics import link_forces
-from compd.model.kinematics.tool import Arrangement, Contact
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +34,7 @@ class MachineModel:
 
     frame : supports, plate points, base joints.  platform_joints_P_mm : (n, 3).
     revolute_axes_P : (3, 3) unit vectors for the tripod, (0, 3) for the hexapod.
-    arrangement : where the tool is.  joint_weights : (n, k), see `compd.model.kinematics.link_kinematics.joint_shortening`.
+    arrangement : where the tool is.  joint_weights : (n, k), see `compd.model.kinematics.joint_shortening`.
     weight_N : the moving platform's, at weight_at_P_mm (3,).
     effects : in their order.  covariance : (P, P) of all their fitted numbers jointly.
     constants : what effects need beyond the kinematics; None where none was computed, as for a model without effects.

@@ -8,14 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import BoolArray, FloatArray
-from compd.model.kinematics.frame import solve_frame
-from compd.model.kernels.joints import joint_shortening
-from compd.rotation import to_outer
-from compd.model.kinematics.link_kinematics import Pose, forward_kinematics, link_length_mm
+from compd.model.effects import MachineConstants, Observations
+from compd.model.kernels import joint_shortening
+from compd.model.kinematics import Movement, Pose, ToolOnPlatform, forward_kinematics, link_length_mm, solve_frame
 from compd.model.machine import MachineModel
-from compd.model.kinematics.motion import Movement
-from compd.model.effects.observations import MachineConstants, Observations
-from compd.model.kinematics.tool import ToolOnPlatform
+from compd.rotation import to_outer
 
 
 def observe(

@@ -7,14 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.effects.deltas import Deltas
-from compd.model.effects.effect import Port
-from compd.model.kinematics.frame import solve_frame
-from compd.model.kernels.joints import joint_shortening
-from compd.rotation import compose, rotation_matrix
-from compd.model.kinematics.link_kinematics import Mechanism, forward_kinematics, link_length_mm
+from compd.model.effects import Deltas, Observations, Port
+from compd.model.kernels import joint_shortening
+from compd.model.kinematics import Mechanism, forward_kinematics, link_length_mm, solve_frame
 from compd.model.machine import MachineModel
-from compd.model.effects.observations import Observations
+from compd.rotation import compose, rotation_matrix
 
 
 class Prediction(NamedTuple):

@@ -8,14 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effects.deltas import effect_deltas
-from compd.model.effects.effect import Memory
-from compd.model.effects.effect_basis import port_size
 from compd.model.effect_memory import EffectMemory
-from compd.model.kinematics.link_kinematics import Pose
+from compd.model.effects import Memory, Observations, effect_deltas, port_size
+from compd.model.kinematics import Movement, Pose, track_motion
 from compd.model.machine import MachineModel
-from compd.model.kinematics.motion import Movement, track_motion
-from compd.model.effects.observations import Observations
 from compd.model.observer import observe_at_pose
 
 

@@ -25,12 +25,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effects.effect import Port
-from compd.model.effects.effect_basis import port_size
-from compd.model.kinematics.frame import solve_frame
-from compd.model.kinematics.link_kinematics import Mechanism, Pose, closure_at
+from compd.model.effects import Observations, Port, port_size
+from compd.model.kinematics import Mechanism, Pose, closure_at, solve_frame
 from compd.model.machine import MachineModel
-from compd.model.effects.observations import Observations
 
 # Step of the central differences through the octahedron, whose sides are about 1 m: the difference's own error is of
 # order (1e-3 / 1e3)^2 = 1e-12, and rounding of coordinates, 1e-13 mm, makes 1e-10 of it.

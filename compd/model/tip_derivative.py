@@ -9,13 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effects.effect_basis import evaluate_basis
 from compd.model.effect_memory import EffectMemory
-from compd.model.kernels.solver_structures import RESULT, WORKSPACE
-from compd.model.kernels.tip_derivatives import set_tip_derivatives
+from compd.model.effects import Observations, evaluate_basis
+from compd.model.kernels import RESULT, WORKSPACE, set_tip_derivatives
+from compd.model.kinematics import Movement
 from compd.model.machine import MachineModel
-from compd.model.kinematics.motion import Movement
-from compd.model.effects.observations import Observations
 from compd.model.observer import observe
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effects.effect import Port
+from compd.model.effects import Port
 
 # The ports at which length gauges are read, in the order in which their variances are added up.
 GAUGE_PORTS: tuple[Port, ...] = ("scale", "joint", "frame")

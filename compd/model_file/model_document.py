@@ -31,14 +31,11 @@ import yaml
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from compd.configuration.section import Finite
-from compd.configuration.yaml_reader import decode, parse_yaml, read_text
+from compd.configuration import Finite, decode, parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem, StateError
-from compd.files.atomic_files import write_files
-from compd.files.checksum import CHECKSUM, checksum_of
-from compd.files.file_kind import FileKind
+from compd.files import CHECKSUM, FileKind, checksum_of, write_files
 from compd.release import __version__
-from compd.text.secrets import has_secret, holds_secret
+from compd.text import has_secret, holds_secret
 
 FORMAT = 3
 # By which a covariance may exceed what its variances allow: numbers are computed.

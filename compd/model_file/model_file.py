@@ -16,8 +16,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem, StateError
-from compd.model.effects.effect import Effect, FittedEffect
-from compd.model.effects.effect_needs import is_measured, needed_quantities
+from compd.model.effects import Effect, FittedEffect, is_measured, needed_quantities
 from compd.model.library import find_effect
 from compd.model_file.model_document import (
     Declaration,

@@ -12,10 +12,10 @@ import orjson
 from compd.gauge import Quality
 from compd.page.browsers import Browser, Browsers
 from compd.page.daemon_link import DaemonLink
+from compd.page.event_history import Moments
 from compd.page.fault_counts import FaultCounts
 from compd.page.history import History, Traces
 from compd.page.model_effects import ModelEffects
-from compd.page.event_history import Moments
 from compd.page.recordings import Recordings
 from compd.page.scene import scene
 

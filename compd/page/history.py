@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
-from compd.live.loop.states import state_named
 from compd.page.cadence import Cadence
 from compd.page.scene import moved_um
+from compd.setpoint_states import state_named
 
 Message = Mapping[str, Any]
 

@@ -12,8 +12,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from compd.configuration.yaml_reader import LARGEST_BYTES
-from compd.files.atomic_files import open_regular, read_descriptor
+from compd.configuration import LARGEST_BYTES
+from compd.files import open_regular, read_descriptor
 from compd.page.recordings import is_own
 
 # As `compd effect add --model my.model.yaml` writes them; copies beside recordings end otherwise.

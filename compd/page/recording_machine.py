@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from compd.configuration.shipped import load_machine
-from compd.recording.sidecar import read_sidecar
+from compd.configuration import load_machine
+from compd.recording import read_sidecar
 
 
 def machine_of(recording: Path, machine: Path | None) -> Path | None:

@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Scope
 
-from compd.text.json_text import nan_to_null
+from compd.text import nan_to_null
 
 LONGEST_BODY_BYTES = 8192
 LOOKS_ONLY = "this browser may look only"

@@ -10,9 +10,9 @@ from typing import get_args
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from compd.configuration.yaml_reader import parse_yaml, read_text
+from compd.configuration import parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem
-from compd.files.file_kind import FileKind
+from compd.files import FileKind
 from compd.page.guard import Role, Token, hashed, new_token
 
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from compd.clock import Clock
-from compd.live.service.connection_limits import WRONG_TOKEN_REST_S
+from compd.live.service import WRONG_TOKEN_REST_S
 
 # Addresses that wait. Where there are more, all wait: they are one person's.
 _MOST_ADDRESSES = 256

@@ -4,3 +4,7 @@ Each experiment is a module with `run` (the measurement), `reductions` and `pane
 (all of it, ready for print and page). `frame_experiment` compares equations (4) and (5) with the exact frame, and
 `frame_page` shows it. Nothing is tuned to hit the paper's numbers.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

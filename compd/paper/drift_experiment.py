@@ -11,10 +11,8 @@ from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.paper.gauge_log import GaugeLog
 from compd.paper.reproduction import Reduction, Reproduction
-from compd.report.page import COLOURS, Panel, style_figure
-from compd.simulation.truth.instruments import TRACKER
-from compd.simulation.truth.probing import probe_ball
-from compd.simulation.truth.world import World
+from compd.report import COLOURS, Panel, style_figure
+from compd.simulation import TRACKER, World, probe_ball
 from compd.units import UM_PER_MM
 
 HOUR_S = 3600.0
@@ -53,7 +51,7 @@ def run(configuration: Configuration, seed: int) -> DriftResult:
     return DriftResult(np.array(time_h), change_um, np.array(frame_degC))
 
 
-def reproduce(configuration: Configuration, seed: int) -> Reproduction:
+def reproduce_drift(configuration: Configuration, seed: int) -> Reproduction:
     """Run and evaluate the experiment on this machine; seed : of joints, weather and noise."""
     result = run(configuration, seed)
     return Reproduction("Figure 21: a ball on the surface plate during warm-up", reductions(result), panels(result))

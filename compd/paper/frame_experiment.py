@@ -14,17 +14,19 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Configuration
-from compd.configuration.operation import FRAME_DISTANCES
+from compd.configuration import FRAME_DISTANCES, Configuration
 from compd.machine_builder import build_model
-from compd.model.kinematics.frame import solve_frame
-from compd.model.kinematics.instantaneous import frame_difference, frame_jacobians, instantaneous_frame
-from compd.rotation import compose, rotation_matrix, to_outer
-from compd.model.kinematics.link_kinematics import forward_kinematics
-from compd.model.machine import MachineModel
+from compd.model import MachineModel
+from compd.model.kinematics import (
+    forward_kinematics,
+    frame_difference,
+    frame_jacobians,
+    instantaneous_frame,
+    solve_frame,
+)
 from compd.paper.gauge_log import GaugeLog
-from compd.simulation.truth.strengths import Strengths
-from compd.simulation.truth.world import World
+from compd.rotation import compose, rotation_matrix, to_outer
+from compd.simulation import Strengths, World
 from compd.units import UM_PER_MM
 
 # Largest of the nine changes, mm: from a hundredth, an ordinary day, to more than any frame survives.
@@ -87,7 +89,7 @@ class FrameResult:
     many: Cost
 
 
-def run(configuration: Configuration, seed: int) -> FrameResult:
+def run_frame_experiment(configuration: Configuration, seed: int) -> FrameResult:
     """Compare the two ways on this machine; seed : of the directions and of the warm-up."""
     model = build_model(configuration.geometry, configuration.wiring)
     directions = np.random.default_rng([seed, 45]).normal(size=(DIRECTIONS, 9))

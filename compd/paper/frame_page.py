@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from plotly.graph_objects import Figure
@@ -19,8 +20,7 @@ from compd.paper.frame_experiment import (
     crossing_mm,
     order,
 )
-from compd.report.page import COLOURS, Panel, check_page_path, style_figure, write_page
-from compd.report.page_table import PageTable
+from compd.report import COLOURS, PageTable, Panel, check_page_path, style_figure, write_page
 from compd.units import UM_PER_MM
 
 # Each cell but the first holds the median and the largest, over directions or, for the warm-up, over time.
@@ -29,6 +29,21 @@ _FOOTER = (
     "Equations (4) and (5) of T. Oiwa, Accuracy improvement of parallel kinematic machine, against the exact solution "
     "of equations (2) and (3). The warm-up is that of the simulated machine, which shares no code with the model."
 )
+
+
+class FrameTable(NamedTuple):
+    """The result as a table: `rows` stand under `head`; `sentences` say what the numbers mean."""
+
+    title: str
+    caption: str
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    sentences: list[str]
+
+
+def frame_table(result: FrameResult) -> FrameTable:
+    """The table of a terminal, and the same texts for the page."""
+    return FrameTable(title(result), table_caption(), HEAD, table_rows(result), sentences(result))
 
 
 def title(result: FrameResult) -> str:

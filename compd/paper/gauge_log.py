@@ -7,12 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation.compensation import compensate_cmm
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.configuration import Configuration
 from compd.machine_builder import build_model
-from compd.simulation.truth.frame import DISTANCES
-from compd.simulation.truth.world import World
+from compd.simulation import DISTANCES, World
 
 
 @dataclass

@@ -16,13 +16,8 @@ from compd.configuration import Configuration
 from compd.machine_builder import joint_weights
 from compd.paper.gauge_log import GaugeLog
 from compd.paper.reproduction import Reduction, Reproduction
-from compd.report.page import COLOURS, Panel, style_figure
-from compd.simulation.causes.catalogue import build_cause
-from compd.simulation.truth.cause import Cause
-from compd.simulation.truth.instruments import INTERFEROMETER
-from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.warm_up import Heat
-from compd.simulation.truth.world import World
+from compd.report import COLOURS, Panel, style_figure
+from compd.simulation import INTERFEROMETER, Cause, Heat, Mechanism, World, build_cause
 from compd.units import UM_PER_MM
 
 LINK = 0
@@ -114,7 +109,7 @@ def _measure_link(
     return LinkDifferences(axial_N, cold_um, warm_um, np.array(link_degC), np.array(warming_um))
 
 
-def reproduce(configuration: Configuration, seed: int) -> Reproduction:
+def reproduce_link(configuration: Configuration, seed: int) -> Reproduction:
     """Run and evaluate the experiment on this machine; seed : of joints, weather and noise."""
     result = run(configuration, seed)
     return Reproduction("Figure 18: scale unit against laser interferometer", reductions(result), panels(result))

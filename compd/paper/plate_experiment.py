@@ -12,10 +12,8 @@ from compd.arrays import FloatArray, rms
 from compd.configuration import Configuration
 from compd.paper.gauge_log import GaugeLog
 from compd.paper.reproduction import Reduction, Reproduction
-from compd.report.page import COLOURS, Panel, style_figure
-from compd.simulation.truth.instruments import TRACKER, ball_plate_mm
-from compd.simulation.truth.probing import probe_ball
-from compd.simulation.truth.world import World
+from compd.report import COLOURS, Panel, style_figure
+from compd.simulation import TRACKER, World, ball_plate_mm, probe_ball
 from compd.units import UM_PER_MM
 
 # Time that a person takes per ball; rounds over the whole plate, there and back.
@@ -63,7 +61,7 @@ def run(configuration: Configuration, seed: int) -> PlateResult:
     )
 
 
-def reproduce(configuration: Configuration, seed: int) -> Reproduction:
+def reproduce_plate(configuration: Configuration, seed: int) -> Reproduction:
     """Run and evaluate the experiment on this machine; seed : of joints, weather and noise."""
     result = run(configuration, seed)
     return Reproduction("Figure 20: distances between the balls of a 3D ball plate", reductions(result), panels(result))

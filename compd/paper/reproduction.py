@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compd.report.page import Panel, check_page_path, write_page
-from compd.report.page_table import PageTable
+from compd.report import PageTable, Panel, check_page_path, write_page
 
 HEAD = ("", "without", "with", "reduction", "the paper")
 _FOOTER = (

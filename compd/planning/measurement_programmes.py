@@ -9,19 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.planning.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
+from compd.comparison import AlignedRecording
 from compd.errors import Problem, RecordingError
-from compd.model.effects.effect import Effect
-from compd.model.effects.effect_needs import needed_quantities
-from compd.model.kinematics.link_kinematics import inverse_kinematics
-from compd.model.machine import MachineModel
-from compd.model.kinematics.motion import Movement
-from compd.model.effects.observations import MachineConstants, Observations
-from compd.model.observer import observe
-from compd.reference_conditions import REFERENCE_TEMPERATURE_degC
-from compd.model.kernels.solve_status import Reason
+from compd.model import MachineModel, observe
+from compd.model.effects import Effect, MachineConstants, Observations, needed_quantities
+from compd.model.kernels import Reason
+from compd.model.kinematics import Movement, inverse_kinematics
 from compd.plan_file import plan_row
+from compd.planning.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
+from compd.reference_conditions import REFERENCE_TEMPERATURE_degC
 
 # Places along each edge of the workspace's box.
 PLACES_PER_EDGE = 3

@@ -8,9 +8,17 @@ from typing import Any, Literal
 import numpy as np
 
 from compd.errors import CompdError, Problem
-from compd.instruments.writers.gcode import MARK, FeedAndDwell, write_gcode
-from compd.instruments.writers.target import TargetPoint, Way
-from compd.instruments.writers.target_list import CSV_MARK, SA_MARK, write_csv_targets, write_sa_targets
+from compd.instruments import (
+    CSV_MARK,
+    MARK,
+    SA_MARK,
+    FeedAndDwell,
+    TargetPoint,
+    Way,
+    write_csv_targets,
+    write_gcode,
+    write_sa_targets,
+)
 from compd.plan_file import NOT_SET, PURPOSE_COLUMN, SPEED_COLUMN, TIP_COLUMNS
 
 PlanFormat = Literal["plan", "sa", "csv", "gcode"]

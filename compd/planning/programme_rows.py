@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.model.effects.observations import Observations
+from compd.comparison import AlignedRecording
+from compd.model.effects import Observations
 
 # Times after a step, as shares of the time for which it is watched.
 WAITS = (0.0, 0.05, 0.15, 0.4, 1.0)

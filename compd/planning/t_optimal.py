@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.statistics.least_squares import solve_ridge
+from compd.statistics import solve_ridge
 
 # Ridge of the rival's refit, as a share of the diagonal of its normal equations: conditioning alone.
 RIDGE = 1e-9

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.optimize import linprog
 
 from compd.arrays import FloatArray
-from compd.instruments.writers.target import Way
-from compd.model.kinematics.link_kinematics import inverse_kinematics
-from compd.model.machine import MachineModel
-from compd.model.kernels.solve_status import Reason
+from compd.instruments import Way
+from compd.model import MachineModel
+from compd.model.kernels import Reason
+from compd.model.kinematics import inverse_kinematics
 from compd.plan_file import SPEED_COLUMN, TIP_COLUMNS
 
 # Travel of the slowest link before the place: an error of reversal has built up after a hand's width at most, and

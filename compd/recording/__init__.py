@@ -18,3 +18,7 @@ An empty cell is a missing value. A column's name ends in its unit. The format i
 Module `columns` has the names, units and decimals, `sidecar` the YAML; `writer` writes both files, `reader` reads and
 checks them, and `blocks` does so block by block; `convert` makes one table into the other.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

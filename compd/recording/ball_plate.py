@@ -10,10 +10,8 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.errors import Problem
-from compd.files.atomic_files import write_files
-from compd.tables.csv_table import read_table
-from compd.tables.problem_list import ProblemList, rows_text, values_text
-from compd.tables.table import Table
+from compd.files import write_files
+from compd.tables import ProblemList, Table, read_table, rows_text, values_text
 
 COLUMNS: Mapping[str, str] = {
     "ball": "number of the ball, each once",

@@ -13,11 +13,9 @@ from itertools import chain, pairwise
 from pathlib import Path
 
 from compd.configuration import Configuration
-from compd.tables import table_file
 from compd.recording.recording import Recording
 from compd.recording.recording_builder import RecordingBuilder
-from compd.tables.table_file import table_blocks, table_path
-from compd.tables.table import TableBlock
+from compd.tables import TableBlock, table_blocks, table_path
 
 BLOCK_ROWS = 100_000
 
@@ -50,11 +48,3 @@ def recording_blocks(
         recording = builder.build(block.table, block.problems, last=following is None)
         if recording.rows:
             yield recording
-
-
-def row_count(path: Path) -> int:
-    """Rows of a recording's table, empty ones with the others: Parquet says how many, lines of CSV are counted.
-
-    path : NAME.csv, NAME.parquet, or NAME.yaml. Raises RecordingError for a file that cannot be read.
-    """
-    return table_file.row_count(path)

@@ -24,9 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.tables.columns import DISTANCE_COLUMN, ID_COLUMNS
-from compd.tables.problem_list import ProblemList, rows_text, values_text
-from compd.tables.table import Table
+from compd.tables import DISTANCE_COLUMN, ID_COLUMNS, ProblemList, Table, rows_text, values_text
 
 
 class Limit(NamedTuple):

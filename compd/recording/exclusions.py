@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from compd.errors import CompdError, Problem, RecordingError
-from compd.files.atomic_files import write_files
+from compd.files import write_files
 from compd.recording.sidecar import Sidecar, read_sidecar
 
 _KEY = "excluded_rows"

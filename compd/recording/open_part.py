@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from compd.errors import Problem, RecordingError
-from compd.files.atomic_files import write_files
+from compd.files import write_files
 from compd.recording.parquet_writer import arrow_batch, arrow_schema, write_parquet
-from compd.tables.parquet_table import arrow_modules
+from compd.tables import arrow_modules
 
 ARROW = ".arrow"
 

@@ -23,22 +23,24 @@ from compd.recording.checks import (
     check_values,
     largest_joint_um,
 )
-from compd.tables.columns import (
+from compd.recording.layout import Layout, machine_problems, read_layout
+from compd.recording.recording import Recording
+from compd.recording.sidecar import Sidecar, read_sidecar
+from compd.tables import (
     ATTITUDE_COLUMNS,
     ATTITUDES,
     AXES,
     DISTANCE_COLUMN,
+    FIRST_ROW,
     FRAME_COLUMNS,
+    ProblemList,
+    Table,
     approach_columns,
     correct_names,
     joint_columns,
+    rows_text,
     scale_columns,
 )
-from compd.recording.layout import Layout, machine_problems, read_layout
-from compd.recording.recording import Recording
-from compd.recording.sidecar import Sidecar, read_sidecar
-from compd.tables.problem_list import ProblemList, rows_text
-from compd.tables.table import FIRST_ROW, Table
 from compd.travel_direction import RowDirections
 from compd.units import UM_PER_MM
 

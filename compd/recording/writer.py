@@ -12,11 +12,10 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.files.atomic_files import Content, write_files
-from compd.tables.columns import decimals, is_covariate, number_text, parse_name
+from compd.files import Content, write_files
 from compd.recording.parquet_writer import arrow_batch, arrow_schema, write_parquet
 from compd.recording.sidecar import sidecar_text
-from compd.tables.table_file import PARQUET, SUFFIXES
+from compd.tables import PARQUET, SUFFIXES, decimals, is_covariate, number_text, parse_name
 
 
 def write_recording(

@@ -9,11 +9,8 @@ import numpy as np
 from plotly.graph_objects import Figure
 
 from compd.arrays import rms
-from compd.comparison.comparison import Comparison
-from compd.comparison.covariate import covariates
-from compd.comparison.display_unit import format_error
-from compd.comparison.stream.streamed_comparison import StreamedComparison
-from compd.model_file.model_file import parameter_estimates
+from compd.comparison import Comparison, StreamedComparison, covariates, format_error
+from compd.model_file import parameter_estimates
 from compd.report.envelope_figure import plot_envelope
 from compd.report.figures import (
     plot_contributions,
@@ -25,7 +22,7 @@ from compd.report.figures import (
 from compd.report.page import Panel, write_page
 from compd.report.page_table import PageTable
 from compd.report.small_multiples import plot_residual_against
-from compd.text.numbers_as_text import number_text
+from compd.text import number_text
 
 HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all {rows}; a flat line at zero is right."
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import yaml
 
-from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding
-from compd.diagnosis.verdict import Diagnosis
-from compd.diagnosis.words.error_fall import ErrorFall
-from compd.diagnosis.words.phrases import (
+from compd.diagnosis import (
+    Diagnosis,
+    DiagnosisStep,
+    EmpiricalFinding,
+    ErrorFall,
     change_text,
     gross_texts,
     parameter_texts,
@@ -20,7 +21,7 @@ from compd.diagnosis.words.phrases import (
 )
 from compd.report.page_table import PageTable
 from compd.report.planned_rows import planned_rows_table
-from compd.text.numbers_as_text import chance_text, estimate_text, fall_text, number_text, percent_text
+from compd.text import chance_text, estimate_text, fall_text, number_text, percent_text
 
 # Columns of the YAML in a page and a terminal: lines that are not broken can be copied.
 YAML_WIDTH = 76

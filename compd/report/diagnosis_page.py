@@ -9,12 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.diagnosis.findings import EmpiricalFinding
-from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.verdict import Diagnosis
-from compd.diagnosis.words.error_fall import ErrorFall, error_fall
-from compd.diagnosis.words.summary_lines import summary_lines
-from compd.model.effects.effect import FittedEffect
+from compd.diagnosis import Diagnosis, EmpiricalFinding, ErrorFall, Holdout, error_fall, summary_lines
+from compd.model.effects import FittedEffect
 from compd.model.library import find_effect
 from compd.report.diagnosis_evidence import (
     candidates_table,

@@ -10,10 +10,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.verdict import Diagnosis
-from compd.diagnosis.words.error_fall import ErrorFall, error_fall
-from compd.diagnosis.words.summary_lines import WIDTH, summary_lines
+from compd.diagnosis import WIDTH, Diagnosis, ErrorFall, Holdout, error_fall, summary_lines
 from compd.plan_file import PURPOSE_COLUMN
 from compd.report.diagnosis_evidence import (
     candidates_table,

@@ -9,10 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.covariate import Covariate, covariates
-from compd.model.effects.effect import FittedEffect
-from compd.model.effects.effect_needs import needed_quantities
+from compd.comparison import AlignedRecording, Covariate, covariates
+from compd.model.effects import FittedEffect, needed_quantities
 from compd.report.error_part import ErrorPart
 from compd.report.small_multiples import axis_title
 from compd.units import unit_of

@@ -9,7 +9,7 @@ from plotly.graph_objects import Cone, Figure, Scatter, Scatter3d
 
 from compd.configuration import Configuration
 from compd.machine_builder import build_model, machine_details
-from compd.model.effects.effect import Constant, Effect, Parameter
+from compd.model.effects import Constant, Effect, Parameter
 from compd.report.effect_signature import (
     ASIDE_MM,
     FORCE_N,

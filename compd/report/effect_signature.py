@@ -10,15 +10,19 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError
-from compd.model.effects.deltas import effect_deltas
-from compd.model.effects.effect import Constant, Effect, FittedEffect, Parameter
-from compd.model.effects.effect_needs import needed_quantities, unmet_needs
-from compd.model.kinematics.link_kinematics import inverse_kinematics
-from compd.model.machine import MachineModel, machine_constants
-from compd.model.kinematics.motion import Movement, update_motion
-from compd.model.effects.observations import MachineDetails, Observations
-from compd.model.observer import observe
-from compd.model.prediction import predict
+from compd.model import MachineModel, machine_constants, observe, predict
+from compd.model.effects import (
+    Constant,
+    Effect,
+    FittedEffect,
+    MachineDetails,
+    Observations,
+    Parameter,
+    effect_deltas,
+    needed_quantities,
+    unmet_needs,
+)
+from compd.model.kinematics import Movement, inverse_kinematics, update_motion
 from compd.reference_conditions import REFERENCE_PRESSURE_hPa
 from compd.units import UM_PER_MM
 

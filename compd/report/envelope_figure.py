@@ -6,7 +6,7 @@ import numpy as np
 from plotly.graph_objects import Figure, Scatter
 from plotly.subplots import make_subplots
 
-from compd.comparison.stream.streamed_comparison import StreamedComparison
+from compd.comparison import StreamedComparison
 from compd.report.page import style_figure
 from compd.report.small_multiples import SERIES_COLOURS
 from compd.units import UNIT_KINDS

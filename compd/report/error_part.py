@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, rms
-from compd.comparison.comparison import Comparison
-from compd.statistics.least_squares import solve_least_squares
-from compd.model.effects.effect import FittedEffect
-from compd.model.sensitivity import link_residuals
+from compd.comparison import Comparison
+from compd.model import link_residuals
+from compd.model.effects import FittedEffect
+from compd.statistics import solve_least_squares
 from compd.units import UM_PER_MM
 
 # Effects that add to each link: where link lengths follow from the tip, they are seen best there.

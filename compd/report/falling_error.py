@@ -9,12 +9,9 @@ from typing import NamedTuple
 
 from plotly.graph_objects import Bar, Figure, Scatter
 
-from compd.diagnosis.holdout import Holdout
-from compd.diagnosis.verdict import Diagnosis
-from compd.diagnosis.words.error_fall import ErrorFall
-from compd.diagnosis.words.phrases import short_name
+from compd.diagnosis import Diagnosis, ErrorFall, Holdout, short_name
 from compd.report.page import COLOURS, style_figure
-from compd.text.numbers_as_text import number_text
+from compd.text import number_text
 
 # Letters of a name on one line beside its bar.
 NAME_WIDTH = 30

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from plotly.graph_objects import Figure, Scatter
 
-from compd.comparison.display_unit import format_error
-from compd.model_file.model_document import StoredModel
+from compd.comparison import format_error
+from compd.model_file import StoredModel
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
-from compd.text.numbers_as_text import number_text
+from compd.text import number_text
 
 LEDGER_HEAD = ("", "step", "fitted on", "before", "after", "floor", "unit", "date")
 

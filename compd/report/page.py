@@ -22,7 +22,7 @@ from plotly.graph_objects import Figure
 from plotly.offline import get_plotlyjs
 
 from compd.errors import CompdError, Problem
-from compd.files.output_file import check_replaceable
+from compd.files import check_replaceable
 from compd.release import __version__
 from compd.report.page_table import PageTable
 

@@ -9,8 +9,7 @@ from plotly.graph_objects import Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.comparison import Comparison
-from compd.comparison.covariate import Covariate
+from compd.comparison import Comparison, Covariate
 from compd.report.page import COLOURS, style_figure
 from compd.report.page_table import PageTable
 

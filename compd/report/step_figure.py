@@ -9,9 +9,9 @@ from plotly.graph_objects import Box, Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.comparison import Comparison
-from compd.diagnosis.words.error_fall import ErrorFall
-from compd.model.effects.effect import FittedEffect
+from compd.comparison import Comparison
+from compd.diagnosis import ErrorFall
+from compd.model.effects import FittedEffect
 from compd.report.driver import Driver, find_driver
 from compd.report.error_part import ErrorPart, error_part
 from compd.report.page import style_figure

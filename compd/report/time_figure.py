@@ -7,10 +7,8 @@ from plotly.graph_objects import Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
-from compd.diagnosis.verdict import Diagnosis
-from compd.diagnosis.words.error_fall import ErrorFall
-from compd.diagnosis.words.phrases import change_text
-from compd.recording.recording import Recording
+from compd.diagnosis import Diagnosis, ErrorFall, change_text
+from compd.recording import Recording
 from compd.report.page import COLOURS, style_figure
 from compd.report.small_multiples import SERIES_COLOURS, dot_style, thin
 from compd.units import UNIT_KINDS

@@ -13,3 +13,7 @@ causes    causes that can be hidden in it, one module per family; `catalogue` li
 campaign  recordings computed without real time: `simulated_recording.simulate_recording`
 wires     the world on real ports: `server.Simulation`, its lines and devices, its control socket and client
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from compd.files.file_kind import without_values
+from compd.files import without_values
 from compd.tables.problem_list import ProblemList, column_letters, rows_text, values_text
 from compd.tables.table import FIRST_ROW
 

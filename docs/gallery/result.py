@@ -14,12 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import compd
-from compd.cli.main import app
-from compd.configuration.shipped import shipped_configuration
-from compd.diagnosis.holdout import evaluate_holdout
-from compd.diagnosis.verdict import Diagnosis
-from compd.report.comparison_page import write_comparison_page
-from compd.report.diagnosis_page import write_diagnosis_page
+from compd.cli.app import app
+from compd.configuration import shipped_configuration
+from compd.diagnosis import Diagnosis, evaluate_holdout
+from compd.report import write_comparison_page, write_diagnosis_page
 from docs.gallery.cases import Case
 
 

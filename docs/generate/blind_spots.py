@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
-from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, BlindSpot, Figures, figures_of, shown_by
-from compd.configuration.shipped import load_machine
+from compd.commissioning import BLIND_SPOTS, DRIFT_UM, figures_of, shown_by
+from compd.commissioning.blind_spots import BlindSpot, Figures
+from compd.configuration import load_machine
 from docs.generate import fault_cells
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target
 from tests.injection.matrix import FAULTS

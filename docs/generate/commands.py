@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import typer
 
+from compd.cli.app import app
 from compd.cli.commands import PANELS
-from compd.cli.main import app
 from docs.generate.markdown import code, escape, fence, heading, join, link, prose, sentence, table, target
 
 INTRODUCTION = """\

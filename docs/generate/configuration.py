@@ -6,7 +6,7 @@ from collections import Counter
 
 from pydantic import TypeAdapter
 
-from compd.configuration.machine_configuration import SECTIONS
+from compd.configuration import SECTIONS
 from compd.configuration.plausible import PLAUSIBLE, PlausibleRange
 from compd.gauge import GaugeOptions
 from docs.generate.markdown import code, escape, heading, join, link, sentence, table, target, term

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from compd.comparison.criteria import ComparisonCriteria
-from compd.diagnosis.criteria import Criteria
+from compd.diagnosis import Criteria
 from compd.fleet.criteria import FleetCriteria
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target, term
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import takewhile
 from pathlib import Path
 
-from compd.configuration.shipped import shipped_effects
-from compd.model.effects.effect import Constant, Effect, Parameter
-from compd.model.library.effects_file import load_effects
+from compd.configuration import shipped_effects
+from compd.model.effects import Constant, Effect, Parameter
+from compd.model.library import load_effects
 from docs.generate.markdown import code, escape, fence, heading, join, link, sentence, table, target
 
 PAGE = "effect-files"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.model.effects.effect import PORTS, Constant, Effect, Parameter
+from compd.model.effects import PORTS, Constant, Effect, Parameter
 from compd.model.effects.effect_needs import NEEDS
 from compd.model.library import BUNDLED
 from docs.generate.markdown import code, escape, heading, join, link, sentence, table, target, term

@@ -6,8 +6,9 @@ from typing import Any
 
 import yaml
 
-from compd.gauge_tools.driver_catalogue import GIVEN_BY_THE_CONFIGURATION, catalogue, driver_text
 from compd.gauge import Gauge, GaugeOptions, Quality
+from compd.gauge_tools import catalogue
+from compd.gauge_tools.driver_catalogue import GIVEN_BY_THE_CONFIGURATION, driver_text
 from compd.plugins import GAUGES, load
 from docs.generate.configuration import keys_table
 from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table, target, term

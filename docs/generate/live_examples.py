@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compd.client import connect
-from compd.configuration import load
-from compd.configuration.shipped import shipped_configuration
+from compd.configuration import load, shipped_configuration
 from compd.demo.processes import Command, run_commands
 from compd.demo.session import wait_for_gauges
 from compd.live.service.requests import REQUESTS

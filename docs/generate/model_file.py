@@ -9,15 +9,23 @@ from typing import Any
 import numpy as np
 import yaml
 
-from compd.model.effects.effect import FittedEffect
-from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK, READING_PORTS
-from compd.model.formula.declaration import formula_effect
-from compd.model.formula.functions import FUNCTIONS, LAG
-from compd.model.formula.keys import FormulaDeclaration, FormulaParameter
+from compd.model.effects import FittedEffect
+from compd.model.formula import (
+    ANYWHERE,
+    FUNCTIONS,
+    LAG,
+    OF_LINK,
+    OF_READING,
+    PER_LINK,
+    FormulaDeclaration,
+    formula_effect,
+)
+from compd.model.formula.columns import READING_PORTS
+from compd.model.formula.keys import FormulaParameter
 from compd.model.formula.parser import ALLOWED, DEEPEST, LARGEST_EXPONENT
 from compd.model.library import find_effect
-from compd.model_file.model_document import EffectEntry, ModelDocument, ModelStep, ParameterEntry
-from compd.model_file.model_file import ModelFile
+from compd.model_file import ModelFile, ModelStep
+from compd.model_file.model_document import EffectEntry, ModelDocument, ParameterEntry
 from docs.generate.markdown import code, codes, escape, fence, heading, join, link, table, term
 from docs.generate.schema import ModelSchema, default_text
 

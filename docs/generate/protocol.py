@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import inspect
 
-from compd.configuration.operation import TargetSettings, TcpSocket
+from compd.configuration import TargetSettings, TcpSocket
 from compd.live.loop.packet_layout import PACKET_FIELDS, PACKET_SIZE
-from compd.live.loop.states import Mode
+from compd.live.service import PROTOCOL
 from compd.live.service.client_session import MAX_BEHIND_BYTES, MAX_READINGS_BEHIND_BYTES
+from compd.live.service.connection_limits import AUTH_WITHIN_S, IDLE_AFTER_S, MAX_CLIENTS, MAX_TCP_CLIENTS
 from compd.live.service.message_keys.message import ErrorKeys, SentMessage, VersionKeys
 from compd.live.service.message_keys.readings import ReadingsKeys
 from compd.live.service.message_keys.setpoint import SetpointKeys
 from compd.live.service.message_keys.status import StatusKeys
-from compd.live.service.messages import LARGEST_NUMBER, MAX_LINE_BYTES, PROTOCOL, ErrorCode
+from compd.live.service.messages import LARGEST_NUMBER, MAX_LINE_BYTES, ErrorCode
 from compd.live.service.order import OrderKeys
 from compd.live.service.request import Asker, Request
 from compd.live.service.requests import REQUESTS
-from compd.live.service.connection_limits import AUTH_WITHIN_S, IDLE_AFTER_S, MAX_CLIENTS, MAX_TCP_CLIENTS
+from compd.setpoint_states import Mode
 from docs.generate.live_examples import Exchange, exchanges, shown
 from docs.generate.markdown import code, escape, fence, heading, join, link, prose, table, target, term
 from docs.generate.schema import Key, ModelSchema

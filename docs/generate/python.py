@@ -6,19 +6,10 @@ import inspect
 
 import compd
 from compd.client import Client
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.comparison import Comparison
+from compd.comparison import AlignedRecording, Comparison
 from compd.configuration import Configuration
-from compd.diagnosis.findings import (
-    CandidateResult,
-    DiagnosisStep,
-    EmpiricalFinding,
-    NonlinearConstant,
-    ParameterEstimate,
-    Rival,
-)
-from compd.planning.measurement_plan import MeasurementPlan
-from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis import CandidateResult, Diagnosis, DiagnosisStep, EmpiricalFinding
+from compd.diagnosis.findings import NonlinearConstant, ParameterEstimate, Rival
 from compd.errors import (
     ConfigurationError,
     DaemonError,
@@ -28,9 +19,9 @@ from compd.errors import (
     RecordingError,
     StateError,
 )
-from compd.model.effects.effect import FittedEffect
-from compd.model_file.model_document import ModelStep
-from compd.model_file.model_file import EffectNumber, ModelFile
+from compd.model.effects import FittedEffect
+from compd.model_file import EffectNumber, ModelFile, ModelStep
+from compd.planning import MeasurementPlan
 from compd.simulation.campaign.simulate_campaign import CampaignFiles
 
 # What the functions return, and what is in it.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 
 
 def page() -> str:

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.configuration import load
-from compd.configuration.shipped import shipped_configuration
+from compd.configuration import load, shipped_configuration
 from compd.paper import frame_experiment
 from compd.paper.frame_experiment import SIZES_MM, FrameResult
 from compd.paper.frame_page import length_text
-from compd.report.page import COLOURS
+from compd.report import COLOURS
 from compd.units import UM_PER_MM
 
 PICTURE = Path(__file__).with_name("instantaneous-frame.svg")

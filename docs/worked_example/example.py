@@ -13,20 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.cli.main import app
-from compd.comparison.recording_comparison import compare
-from compd.comparison.neighbour_block import neighbour_blocks
-from compd.comparison.open import open_recording
-from compd.statistics.robust import robust_regression, trimmed_scale
-from compd.configuration.shipped import shipped_configuration
-from compd.diagnosis.candidates.candidates import Candidate
-from compd.diagnosis.recording_diagnosis import diagnose, explain_residual
+from compd.cli.app import app
+from compd.comparison import compare, neighbour_blocks, open_recording
+from compd.configuration import shipped_configuration
+from compd.diagnosis import Candidate, Diagnosis, DiagnosisProblem, diagnose
+from compd.diagnosis.recording_diagnosis import explain_residual
 from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.gross_rows import EXPONENT, RIDGE, ROUNDS
-from compd.diagnosis.search.problem import DiagnosisProblem
-from compd.diagnosis.verdict import Diagnosis
 from compd.model.library import load_library
+from compd.statistics import robust_regression, trimmed_scale
 
 SEED, HIDDEN = 5, "link_elasticity"
 # A second member that would lower the loss a little, and an effect that does nearly the same: for the scores.

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from compd.statistics.last_digit import last_digit_um
-from compd.statistics.replicates import replicate_pairs
-from compd.statistics.robust import SCALE_EFFICIENCY, TRIMMED, WINSORIZED, WINSORIZED_MEAN_SQUARE
+from compd.statistics import SCALE_EFFICIENCY, last_digit_um, replicate_pairs
+from compd.statistics.robust import TRIMMED, WINSORIZED, WINSORIZED_MEAN_SQUARE
 from compd.units import UM_PER_MM
 from docs.worked_example.sheets import AXES, FIRST, Sheets
 from docs.worked_example.spreadsheet import Address, column_letters

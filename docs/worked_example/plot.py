@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
-from compd.report.page import COLOURS
+from compd.report import COLOURS
 
 INK, SOFT, GRID = "#1c2126", "#555c64", "#e3e7eb"
 

@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 
 from compd.comparison.criteria import ComparisonCriteria
-from compd.diagnosis.criteria import Criteria
+from compd.diagnosis import Criteria
 from docs.worked_example.sheets import AXES, Sheets
 from docs.worked_example.spreadsheet import Address
 

@@ -8,8 +8,8 @@ from typing import Literal, NamedTuple, Self, cast
 
 from pydantic import Field, model_validator
 
-from compd.lines.checksums import CHECKSUMS, ChecksumField, ChecksumKind
-from compd.text.escapes import unescape
+from compd.lines import CHECKSUMS, ChecksumField, ChecksumKind
+from compd.text import unescape
 from compd_drivers.exchange import ExchangeOptions, Seconds
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, repeated
 from compd_drivers.number_form import DecimalMark

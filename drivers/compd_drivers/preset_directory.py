@@ -16,9 +16,9 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from compd.configuration.document import Document, Location, read_document
+from compd.configuration import Document, Location, read_document
 from compd.errors import ConfigurationError, PluginError, Problem
-from compd.files.file_kind import FileKind
+from compd.files import FileKind
 from compd.gauge import Gauge
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd_drivers.preset import Preset

@@ -36,8 +36,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from random import Random
 from typing import Literal, cast
 
-from compd.lines.checksums import CHECKSUMS, ChecksumField, ChecksumKind
-from compd.text.escapes import unescape
+from compd.lines import CHECKSUMS, ChecksumField, ChecksumKind
+from compd.text import unescape
 from compd_drivers.number_form import DecimalMark, FactorWords, NumberForm, characters
 
 OPEN_LENGTH = 32  # bytes of a number without width: more than any instrument sends

@@ -60,7 +60,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
-from compd.text.escapes import unescape
+from compd.text import unescape
 from compd_drivers.ascii_description import Description, ErrorReply, PollForm, SerialAsciiOptions
 from compd_drivers.exchange import MenuSilence, ask, nothing_behind, receive, receive_line
 from compd_drivers.reply_format import ReplyFormat

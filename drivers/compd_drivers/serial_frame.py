@@ -28,7 +28,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 from pydantic import Field, model_validator
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
-from compd.lines.checksums import CHECKSUMS, ChecksumKind
+from compd.lines import CHECKSUMS, ChecksumKind
 from compd_drivers.exchange import ExchangeOptions, ask, following, nothing_behind, receive
 from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, not_measured, repeated
 

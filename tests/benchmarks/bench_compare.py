@@ -17,8 +17,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.model.kinematics.link_kinematics import closure_at
+from compd.comparison import AlignedRecording
+from compd.model.kinematics import closure_at
 from tests.benchmarks.figures import show
 from tests.support.measured import aligned, gauges, hidden, record
 

@@ -9,13 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from compd.gauge import good
-from compd.live.loop.commands import Target
-from compd.live.loop.model_loader import LiveModel, Models
-from compd.live.system.realtime import QuietCollector
-from compd.model.effects.effect import FittedEffect
-from compd.model.effects.effect_needs import needed_quantities
+from compd.live.loop import LiveModel, Models, Target
+from compd.live.system import QuietCollector
+from compd.model import GaugeNoise
+from compd.model.effects import FittedEffect, needed_quantities
 from compd.model.library import load_library
-from compd.model.uncertainty import GaugeNoise
 from tests.benchmarks.figures import median_and_p99, show
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
 

@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.diagnosis import diagnose
 from compd.model.library import load_library
 from tests.benchmarks.figures import show
 from tests.support.hidden_effects import record_with_effects

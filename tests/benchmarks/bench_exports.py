@@ -9,8 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from compd.instruments.export import ReadOptions
-from compd.instruments.read import read_export
+from compd.instruments import ReadOptions, read_export
 from tests.benchmarks.figures import show
 
 ROWS = 1_000_000

@@ -16,13 +16,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from compd.fleet import Examination, examination, find_recordings
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import outcomes
-from compd.fleet.machine_examination import Examination, examination
 from compd.fleet.examine import BATCH
 from compd.fleet.fleet_recording import FleetRecording
-from compd.fleet.recordings import find_recordings
-from compd.simulation.campaign.simulate_campaign import simulate_campaign
+from compd.simulation import simulate_campaign
 from tests.benchmarks.figures import show
 
 # Recordings that are simulated; the others are copies.

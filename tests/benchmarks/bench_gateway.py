@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.clock import MonotonicClock
-from compd.configuration.lines import ModbusTcpLine
+from compd.configuration import ModbusTcpLine
 from compd.gauge import Gauge
-from compd.live.acquisition.acquisition import Acquisition
-from compd.live.memory.latest import Latest
+from compd.live.acquisition import Acquisition
+from compd.live.memory import Latest
 from compd.plugins import GAUGES, load
 from tests.benchmarks.figures import quiet, show
 from tests.support.serial_gateway import SerialGateway, serial_gateway

@@ -19,11 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation.values import GaugeValues, WarmStart
-from compd.model.kinematics.frame import distances_mm, solve_frame
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.model.kinematics import distances_mm, forward_kinematics, inverse_kinematics, solve_frame
 from compd.rotation import to_inner
-from compd.model.kinematics.link_kinematics import forward_kinematics, inverse_kinematics
 from tests.benchmarks.figures import median_and_p99, show
 from tests.support.model_machines import tripod
 

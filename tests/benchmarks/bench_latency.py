@@ -16,7 +16,7 @@ from pathlib import Path
 from compd.clock import Clock
 from compd.gauge import good
 from compd.live import daemon as daemon_module
-from compd.live.memory.latest import Latest
+from compd.live.memory import Latest
 from tests.benchmarks.bench_loop import configuration
 from tests.benchmarks.figures import median_and_p99, quiet, show
 from tests.support.live_machine import RAW_AT_ZERO_MM

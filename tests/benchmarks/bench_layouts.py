@@ -32,15 +32,13 @@ from typing import Any
 
 import numpy as np
 
-from compd.configuration.operation import LoopSettings
+from compd.configuration import LoopSettings
 from compd.gauge import Quality, Reading, bad, good
+from compd.live.loop import CycleInputs, CycleState, Setpoint, step
+from compd.live.loop.setpoint import SetpointValues
+from compd.live.memory import Readings, Snapshot
 from compd.live.system import realtime
-from compd.live.loop.cycle import step
-from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.setpoint import Setpoint, SetpointValues
-from compd.live.loop.states import Mode, State
-from compd.live.memory.latest import Snapshot
-from compd.live.memory.readings import Readings
+from compd.setpoint_states import Mode, State
 from tests.benchmarks.bench_loop import PRIORITY, BusyDrivers, load_beside
 from tests.benchmarks.figures import quiet, show
 from tests.support.live_machine import machine

@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from compd.client import connect
-from compd.live.loop.states import State
+from compd.page import Token
 from compd.page.broadcast import LIVE_HZ, Broadcast
 from compd.page.browsers import Browsers
-from compd.page.guard import Token
 from compd.page.recordings import Recordings
 from compd.page.server import STATIC
+from compd.setpoint_states import State
 from tests.benchmarks.figures import quiet, show
 from tests.support.event_stream import EventStream
 from tests.support.hand_clock import HandClock

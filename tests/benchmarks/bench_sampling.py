@@ -24,18 +24,13 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.commissioning.line_budget import Pace, serial_pace
 from compd.configuration import Configuration, load
-from compd.stated_noise import tolerance_mm
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
-from compd.live.loop.cycle import step
-from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import Models
-from compd.live.memory.latest import Snapshot
-from compd.live.memory.readings import Readings
-from compd.live.loop.pipeline import build_pipeline
-from compd.simulation.truth.world import World
+from compd.live.loop import CycleInputs, CycleSettings, CycleState, MachineZero, Models, build_pipeline, step
+from compd.live.memory import Readings, Snapshot
+from compd.simulation import World
+from compd.stated_noise import tolerance_mm
 from tests.benchmarks.figures import show
 from tests.support.paths import CONFIG
 

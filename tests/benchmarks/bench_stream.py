@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.model_file.model_file import ModelFile
+from compd.model_file import ModelFile
 from tests.benchmarks.bench_compare import COMMAND, Cost, cost
 from tests.benchmarks.figures import show
 from tests.support.measured import SIGMA_UM, gauges, hidden, record, tripod

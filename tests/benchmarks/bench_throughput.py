@@ -23,13 +23,13 @@ from typing import Any, NamedTuple
 
 from compd.clock import MonotonicClock
 from compd.commissioning.line_budget import LATENCY_TIMER_S, budget_of_line, serial_pace
-from compd.configuration.lines import ModbusRtuLine
+from compd.configuration import ModbusRtuLine
 from compd.gauge import Gauge
 from compd.lines import open_line
 from compd.lines.modbus_rtu import crc16
-from compd.live.acquisition.acquisition import Acquisition
-from compd.live.memory.latest import Latest
-from compd.live.system.realtime import sharpen_timers
+from compd.live.acquisition import Acquisition
+from compd.live.memory import Latest
+from compd.live.system import sharpen_timers
 from compd.plugins import GAUGES, load
 
 SECONDS = 4.0  # of measuring per row

@@ -13,7 +13,7 @@ import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
 
-from compd.fleet.machine_examination import examination
+from compd.fleet import examination
 from compd.live import daemon as daemon_module
 from tests.benchmarks import bench_fleet, bench_kilohertz, bench_stream
 from tests.benchmarks.bench_cycle import EFFECTS, whole_cycles

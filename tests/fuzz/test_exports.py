@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compd.errors import RecordingError
-from compd.instruments.export import ReadOptions
-from compd.instruments.read import read_export
+from compd.instruments import ReadOptions, read_export
 from tests.fuzz.bounds import examples, is_told, refusal
 from tests.fuzz.mutations import changed_bytes
 

@@ -10,11 +10,9 @@ from hypothesis import strategies as st
 
 from compd.configuration import load
 from compd.errors import CompdError, ConfigurationError, RecordingError
-from compd.model.library.effects_file import load_effects
-from compd.model_file.model_file import read_model_file
-from compd.recording.blocks import recording_blocks
-from compd.recording.convert import convert_recording
-from compd.recording.reader import read_recording
+from compd.model.library import load_effects
+from compd.model_file import read_model_file
+from compd.recording import convert_recording, read_recording, recording_blocks
 from tests.fuzz.bounds import examples, is_told, refusal
 from tests.fuzz.mutations import ALIASES, BOMBS, changed_binary, changed_bytes
 from tests.support.live_models import file_with

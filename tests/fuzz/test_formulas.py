@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compd.errors import ConfigurationError
-from compd.model.formula.functions import FUNCTIONS
+from compd.model.formula import FUNCTIONS
 from compd.model.formula.parser import parse
 from tests.fuzz.bounds import examples, is_told, refusal
 from tests.support.formulas import written

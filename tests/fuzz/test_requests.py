@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compd.errors import Problem, StateError
-from compd.live.loop.commands import Commands
+from compd.live.loop import Commands
+from compd.live.service import RequestContext, Requests, TargetKeys
 from compd.live.service.client_session import ClientSession
 from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError
-from compd.live.service.request_context import RequestContext, TargetKeys
-from compd.live.service.requests import REQUESTS, SENT_MESSAGES, Requests
+from compd.live.service.requests import REQUESTS, SENT_MESSAGES
 from tests.fuzz.bounds import examples
 
 # Answered by the next setpoint, or later.

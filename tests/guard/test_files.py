@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from compd.comparison.open import open_recording
+from compd.comparison import open_recording
 from compd.configuration import load
-from compd.live.loop.machine_zero import load_zero
+from compd.live.loop import load_zero
 from compd.machine_builder import build_model
-from compd.model_file.model_file import read_model_file
+from compd.model_file import read_model_file
 from tests.support.live_machine import Machine
 
 FILES = Path(__file__).parent / "files"

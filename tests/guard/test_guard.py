@@ -16,8 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.live.record.compared_table import differing_cells
-from compd.live.record.replay import RecordedCycles, replay_cycles
+from compd.live.record import RecordedCycles, differing_cells, replay_cycles
 from tests.support.command import run_in_process
 from tests.support.live_machine import machine
 from tests.support.paths import SHARED

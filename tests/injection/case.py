@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.injection.rig import InjectedMachine
 
 # At rest without a fault the largest error of thousands of valid setpoints is 0.3 um: gauge noise.

@@ -22,7 +22,7 @@ import yaml
 
 from compd.demo.processes import START_TIMEOUT_S, Command, run_commands
 from compd.errors import DaemonError
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.injection.clients import attacking
 from tests.injection.ends import LOOPBACK
 from tests.injection.injector import Injector

@@ -10,7 +10,7 @@ from typing import Any
 
 from compd.client import Client
 from compd.errors import DaemonError
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.injection.beginnings import REST_MM
 from tests.injection.case import Case, Way
 from tests.injection.cases_of_processes import CLIENTS

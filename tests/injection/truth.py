@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from compd.errors import DaemonError
-from compd.simulation.wires.control_client import ControlClient
+from compd.simulation import ControlClient
 from tests.support.watching import PATIENCE_S, until
 
 # For so long after a motion a setpoint may rest on readings from the motion: two polls of the slowest gauge.

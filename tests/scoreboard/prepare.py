@@ -11,22 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Configuration, load
-from compd.configuration.shipped import shipped_configuration
-from compd.recording.sidecar import sidecar_contents
-from compd.recording.writer import write_recording
+from compd.configuration import Configuration, load, shipped_configuration
+from compd.recording import sidecar_contents, write_recording
+from compd.simulation import FULLY_MEASURED, TRACKER, AirAtZero, Cause, CauseSizer, Mechanism, build_cause
 from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import CampaignPlan, draw_campaign_plan
 from compd.simulation.campaign.simulated_recording import OUTLIER_SHARE
-from compd.simulation.campaign.sizing import CauseSizer
-from compd.simulation.causes.catalogue import build_cause
 from compd.simulation.causes.hidden_cause import HiddenCause, answer
 from compd.simulation.causes.sudden_change import NoCause, SuddenChange
-from compd.simulation.truth.cause import Cause
-from compd.simulation.truth.instruments import TRACKER
-from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.strengths import FULLY_MEASURED
-from compd.simulation.truth.weather import AirAtZero
 from tests.scoreboard import recording_faults as faults
 from tests.scoreboard.cases import THERMOMETERS, Case
 from tests.scoreboard.expectation import expectation

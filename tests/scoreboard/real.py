@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from compd.configuration.shipped import shipped_effects
+from compd.configuration import shipped_effects
 from tests.scoreboard.expectation import Expectation
 from tests.support.paths import SHARED
 

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compd.diagnosis.criteria import Criteria
+from compd.diagnosis import Criteria
 from tests.scoreboard.parallel import append_results, read_results
 from tests.scoreboard.scoring import Result, score
 from tests.scoreboard.trial import prepared, read_answer, run

@@ -9,16 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
-from compd.comparison.open import open_recording
-from compd.comparison.shape_search import search_constants
-from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.comparison import AlignedRecording, compare, open_recording, search_constants
+from compd.diagnosis import Criteria, diagnose
 from compd.errors import CompdError
-from compd.model.effects.effect import Effect, FittedEffect
-from compd.model.library import load_library
-from compd.model.library.effects_file import load_effects
+from compd.model.effects import Effect, FittedEffect
+from compd.model.library import load_effects, load_library
 
 ANSWER = "answer.json"
 # The family for which it is computed what the true effects, fitted, leave on the other recording: a bound, set by the

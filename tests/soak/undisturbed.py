@@ -18,16 +18,12 @@ from typing import Any
 
 from compd.configuration import Configuration, load
 from compd.gauge import Channel, Gauge, Quality, Reading, good
+from compd.live.acquisition import LOOK_EVERY_S, Votes
 from compd.live.acquisition.polled_gauge import PolledGauge
-from compd.live.acquisition.cross_checks.cross_checks import LOOK_EVERY_S, Votes
-from compd.live.loop.commands import Commands
-from compd.live.loop.cycle import step
-from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.memory.trust_memory import Doubt
-from compd.live.loop.pipeline import build_pipeline
+from compd.live.loop import Commands, CycleInputs, CycleState, MachineZero, build_pipeline, step
+from compd.live.memory import Doubt
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
-from compd.simulation.truth.world import World
+from compd.simulation import World
 from compd.simulation.wires.sensing import Sensing
 
 # All gauges are polled one after the other, a round in this time, s; now and then the computer is late.

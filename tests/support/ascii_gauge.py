@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines.stream import StreamLine
+from compd.lines import StreamLine
 from compd_drivers.serial_ascii import SerialAscii
 from tests.support.wire_rig import InstantClock, ScriptedPort
 

@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.diagnosis.candidates.candidates import Candidate
-from compd.diagnosis.criteria import Criteria
+from compd.diagnosis import Candidate, Criteria, SubsetLosses
 from compd.diagnosis.search.regression import RegressionData, Regressors
-from compd.diagnosis.search.subset_losses import SubsetLosses
 from compd.model.library import load_library
 
 ROWS, COORDINATES = 240, 3

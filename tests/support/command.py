@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 
 
 def run_in_process(*arguments: str) -> str:

@@ -12,18 +12,17 @@ from typing import Any
 
 import numpy as np
 
+from compd.comparison import AlignedRecording, Comparison, compare
 from compd.comparison.alignment.align_recording import align_recording
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
-from compd.comparison.comparison import Comparison
 from compd.comparison.noise_floor import NoiseFloor
-from compd.diagnosis.findings import DiagnosisStep, EmpiricalFinding, ParameterEstimate, Rival
-from compd.diagnosis.verdict import Diagnosis, Verdict
+from compd.diagnosis import Diagnosis, DiagnosisStep, EmpiricalFinding
+from compd.diagnosis.findings import ParameterEstimate, Rival
+from compd.diagnosis.verdict import Verdict
 from compd.diagnosis.words.summary import summary
-from compd.model.effects.effect import Effect, FittedEffect
-from compd.model.formula.declaration import formula_effect
+from compd.model.effects import Effect, FittedEffect
+from compd.model.formula import formula_effect
 from compd.model.library import load_library
-from compd.recording.reader import read_recording
+from compd.recording import read_recording
 from tests.support.measured import aligned as align_tripod
 from tests.support.measured import gauges, record
 

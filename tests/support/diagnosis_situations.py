@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from compd.diagnosis import Diagnosis
 from compd.diagnosis.findings import ConstantFinding, GrossRows, UntestedEffect
-from compd.diagnosis.verdict import Diagnosis
 from tests.support.diagnoses import (
     FRAME,
     Noise,

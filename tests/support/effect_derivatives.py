@@ -7,10 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effects.deltas import split_by_port
-from compd.model.effects.effect import Effect, Port
-from compd.model.effects.observations import Observations
-from compd.model.sensitivity import Sensitivity
+from compd.model import Sensitivity
+from compd.model.effects import Effect, Observations, Port, split_by_port
 
 
 def effect_sensitivity(

@@ -9,15 +9,11 @@ import numpy as np
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from compd.model.effects.deltas import effect_deltas
-from compd.model.effects.effect import Effect
-from compd.model.kinematics.link_kinematics import inverse_kinematics
+from compd.model import MachineModel, machine_constants, observe
+from compd.model.effects import Effect, MachineDetails, Observations, effect_deltas
+from compd.model.kinematics import Movement, inverse_kinematics
 from compd.model.library import load_library
 from compd.model.library.scale import PERIODS_MM
-from compd.model.machine import MachineModel, machine_constants
-from compd.model.kinematics.motion import Movement
-from compd.model.effects.observations import MachineDetails, Observations
-from compd.model.observer import observe
 from tests.support.model_machines import Floats, hexapod, tips, tripod
 
 DETAILS = MachineDetails(plate_thickness_mm=200.0, scale_signal_period_mm=0.020)
@@ -111,7 +107,7 @@ def constants_of(effect: Effect) -> dict[str, float]:
 
 def delta_mm(id_: str, rows: Observations, *theta: float, **shape: float) -> Floats:
     """What one effect adds at its first port, (N, size), for these numbers."""
-    from compd.model.effects.effect import FittedEffect
+    from compd.model.effects import FittedEffect
 
     effect = LIBRARY[id_]
     found, _ = effect_deltas(FittedEffect(effect, np.array(theta), shape), rows)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from compd.recording.writer import write_recording
+from compd.recording import write_recording
 
 Floats = NDArray[np.float64]
 

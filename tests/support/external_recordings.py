@@ -10,14 +10,13 @@ import numpy as np
 import yaml
 
 from compd.arrays import FloatArray
+from compd.comparison import AlignedRecording
 from compd.comparison.alignment.align_recording import align_recording
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.model.effects.effect import Effect
-from compd.model.formula.declaration import formula_effect
-from compd.model.kinematics.motion import Movement
-from compd.model.effects.observations import Observations
-from compd.model.observer import observe_external
-from compd.recording.reader import read_recording
+from compd.model import observe_external
+from compd.model.effects import Effect, Observations
+from compd.model.formula import formula_effect
+from compd.model.kinematics import Movement
+from compd.recording import read_recording
 
 SIGMA_UM = 0.5
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.recording.writer import write_recording
+from compd.comparison import AlignedRecording
+from compd.recording import write_recording
 from tests.support.measured import SIGMA_UM, Floats, aligned, gauges, tips_mm, tripod
 
 DISTANCE = {"quantity": "distance", "sigma_um": SIGMA_UM}

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from compd.fleet.recording_result import FleetEstimate, RecordingResult
+from compd.fleet import RecordingResult
+from compd.fleet.recording_result import FleetEstimate
 
 BEGAN = datetime(2026, 1, 5, 8, tzinfo=UTC)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from compd.model.effects.effect import Effect
-from compd.model.formula.declaration import formula_effect
+from compd.model.effects import Effect
+from compd.model.formula import formula_effect
 
 
 def written(formula: str | dict[str, str], port: str = "link", parameters: str = "k", **more: Any) -> Effect:

@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.comparison import AlignedRecording
 from compd.comparison.alignment.align_recording import align_recording
-from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.configuration import load
-from compd.configuration.shipped import shipped_configuration
-from compd.model.effects.effect import FittedEffect
+from compd.comparison.alignment.aligned_recording import effect_deltas
+from compd.configuration import load, shipped_configuration
+from compd.model.effects import FittedEffect
 from compd.model.library import load_library
-from compd.recording.reader import read_recording
-from compd.recording.writer import write_recording
+from compd.recording import read_recording, write_recording
 
 LIBRARY = load_library()
 NOISE_UM = 0.15

@@ -22,8 +22,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.instruments.writers.registry import FORMATS
-from compd.instruments.writers.samples import LENGTH, POSITION, Samples
+from compd.instruments import FORMATS, Samples
+from compd.instruments.writers.samples import LENGTH, POSITION
 from compd.units import UM_PER_MM
 
 # The recording's clock is ahead of the instrument's by this.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from compd.simulation.campaign.simulate_campaign import simulate_campaign
+from compd.simulation import simulate_campaign
 from tests.support.instrument_files import split_campaign, write_export
 
 # Recordings of the gauges: as a machine records them, and with the ids of the places.

@@ -6,12 +6,8 @@ from dataclasses import replace
 
 from compd.configuration import Configuration, load
 from compd.gauge import Quality, bad, good
-from compd.live.loop.commands import Commands
-from compd.live.loop.cycle import step
-from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.states import State
-from compd.live.loop.pipeline import build_pipeline
+from compd.live.loop import Commands, CycleInputs, CycleState, MachineZero, build_pipeline, step
+from compd.setpoint_states import State
 from tests.support.paths import CONFIG
 
 RATE_HZ = 200

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.live.loop.model_loader import Models
-from compd.model.effects.effect import FittedEffect
+from compd.live.loop import Models
+from compd.model.effects import FittedEffect
 from compd.model.library import find_effect
-from compd.model_file.model_file import ModelFile
+from compd.model_file import ModelFile
 from tests.support.live_machine import Machine
 
 

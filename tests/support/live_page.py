@@ -18,7 +18,7 @@ from playwright.sync_api import sync_playwright
 
 from compd.demo.live import take_zero
 from compd.demo.processes import Command, run_commands
-from compd.simulation.wires.control_client import ControlClient
+from compd.simulation import ControlClient
 from tests.support.paths import CONFIG
 from tests.support.simulated import made_patient, run_directory
 

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from compd.comparison import AlignedRecording
 from compd.comparison.alignment.align_recording import align_recording
-from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.configuration import Configuration, load
-from compd.configuration.shipped import shipped_configuration
-from compd.model.effects.effect import FittedEffect
+from compd.comparison.alignment.aligned_recording import effect_deltas
+from compd.configuration import Configuration, load, shipped_configuration
+from compd.model.effects import FittedEffect
 from compd.model.library import load_library
-from compd.recording.reader import read_recording
-from compd.recording.writer import write_recording
+from compd.recording import read_recording, write_recording
 
 Floats = NDArray[np.float64]
 SIGMA_UM = 0.15

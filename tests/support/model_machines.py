@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from compd.model.machine import MachineModel, machine_model
-from compd.model.kinematics.tool import Contact, ToolOnPlate, ToolOnPlatform
+from compd.model import MachineModel, machine_model
+from compd.model.kinematics import Contact, ToolOnPlate, ToolOnPlatform
 from tests.support.paths import VECTORS
 
 Floats = NDArray[np.float64]

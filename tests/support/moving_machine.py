@@ -14,20 +14,16 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.configuration import Configuration, load
-from compd.stated_noise import tolerance_mm
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import MotionEstimate
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
-from compd.live.loop.cycle import step
-from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.states import State
-from compd.live.memory.latest import Snapshot
-from compd.live.memory.readings import Readings
-from compd.live.loop.pipeline import build_pipeline
+from compd.live.loop import CycleInputs, CycleState, MachineZero, build_pipeline, step
+from compd.live.memory import Readings, Snapshot
+from compd.setpoint_states import State
+from compd.simulation import World
 from compd.simulation.truth.motion import Move
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
-from compd.simulation.truth.world import World
+from compd.stated_noise import tolerance_mm
 from tests.support.paths import CONFIG
 
 GRID_S = 1e-3

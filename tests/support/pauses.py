@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 
-from compd.live.memory.shared_array import shared_floats
-from compd.live.system.realtime import sleep_until
+from compd.live.memory import shared_floats
+from compd.live.system import sleep_until
 from tests.support.other_process import beside
 
 _STEP_S = 0.01

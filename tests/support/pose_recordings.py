@@ -9,10 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.comparison.alignment.aligned_recording import effect_deltas
-from compd.configuration import Configuration, load
-from compd.configuration.shipped import shipped_configuration
-from compd.model.prediction import predict
-from compd.recording.writer import write_recording
+from compd.configuration import Configuration, load, shipped_configuration
+from compd.model import predict
+from compd.recording import write_recording
 from tests.support.measured import SIGMA_UM, aligned, gauges, record
 
 SIGMA_URAD = 2.0

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.support.daemon_process import Daemon
 from tests.support.pauses import Pauses
 from tests.support.watching import Seen

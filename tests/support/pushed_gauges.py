@@ -8,8 +8,7 @@ from typing import Any
 
 from compd.clock import MonotonicClock
 from compd.gauge import Gauge
-from compd.live.acquisition.acquisition import Acquisition
-from compd.live.acquisition.reading_trust import ReadingTrust
+from compd.live.acquisition import Acquisition, ReadingTrust
 from compd.plugins import GAUGES, load
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
 

@@ -12,11 +12,9 @@ import numpy as np
 
 from compd.clock import MonotonicClock
 from compd.gauge import Quality
-from compd.live.loop.commands import Target
-from compd.live.loop.directions import Directions
-from compd.live.loop.ring_entries import CyclePacker, CycleUnpacker
-from compd.live.record.recorder import Recorder, RecordingLimits
-from compd.live.service.readings_message import ReadingsMessage
+from compd.live.loop import CyclePacker, CycleUnpacker, Directions, Target
+from compd.live.record import Recorder, RecordingLimits
+from compd.live.service import ReadingsMessage
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine
 
 ROOMY = RecordingLimits(part_bytes=10**9, part_s=1e9, limit_bytes=10**10, drop_oldest=False)

@@ -11,9 +11,8 @@ from contextlib import contextmanager
 from compd.clock import MonotonicClock
 from compd.configuration import Configuration
 from compd.live.daemon import Daemon
-from compd.live.system.child_process import ChildProcess
 from compd.live.supervisor import Supervisor
-from compd.live.system.systemd import Notifier
+from compd.live.system import ChildProcess, Notifier
 
 START_WITHIN_S = 30
 

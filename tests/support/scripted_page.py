@@ -13,11 +13,12 @@ from typing import Any, get_args
 
 import uvicorn
 
-from compd.live.loop.states import State
+from compd.page import Token, hashed
 from compd.page.daemon_link import DaemonLink
-from compd.page.guard import Guard, Role, Token, hashed
+from compd.page.guard import Guard, Role
 from compd.page.recordings import Recordings
 from compd.page.server import Server
+from compd.setpoint_states import State
 
 LOOKS, ORDERS = get_args(Role)
 TOKEN = "a token"

@@ -10,7 +10,7 @@ from typing import Any
 from compd.clock import Clock
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, good
 from compd.live.acquisition.acquisition import LineThread
-from compd.live.memory.poll_requests import PollRequests
+from compd.live.memory import PollRequests
 from compd.live.service.message_keys.status import LineStatusKeys
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, WatchedLatest
 

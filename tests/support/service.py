@@ -10,21 +10,15 @@ import threading
 import numpy as np
 
 from compd.clock import MonotonicClock
-from compd.compensation.values import CorrectionShares
-from compd.configuration.operation import SocketSettings
+from compd.compensation import CorrectionShares
+from compd.configuration import SocketSettings
 from compd.errors import Problem, StateError
-from compd.live.loop.commands import Commands
-from compd.live.loop.ring_entries import SentSetpoint
-from compd.live.loop.setpoint import Setpoint, SetpointValues
-from compd.live.loop.states import Mode, State
-from compd.live.memory.poll_requests import PollRequests
-from compd.live.memory.shared_ring import SharedRing
-from compd.live.service.listeners import Listeners
+from compd.live.loop import Commands, SentSetpoint, Setpoint
+from compd.live.loop.setpoint import SetpointValues
+from compd.live.memory import PollRequests, SharedRing
+from compd.live.service import Listeners, Publisher, RequestContext, Requests, TargetKeys, TcpAccess
 from compd.live.service.messages import line
-from compd.live.service.publisher import Publisher
-from compd.live.service.request_context import RequestContext, TargetKeys
-from compd.live.service.requests import Requests
-from compd.live.service.tcp_access import TcpAccess
+from compd.setpoint_states import Mode, State
 
 PERIOD_S = 0.005
 TIMEOUT_S = 20

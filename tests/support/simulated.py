@@ -15,9 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from compd.configuration.document import read_document
-from compd.configuration.geometry import Geometry
-from compd.configuration.operation import Wiring
+from compd.configuration import Geometry, Wiring, read_document
 from tests.support.paths import CONFIG
 
 TRIPOD = CONFIG / "tripod-cmm.yaml"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from compd.comparison.stream.recording_stream import RecordingStream
+from compd.comparison import RecordingStream
 from compd.configuration import Configuration
-from compd.recording.recording import Recording
+from compd.recording import Recording
 
 
 def in_blocks(recording: Recording, configuration: Configuration | None, rows: int) -> RecordingStream:

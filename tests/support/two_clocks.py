@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.instruments.track import Track
+from compd.instruments import Track
 
 # Base joints of a tripod, in mm; the scales are distances from them, as on the real thing, and nothing polynomial.
 _BASE_MM = np.array([[0.0, 250.0, 700.0], [-216.5, -125.0, 700.0], [216.5, -125.0, 700.0]])

@@ -14,7 +14,7 @@ import numpy as np
 from compd.client import connect
 from compd.clock import MonotonicClock
 from compd.errors import DaemonError
-from compd.live.loop.states import State, state_named
+from compd.setpoint_states import State, state_named
 
 # Long enough for a loaded computer; what is waited for comes much sooner.
 PATIENCE_S = 60.0

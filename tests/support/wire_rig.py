@@ -12,10 +12,10 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from compd.clock import MonotonicClock
-from compd.configuration.lines import LineSettings
+from compd.configuration import LineSettings
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line
-from compd.live.memory.latest import Latest
+from compd.live.memory import Latest
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
 

@@ -12,10 +12,10 @@ import pytest
 from scipy.stats import kstest
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.effect_fit import fit, initial_effect
-from compd.diagnosis.recording_diagnosis import diagnose
-from compd.model.effects.effect import FittedEffect
+from compd.comparison import AlignedRecording, fit, initial_effect
+from compd.comparison.alignment.aligned_recording import effect_deltas
+from compd.diagnosis import diagnose
+from compd.model.effects import FittedEffect
 from tests.support.hidden_effects import LIBRARY, NOISE_UM, record_with_effects
 
 # Two-sided 95 % of a normal distribution: of how many standard errors a reader makes an interval.

@@ -14,7 +14,7 @@ import pytest
 from compd.client import Client, connect
 from compd.demo.processes import Command, run_commands
 from compd.demo.session import wait_for_gauges
-from compd.simulation.wires.control_client import ControlClient
+from compd.simulation import ControlClient
 from tests.support.simulated import TRIPOD, made_patient
 
 RATE_HZ = 50.0

@@ -14,13 +14,9 @@ import pytest
 from distributed import Client
 
 from compd.errors import CompdError
+from compd.fleet import RecordingResult, examination, examine_fleet, find_recordings, read_table, write_table
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import outcomes
-from compd.fleet.machine_examination import examination
-from compd.fleet.examine import examine_fleet
-from compd.fleet.recording_result import RecordingResult
-from compd.fleet.recordings import find_recordings
-from compd.fleet.table import read_table, write_table
 from tests.support.dask_cluster import PATIENCE_S, DaskCluster, dask_cluster
 from tests.support.measured import gauges, hidden, record
 from tests.support.paths import ROOT

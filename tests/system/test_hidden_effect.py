@@ -17,9 +17,8 @@ from typing import Any, NamedTuple
 import pytest
 import yaml
 
+from compd.simulation import Mechanism, draw_hidden
 from compd.simulation.causes.catalogue import CAUSES
-from compd.simulation.causes.hidden_cause import draw_hidden
-from compd.simulation.truth.mechanism import Mechanism
 from tests.scoreboard.expectation import covariates
 from tests.support.hidden_run import HiddenRun, hidden_run, parse_output
 from tests.support.hidden_visits import check_visits, survey_visits

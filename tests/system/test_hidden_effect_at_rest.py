@@ -13,15 +13,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.main import app
-from compd.comparison.recording_comparison import compare
-from compd.comparison.open import open_recording
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.cli.app import app
+from compd.comparison import compare, open_recording
+from compd.diagnosis import diagnose
 from compd.model.library import load_library
-from compd.recording.reader import read_recording
-from compd.recording.sidecar import sidecar_contents
-from compd.recording.writer import write_recording
-from compd.simulation.campaign.simulate_campaign import simulate_campaign
+from compd.recording import read_recording, sidecar_contents, write_recording
+from compd.simulation import simulate_campaign
 from tests.support.points_at_rest import in_own_frame
 
 # Numbers of hidden causes that are plain and in the library; nothing else is known of them here.

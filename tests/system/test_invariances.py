@@ -15,14 +15,12 @@ from typing import NamedTuple
 
 import pytest
 
-from compd.comparison.open import open_recording
-from compd.configuration import load
-from compd.configuration.shipped import shipped_configuration
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.comparison import open_recording
+from compd.configuration import load, shipped_configuration
+from compd.diagnosis import Diagnosis, diagnose
 from compd.diagnosis.findings import ParameterEstimate
-from compd.diagnosis.verdict import Diagnosis
 from compd.model.library import find_effect, load_library
-from compd.recording.writer import write_recording
+from compd.recording import write_recording
 from compd.simulation.campaign.simulated_recording import simulate_recording
 from compd.simulation.causes.hidden_cause import HiddenCause
 from tests.support.changed_recordings import (

@@ -15,16 +15,13 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 from compd.cli.simulated.simulate import _planned
 from compd.configuration import load
 from compd.errors import CompdError
-from compd.recording.reader import read_recording
-from compd.simulation.campaign.plan_reader import read_plan
-from compd.simulation.truth.mechanism import Mechanism
+from compd.recording import read_recording
+from compd.simulation import Mechanism, Simulation, World, read_plan
 from compd.simulation.truth.plan_motion import SETTLED_S
-from compd.simulation.truth.world import World
-from compd.simulation.wires.server import Simulation
 from tests.support.planned_measurements import plan_file, straight_down, thin
 from tests.support.simulated import TRIPOD, ask, run_directory
 from tests.unit.simulation.test_server import LONGEST_WAIT_S, TurnedClock

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 import yaml
 
-from compd.configuration.document import read_document
+from compd.configuration import read_document
 from compd.demo.processes import Command, run_commands
 from compd.demo.session import wait_for_gauges
-from compd.simulation.wires.control_client import ControlClient
+from compd.simulation import ControlClient
 from tests.support.daemon_process import Daemon
 from tests.support.mosquitto import Broker, needs_mosquitto, publisher, running_broker
 from tests.support.paths import CONFIG

@@ -11,10 +11,8 @@ import yaml
 
 from compd.client import connect
 from compd.clock import MonotonicClock
-from compd.configuration import Configuration, load
-from compd.configuration.document import read_document
-from compd.simulation.truth.world import World
-from compd.simulation.wires.server import Simulation
+from compd.configuration import Configuration, load, read_document
+from compd.simulation import Simulation, World
 from tests.support.paths import CONFIG
 from tests.support.running_daemon import supervised
 from tests.support.simulated import run_directory

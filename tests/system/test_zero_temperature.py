@@ -9,15 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from compd.comparison.open import open_recording
-from compd.configuration import load
-from compd.configuration.shipped import shipped_configuration
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.comparison import open_recording
+from compd.configuration import load, shipped_configuration
+from compd.diagnosis import diagnose
 from compd.model.library import load_library
-from compd.recording.writer import write_recording
+from compd.recording import write_recording
+from compd.simulation import AirAtZero
 from compd.simulation.campaign.simulated_recording import simulate_recording
 from compd.simulation.causes.hidden_cause import HiddenCause
-from compd.simulation.truth.weather import AirAtZero
 
 # As much as shows plainly above the noise; of more, what the thermometer of a link does not show would be seen, too.
 PPM_PER_K = 1.5

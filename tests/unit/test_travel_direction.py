@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from compd.arrays import FloatArray
 from compd.gauge import good
-from compd.live.loop.directions import Directions
-from compd.live.loop.wiring import Wire
-from compd.model.kinematics.motion import track_motion
+from compd.live.loop import Directions, Wire
+from compd.model.kinematics import track_motion
 from compd.travel_direction import row_directions
 
 STEPS_UM = st.floats(-3.0, 3.0)

@@ -27,7 +27,7 @@ def doctor(
     from rich.table import Table
     from rich.text import Text
 
-    from compd.commissioning.doctor.examine import examine, is_fit, what_to_do
+    from compd.commissioning import examine, is_fit, what_to_do
     from compd.machine_check import load_whole
 
     if config is None and _INSTALLED.exists():

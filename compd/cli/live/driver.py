@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from compd.conformance.case_result import CaseResult
-    from compd.conformance.report import DriverUnderTest
+    from compd.conformance import CaseResult, DriverUnderTest
 
 driver = typer.Typer(no_args_is_help=True, help="Try gauge drivers.")
 
@@ -36,9 +35,9 @@ def try_on_wires(
 
     Exit code 1 if any case fails, or if a driver cannot be tried.
     """
-    from compd.gauge_tools.driver_catalogue import polled_drivers
-    from compd.conformance.report import driver_under_test
+    from compd.conformance import driver_under_test
     from compd.errors import PluginError
+    from compd.gauge_tools import polled_drivers
 
     chosen = _read_options(options, name) if options and name else None
     if name is not None:
@@ -58,7 +57,7 @@ def try_on_wires(
 
 def _try(driver: DriverUnderTest, quick: bool) -> int:
     """Print each case as it ends, and the table; the number that failed."""
-    from compd.conformance.report import run_conformance
+    from compd.conformance import run_conformance
 
     typer.echo(f"\n{driver.name}, {driver.gauge.line_kind}:")
     results: list[tuple[str, CaseResult]] = []
@@ -86,8 +85,8 @@ def _print_table(name: str, results: list[tuple[str, CaseResult]]) -> None:
 
 
 def _read_options(path: Path, driver: str) -> dict[str, Any]:
-    from compd.configuration.document import read_document
-    from compd.files.file_kind import FileKind
+    from compd.configuration import read_document
+    from compd.files import FileKind
     from compd.plugins import GAUGES, load
 
     keys = load(GAUGES, driver, f"driver {driver}").Options.model_fields

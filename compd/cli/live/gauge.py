@@ -12,9 +12,8 @@ import typer
 from compd.cli.options import OverwriteOption
 
 if TYPE_CHECKING:
-    from compd.gauge_tools.gauge_statistics import GaugeStatistics
-    from compd.gauge_tools.open_gauge import GaugeTarget, PortArguments
     from compd.gauge import Reading
+    from compd.gauge_tools import GaugeStatistics, GaugeTarget, PortArguments
 
 gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and describe gauges.")
 
@@ -47,8 +46,8 @@ def list_gauges() -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.gauge_tools.driver_catalogue import catalogue
-    from compd.report.terminal_table import keep_words_whole
+    from compd.gauge_tools import catalogue
+    from compd.report import keep_words_whole
 
     entries = catalogue()
     table = Table("driver", "line carries", "what it is", "options it needs")
@@ -68,7 +67,7 @@ def show(name: Annotated[str, typer.Argument(help="A driver's name: `compd gauge
     from rich.table import Table
 
     from compd.cli.reflow import reflowed
-    from compd.gauge_tools.driver_catalogue import driver_description
+    from compd.gauge_tools import driver_description
 
     description = driver_description(name)
     console = Console()
@@ -88,8 +87,8 @@ def scan(
     ] = False,
 ) -> None:
     """Find serial ports; with --probe, look which presets fit what answers."""
-    from compd.gauge_tools.probe import announcements, preset_candidates
-    from compd.lines.computer_ports import serial_ports
+    from compd.gauge_tools import announcements, preset_candidates
+    from compd.lines import serial_ports
 
     ports = serial_ports()
     if not ports:
@@ -125,8 +124,8 @@ def read(
 ) -> None:
     """Read one gauge once, and show every byte. Exit code 1 if a channel has no value, or one that is stale."""
     from compd.clock import MonotonicClock
-    from compd.gauge_tools.open_gauge import aged, read_gauge
     from compd.gauge import LineFault
+    from compd.gauge_tools import aged, read_gauge
 
     gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
     clock = MonotonicClock()
@@ -165,8 +164,7 @@ def watch(
     from rich.live import Live
 
     from compd.clock import MonotonicClock
-    from compd.gauge_tools.gauge_statistics import GaugeStatistics
-    from compd.gauge_tools.open_gauge import aged, poll_gauge
+    from compd.gauge_tools import GaugeStatistics, aged, poll_gauge
 
     gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
     clock = MonotonicClock()
@@ -229,14 +227,19 @@ def learn(
 
     What the replies leave open is asked, each question with the option that answers it.
     """
-    from compd.gauge_description.answers import Answers, error_reply, range_of
-    from compd.gauge_description.capture import capture_live, read_capture, saved_capture
-    from compd.gauge_description.describe import learn_gauge
-    from compd.gauge_description.read_back import rounds
-    from compd.gauge_description.reply_columns import DescriptionError
-    from compd.gauge_tools.gauge_file import LEARNED_GAUGE, gauge_file_text
-    from compd.gauge_tools.open_gauge import byte_line_settings
-    from compd.files.output_file import check_replaceable
+    from compd.files import check_replaceable
+    from compd.gauge_description import (
+        Answers,
+        DescriptionError,
+        capture_live,
+        error_reply,
+        learn_gauge,
+        range_of,
+        read_capture,
+        rounds,
+        saved_capture,
+    )
+    from compd.gauge_tools import LEARNED_GAUGE, byte_line_settings, gauge_file_text
 
     if to is not None:
         check_replaceable(to, (f"{LEARNED_GAUGE}:".encode(),), "a description of a gauge", overwrite)
@@ -289,14 +292,13 @@ def _between_captures(done: int, wanted: int) -> None:
 def _port(
     port: str, baud: int | None, form: str | None, timeout_s: float, line_keys: Sequence[str] | None
 ) -> PortArguments:
-    from compd.gauge_tools.open_gauge import PortArguments
+    from compd.gauge_tools import PortArguments
 
     return PortArguments(port, baud, form, timeout_s, line_keys or ())
 
 
 def _target(target: str, name: str | None, port: PortArguments, assignments: Sequence[str] | None) -> GaugeTarget:
-    from compd.gauge_tools.gauge_file import gauge_of_file
-    from compd.gauge_tools.open_gauge import gauge_of_driver
+    from compd.gauge_tools import gauge_of_driver, gauge_of_file
 
     if target.endswith((".yaml", ".yml")):
         return gauge_of_file(Path(target), name, port)

@@ -50,10 +50,8 @@ def page(
     """
     from compd.cli.options import unix_address
     from compd.log import hide_secrets_of_libraries, is_journal, log_to_stderr
-    from compd.page.guard import Token, hashed
-    from compd.page.guard import new_token as make_token
-    from compd.page.run import origin, run_page
-    from compd.page.token_file import add_token, read_tokens
+    from compd.page import Token, add_token, hashed, origin, read_tokens, run_page
+    from compd.page import new_token as make_token
 
     if new_token is not None:
         token = add_token(_needed(tokens, "--new-token"), new_token)
@@ -101,7 +99,7 @@ def _print_address(address: str) -> None:
 
 def _print_qr_code(address: str) -> None:
     """On a terminal, for a tablet beside it; never into a file or a log."""
-    from compd.page.qr_code import print_qr_code
+    from compd.page import print_qr_code
 
     if sys.stdout.isatty():
         print_qr_code(address, sys.stdout)

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
-from compd.tables.table_format import TableFormat
+from compd.tables import TableFormat
 
 _MB = 1_000_000
 _S_PER_H = 3600.0
@@ -58,8 +58,7 @@ def record(
     from compd.cli.progress import ElapsedShown
     from compd.client import connect
     from compd.clock import MonotonicClock
-    from compd.live.record.readings_feed import ReadingsFeed
-    from compd.live.record.recorder import Recorder, RecordingLimits
+    from compd.live.record import ReadingsFeed, Recorder, RecordingLimits
 
     keeping = RecordingLimits(
         round(part_mb * _MB), part_hours * _S_PER_H, round(limit_mb * _MB), when_full is WhenFull.DROP_OLDEST

@@ -28,8 +28,7 @@ def replay(
     when a cell of the CSV is not what its cycle says.
     """
     from compd.configuration import load
-    from compd.live.record.compared_table import differing_cells
-    from compd.live.record.replay import RecordedCycles, ReplayedCycle, replay_cycles
+    from compd.live.record import RecordedCycles, ReplayedCycle, differing_cells, replay_cycles
 
     configuration = load(machine)
     transcripts = RecordedCycles(name)

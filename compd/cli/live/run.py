@@ -9,7 +9,7 @@ import typer
 
 from compd.cli.loading import loading
 from compd.cli.waiting import wait_for_file
-from compd.live.system.process_limits import exhaustion_named, require_descriptors, require_limits
+from compd.live.system import exhaustion_named, require_descriptors, require_limits
 
 
 def run(config: Annotated[Path, typer.Argument(help="The machine's configuration (YAML).")]) -> None:
@@ -20,7 +20,7 @@ def run(config: Annotated[Path, typer.Argument(help="The machine's configuration
     require_limits()
     with exhaustion_named():
         with loading():
-            from compd.live.run_daemon import run as run_daemon
+            from compd.live import run as run_daemon
             from compd.machine_check import load_whole
 
             wait_for_file(config)

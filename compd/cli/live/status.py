@@ -22,7 +22,7 @@ def status(
     The exit code is that of monitoring plug-ins: 0 for state ok; 1, a warning, for another state in which setpoints are
     valid; 2, critical, for one in which they are not; 3 where no daemon answers, or the configuration cannot be read.
     """
-    from compd.commissioning.daemon_health import DaemonStatus, Health, daemon_status
+    from compd.commissioning import DaemonStatus, Health, daemon_status
     from compd.errors import CompdError
 
     try:

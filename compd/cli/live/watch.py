@@ -18,9 +18,9 @@ from rich.text import Text
 from compd.cli.waiting import connect_patiently
 from compd.client import DEFAULT_ADDRESS, Client, connect
 from compd.clock import Clock, MonotonicClock
-from compd.commissioning.daemon_health import warnings_of
+from compd.commissioning import warnings_of
 from compd.errors import CompdError
-from compd.live.loop.states import State, state_named
+from compd.setpoint_states import State, state_named
 from compd.units import UM_PER_MM
 
 _BAR_WIDTH = 21  # odd: one cell is zero

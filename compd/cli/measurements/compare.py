@@ -11,8 +11,8 @@ import typer
 from compd.cli.options import MachineOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from compd.comparison.comparison import Comparison
-    from compd.model.effects.effect import FittedEffect
+    from compd.comparison import Comparison
+    from compd.model.effects import FittedEffect
 
 # More sentences than this nobody reads in a terminal.
 MOST_SENTENCES = 6
@@ -43,7 +43,7 @@ def compare(
     from compd.errors import CompdError, Problem
 
     if html is not None:
-        from compd.report.page import check_page_path
+        from compd.report import check_page_path
 
         check_page_path(html, overwrite)
     problems: list[Problem] = []
@@ -56,7 +56,7 @@ def compare(
     if problems:
         raise CompdError(list(dict.fromkeys(problems)))
     if html is not None:
-        from compd.report.comparison_page import write_comparison_page
+        from compd.report import write_comparison_page
 
         write_comparison_page(html, comparisons)
     if as_json:
@@ -70,16 +70,16 @@ def compare(
 
 def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison:
     """In memory, or block by block where the recording is too long for it."""
-    from compd.comparison.stream.recording_stream import is_long
+    from compd.comparison import is_long
 
     if not is_long(path):
-        from compd.api.diagnosis import compare as compare_recording
-        from compd.comparison.open import open_recording
+        from compd.api import compare as compare_recording
+        from compd.comparison import open_recording
 
         return compare_recording(open_recording(path, machine), model)
-    from compd.api.long_recordings import compare_stream
+    from compd.api import compare_stream
     from compd.cli.progress import count_shown
-    from compd.recording.blocks import row_count
+    from compd.tables import row_count
 
     # read twice: for the sample, then row by row
     with count_shown(2 * row_count(path), f"comparing {path.name}") as progress:
@@ -91,7 +91,7 @@ def print_comparisons(comparisons: list[Comparison]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.report.comparison_page import name_of, no_trend_text, summary
+    from compd.report import name_of, no_trend_text, summary
 
     console = Console(highlight=False)
     overview = summary(comparisons)
@@ -129,6 +129,6 @@ def print_comparisons(comparisons: list[Comparison]) -> None:
 
 
 def _is_measured(fitted: FittedEffect) -> bool:
-    from compd.model.effects.effect_needs import is_measured
+    from compd.model.effects import is_measured
 
     return is_measured(fitted.effect)

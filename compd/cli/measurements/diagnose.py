@@ -11,7 +11,7 @@ import typer
 from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
 
 if TYPE_CHECKING:
-    from compd.comparison.alignment.aligned_recording import AlignedRecording
+    from compd.comparison import AlignedRecording
 
 
 def diagnose(
@@ -38,13 +38,13 @@ def diagnose(
     """
     from rich.console import Console
 
-    from compd.api.diagnosis import diagnose as diagnose_recording
+    from compd.api import diagnose as diagnose_recording
     from compd.cli.progress import steps_shown
-    from compd.diagnosis.holdout import evaluate_holdout
-    from compd.report.diagnosis_text import print_diagnosis
+    from compd.diagnosis import evaluate_holdout
+    from compd.report import print_diagnosis
 
     if html is not None:
-        from compd.report.page import check_page_path
+        from compd.report import check_page_path
 
         check_page_path(html, overwrite)
     sealed = [_open(path, machine)[0] for path in recordings[1:]]
@@ -53,7 +53,7 @@ def diagnose(
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]
     if html is not None:
-        from compd.report.diagnosis_page import write_diagnosis_page
+        from compd.report import write_diagnosis_page
 
         write_diagnosis_page(html, diagnosis, holdouts, recorded_rows=all_rows)
     if as_json:
@@ -71,14 +71,13 @@ def diagnose(
 
 def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, int]:
     """The recording and 0; of one that is too long for the memory a sample, and the number of its rows."""
-    from compd.comparison.open import open_recording
-    from compd.comparison.stream.recording_stream import is_long
+    from compd.comparison import is_long, open_recording
 
     if not is_long(path):
         return open_recording(path, machine), 0
-    from compd.api.long_recordings import open_sample
+    from compd.api import open_sample
     from compd.cli.progress import count_shown
-    from compd.recording.blocks import row_count
+    from compd.tables import row_count
 
     rows = row_count(path)
     with count_shown(rows, f"drawing a sample of {path.name}") as progress:

@@ -13,14 +13,12 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from compd.arrays import FloatArray
-    from compd.comparison.alignment.aligned_recording import AlignedRecording
-    from compd.comparison.effect_fit import FitResult
+    from compd.comparison import AlignedRecording, FitResult
     from compd.configuration import Configuration
-    from compd.diagnosis.model_changes import Refinement
+    from compd.diagnosis import Refinement
     from compd.errors import Problem
-    from compd.model.effects.effect import Effect
-    from compd.model_file.model_document import Declaration
-    from compd.model_file.model_file import ModelFile
+    from compd.model.effects import Effect
+    from compd.model_file import Declaration, ModelFile
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
 RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv or NAME.parquet.")]
@@ -37,8 +35,7 @@ def list_effects(effects: EffectsOption = None) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.model.library import load_library
-    from compd.model.library.effects_file import gather_effects
+    from compd.model.library import gather_effects, load_library
 
     table = Table("effect", "port", "needs", "physics")
     table.columns[0].no_wrap = True
@@ -61,11 +58,11 @@ def show(
     """Show one effect: its physics, its parameters, and with --html what it does to the tip of a machine."""
     from rich.console import Console
 
-    from compd.configuration.shipped import load_machine
-    from compd.model.library.effects_file import gather_effects, named_effect
+    from compd.configuration import load_machine
+    from compd.model.library import gather_effects, named_effect
 
     if html is not None:
-        from compd.report.page import check_page_path
+        from compd.report import check_page_path
 
         check_page_path(html, overwrite)
     shown = named_effect(name, "compd effect show", gather_effects(effects or ()))
@@ -73,7 +70,7 @@ def show(
     # an effect of one's own may be of another machine than the shipped one
     Console().print(_card(shown, configuration if machine or not shown.declared else None))
     if html is not None:
-        from compd.report.effect_page import write_effect_page
+        from compd.report import write_effect_page
 
         write_effect_page(html, shown, configuration)
         typer.echo(f"{shown.id} on {configuration.machine}: {html}")
@@ -89,7 +86,7 @@ def add(
     dry_run: DryRunOption = False,
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
-    from compd.api.models import add_effect
+    from compd.api import add_effect
 
     aligned, refine = _open(recording, machine)
     before = _read_model(model, aligned) if model.exists() else None
@@ -106,7 +103,7 @@ def remove(
     dry_run: DryRunOption = False,
 ) -> None:
     """Take an effect out of a model and fit the others again."""
-    from compd.diagnosis.model_changes import remove as remove_effect
+    from compd.diagnosis import remove_effect
 
     aligned, refine = _open(recording, machine)
     before = _read_model(model, aligned)
@@ -118,18 +115,18 @@ def fit(
     recording: RecordingOption, model: ModelOption, machine: MachineOption = None, dry_run: DryRunOption = False
 ) -> None:
     """Fit all effects of a model again, on another recording."""
-    from compd.diagnosis.model_changes import refit
+    from compd.diagnosis import refit_model
 
     aligned, refine = _open(recording, machine)
     before = _read_model(model, aligned)
-    _finish(model, before, refit(before, aligned, refine), aligned, "fitted again", dry_run)
+    _finish(model, before, refit_model(before, aligned, refine), aligned, "fitted again", dry_run)
 
 
 @effect.command()
 def undo(model: ModelOption) -> None:
     """Take back the last step; undo again for the step before it. The ledger keeps both."""
-    from compd.diagnosis.model_changes import undo as undo_step
-    from compd.model_file.model_document import read_stored, write_stored
+    from compd.diagnosis import undo_step
+    from compd.model_file import read_stored, write_stored
 
     after = undo_step(read_stored(model), str(model))
     write_stored(model, after)
@@ -143,15 +140,14 @@ def _declared_id(declared: Declaration) -> str:
 
 def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinement]:
     """The recording; of one that is too long for the memory a sample, and what fits to all its rows."""
-    from compd.comparison.open import open_recording
-    from compd.comparison.stream.recording_stream import is_long
-    from compd.diagnosis.model_changes import unrefined
+    from compd.comparison import is_long, open_recording
+    from compd.diagnosis import unrefined
 
     if not is_long(path):
         return open_recording(path, machine), unrefined
-    from compd.api.long_recordings import open_long
+    from compd.api import open_long
     from compd.cli.progress import count_shown
-    from compd.recording.blocks import row_count
+    from compd.tables import row_count
 
     rows = row_count(path)
     with count_shown(rows, f"drawing a sample of {path.name}") as progress:
@@ -167,7 +163,7 @@ def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinemen
 
 
 def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:
-    from compd.model_file.model_file import read_model_file
+    from compd.model_file import read_model_file
 
     return read_model_file(path, aligned.recording.machine, aligned.rows.links)
 
@@ -179,9 +175,9 @@ def _finish(
     from rich.console import Console
     from rich.table import Table
 
-    from compd.api.diagnosis import compare
-    from compd.comparison.display_unit import format_error
-    from compd.report.terminal_table import keep_words_whole
+    from compd.api import compare
+    from compd.comparison import format_error
+    from compd.report import keep_words_whole
 
     if dry_run:
         done = f"not written: would have {done}"
@@ -214,7 +210,7 @@ def _card(effect: Effect, configuration: Configuration | None) -> RenderableType
     from rich.console import Group
     from rich.table import Table
 
-    from compd.model.effects.effect import PORTS
+    from compd.model.effects import PORTS
 
     card = Table.grid(padding=(0, 2))
     card.add_row("[bold]effect", effect.id)
@@ -250,8 +246,7 @@ def _card(effect: Effect, configuration: Configuration | None) -> RenderableType
 def _lacking(effect: Effect, configuration: Configuration) -> list[Problem]:
     """What the effect needs and the machine's gauges do not measure."""
     from compd.machine_builder import build_model
-    from compd.model.effects.effect_needs import unmet_needs
-    from compd.model.effects.observations import available_settings
+    from compd.model.effects import available_settings, unmet_needs
 
     model = build_model(configuration.geometry, configuration.wiring)
     assert model.constants is not None

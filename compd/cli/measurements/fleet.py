@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from compd.cli.options import EffectsOption, OverwriteOption
-from compd.fleet.machine_names import MachinesBy
+from compd.fleet import MachinesBy
 
 if TYPE_CHECKING:
-    from compd.fleet.machine_examination import Examination
-    from compd.fleet.recording_result import RecordingResult
+    from compd.fleet import Examination, RecordingResult
 
 # More of each a terminal does not show; the page and the table have all.
 MOST_SENTENCES = 20
@@ -102,8 +101,7 @@ def compare(
     A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1. A run
     that was interrupted goes on where it stopped.
     """
-    from compd.fleet.cluster import check_installed
-    from compd.fleet.machine_examination import examination
+    from compd.fleet import check_installed, examination
 
     check_installed()
     wanted = examination("compare", machine or (), model or ())
@@ -128,8 +126,7 @@ def diagnose(
     A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1. A run
     that was interrupted goes on where it stopped.
     """
-    from compd.fleet.cluster import check_installed
-    from compd.fleet.machine_examination import examination
+    from compd.fleet import check_installed, examination
 
     check_installed()
     wanted = examination("diagnose", machine or (), model or (), effects or ())
@@ -157,11 +154,8 @@ def report(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Write the page: which machine has which effect, what drifts, which machine differs, what could not be read."""
-    from compd.fleet.cluster import check_installed
-    from compd.fleet.machine_examination import examination
-    from compd.fleet.fleet_page import write_fleet_page
-    from compd.fleet.table import is_table, read_table
-    from compd.report.page import check_page_path
+    from compd.fleet import check_installed, examination, is_table, read_table, write_fleet_page
+    from compd.report import check_page_path
 
     check_installed()
     if not all(is_table(Path(place)) for place in places):
@@ -188,15 +182,19 @@ def _examine(
     """Examine what lies in these places, write the table and where it is wanted the page, print an overview."""
     from compd.cli.problems import print_problems
     from compd.cli.progress import count_shown
-    from compd.fleet.checkpoint import Checkpoint
-    from compd.fleet.examine import examine_fleet
-    from compd.fleet.fleet_page import write_fleet_page
-    from compd.fleet.recordings import find_recordings
-    from compd.fleet.table import check_table_path, earlier_results, write_table
+    from compd.fleet import (
+        Checkpoint,
+        check_table_path,
+        earlier_results,
+        examine_fleet,
+        find_recordings,
+        write_fleet_page,
+        write_table,
+    )
 
     check_table_path(out, wanted.command, overwrite)
     if html is not None:
-        from compd.report.page import check_page_path
+        from compd.report import check_page_path
 
         check_page_path(html, overwrite)
     found = find_recordings(places, by)
@@ -229,8 +227,8 @@ def _print_overview(results: list[RecordingResult] | tuple[RecordingResult, ...]
     from rich.console import Console
     from rich.table import Table
 
-    from compd.fleet.overview import Overview
-    from compd.report.terminal_table import keep_words_whole
+    from compd.fleet import Overview
+    from compd.report import keep_words_whole
 
     console = Console(highlight=False, markup=False, soft_wrap=True)
     overview = Overview(results)

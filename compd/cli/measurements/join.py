@@ -97,11 +97,9 @@ def join(
 ) -> None:
     """Put an instrument's export beside a recording: on one clock, whose offset is estimated, or point by point."""
     from compd.cli.export_options import echo_taken, read_options
-    from compd.instruments.read import read_export
-    from compd.joining.by_time import Instrument
-    from compd.joining.join import JoinOptions, choose_by, match_export, unfit_option
-    from compd.joining.summary import summary_lines
-    from compd.recording.writer import write_recording
+    from compd.instruments import read_export
+    from compd.joining import Instrument, JoinOptions, choose_by, match_export, summary_lines, unfit_option
+    from compd.recording import write_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
     read_as = read_options(

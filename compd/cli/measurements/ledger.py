@@ -23,10 +23,8 @@ def ledger(
     from rich.console import Console
     from rich.table import Table
 
-    from compd.model_file.model_document import read_stored
-    from compd.report.ledger_page import LEDGER_HEAD, ledger_rows, write_ledger_page
-    from compd.report.page import check_page_path
-    from compd.report.terminal_table import keep_words_whole
+    from compd.model_file import read_stored
+    from compd.report import LEDGER_HEAD, check_page_path, keep_words_whole, ledger_rows, write_ledger_page
 
     stored = read_stored(model)
     steps = stored.steps

@@ -72,11 +72,11 @@ def plan(
 
     Of three rivals or more, those that no rows within the limits tell apart are named.
     """
-    from compd.api.measurements import plan_measurement
-    from compd.comparison.open import open_recording
-    from compd.planning.plan_formats import MARKS
-    from compd.files.output_file import check_replaceable
+    from compd.api import plan_measurement
+    from compd.comparison import open_recording
+    from compd.files import check_replaceable
     from compd.plan_file import PURPOSE_COLUMN
+    from compd.planning import MARKS
 
     if out is not None:
         mark = f"{PURPOSE_COLUMN},".encode() if shape is PlanShape.plan else MARKS[shape.value]

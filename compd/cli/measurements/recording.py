@@ -11,7 +11,7 @@ import typer
 from compd.cli.options import MachineOption
 
 if TYPE_CHECKING:
-    from compd.recording.recording import Recording
+    from compd.recording import Recording
 
 recording = typer.Typer(
     no_args_is_help=True, help="Check, change and merge recordings: readings of the machine beside a reference."
@@ -32,7 +32,7 @@ def check(
     ] = None,
 ) -> None:
     """Check a recording; report every problem at once, with file, row, column, value, what is allowed, next step."""
-    from compd.comparison.open import read_with_machine
+    from compd.comparison import read_with_machine
 
     loaded, _ = read_with_machine(path, machine, needs_reference=False)
     for warning in loaded.warnings:
@@ -57,10 +57,10 @@ def merge(
     overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
 ) -> None:
     """Put recordings of one machine together, so that compare, diagnose and effect add learn from all of them."""
-    from compd.comparison.open import read_with_machine
+    from compd.comparison import read_with_machine
     from compd.errors import CompdError, Problem
-    from compd.recording.merge import ASSUMED_GAP_S, merge_recordings
-    from compd.tables.table_file import written_path
+    from compd.recording import ASSUMED_GAP_S, merge_recordings
+    from compd.tables import written_path
 
     if len(recordings) < 2:
         raise CompdError(
@@ -97,7 +97,7 @@ def convert(
 ) -> None:
     """Write a recording of any length as Parquet or as CSV: the same numbers in the same rows, the same sidecar."""
     from compd.cli.progress import count_shown
-    from compd.recording.convert import convert_recording, rows_to_convert
+    from compd.recording import convert_recording, rows_to_convert
 
     with count_shown(rows_to_convert(source), "rows") as progress:
         rows = convert_recording(source, destination, overwrite, progress)
@@ -116,7 +116,7 @@ def exclude(
     reason: Annotated[str, typer.Option(help="Why they are left out; it is kept in NAME.yaml.")],
 ) -> None:
     """Leave rows out of a recording, with a reason; its sidecar is changed, and nothing else."""
-    from compd.recording.exclusions import exclude_rows, rows_of_text
+    from compd.recording import exclude_rows, rows_of_text
 
     numbers = rows_of_text(rows, "--rows")
     exclude_rows(path, numbers, reason)
@@ -129,7 +129,7 @@ def include(
     rows: RowsOption,
 ) -> None:
     """Let rows count again that were left out."""
-    from compd.recording.exclusions import include_rows, rows_of_text
+    from compd.recording import include_rows, rows_of_text
 
     numbers = rows_of_text(rows, "--rows")
     include_rows(path, numbers)

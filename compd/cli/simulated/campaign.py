@@ -53,7 +53,7 @@ def campaign(
     """
     from rich.console import Console
 
-    from compd.simulation.campaign.simulate_campaign import simulate_campaign
+    from compd.simulation import simulate_campaign
 
     written = simulate_campaign(
         config,

@@ -24,7 +24,7 @@ def fault(
     With DIRECTORY alone the lines are listed, with the fault of each and those that it can have.
     """
     from compd.errors import CompdError, Problem
-    from compd.simulation.wires.control_client import ControlClient
+    from compd.simulation import ControlClient
 
     with ControlClient(simulation / "control.sock") as machine:
         lines = machine.ask("LINES")["lines"]

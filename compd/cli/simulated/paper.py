@@ -9,7 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from compd.configuration import Configuration
-    from compd.paper.reproduction import Reproduction
+    from compd.paper import Reproduction
 
 Config = Annotated[Path | None, typer.Argument(help="The machine; the shipped tripod if left out.")]
 Page = Annotated[Path, typer.Option(help="Where the page with the picture goes.")]
@@ -26,25 +26,25 @@ paper = typer.Typer(
 @paper.command()
 def fig18(config: Config = None, page: Page = Path("out/fig18.html"), seed: Seed = 1) -> None:
     """One link under load and temperature: scale against laser interferometer, compensated or not."""
-    from compd.paper import link_experiment
+    from compd.paper import reproduce_link
 
-    _show(link_experiment.reproduce(_configuration(config), seed), page)
+    _show(reproduce_link(_configuration(config), seed), page)
 
 
 @paper.command()
 def fig20(config: Config = None, page: Page = Path("out/fig20.html"), seed: Seed = 1) -> None:
     """Distances between the 17 balls of a 3D ball plate, joints compensated or not."""
-    from compd.paper import plate_experiment
+    from compd.paper import reproduce_plate
 
-    _show(plate_experiment.reproduce(_configuration(config), seed), page)
+    _show(reproduce_plate(_configuration(config), seed), page)
 
 
 @paper.command()
 def fig21(config: Config = None, page: Page = Path("out/fig21.html"), seed: Seed = 1) -> None:
     """A reference ball on the surface plate, measured again and again while the machine warms up."""
-    from compd.paper import drift_experiment
+    from compd.paper import reproduce_drift
 
-    _show(drift_experiment.reproduce(_configuration(config), seed), page)
+    _show(reproduce_drift(_configuration(config), seed), page)
 
 
 @paper.command()
@@ -53,24 +53,24 @@ def instantaneous(machine: Machine = None, page: Page = Path("out/instantaneous.
     from rich.console import Console
     from rich.table import Table
 
-    from compd.paper import frame_experiment, frame_page
+    from compd.paper import frame_table, run_frame_experiment, write_frame_page
 
-    result = frame_experiment.run(_configuration(machine), seed)
-    table = Table(*frame_page.HEAD, title=frame_page.title(result), title_justify="left")
-    table.caption, table.caption_justify = frame_page.table_caption(), "left"
-    for row in frame_page.table_rows(result):
+    result = run_frame_experiment(_configuration(machine), seed)
+    summary = frame_table(result)
+    table = Table(*summary.head, title=summary.title, title_justify="left")
+    table.caption, table.caption_justify = summary.caption, "left"
+    for row in summary.rows:
         table.add_row(*row)
     console = Console()
     console.print(table)
-    for sentence in frame_page.sentences(result):
+    for sentence in summary.sentences:
         console.print(sentence, highlight=False)
-    frame_page.write_frame_page(result, page)
+    write_frame_page(result, page)
     console.print(f"The same as a picture: {page}")
 
 
 def _configuration(config: Path | None) -> Configuration:
-    from compd.configuration import load
-    from compd.configuration.shipped import shipped_configuration
+    from compd.configuration import load, shipped_configuration
 
     return load(config or shipped_configuration("tripod-cmm.yaml"))
 
@@ -80,7 +80,7 @@ def _show(reproduction: Reproduction, page: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.paper.reproduction import HEAD
+    from compd.paper import HEAD
 
     table = Table(*HEAD, title=reproduction.title, title_justify="left")
     for reduction in reproduction.reductions:

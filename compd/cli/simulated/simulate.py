@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from compd.configuration import Configuration
-    from compd.simulation.causes.hidden_cause import SizedCause
-    from compd.simulation.wires.server import Simulation
+    from compd.simulation import Simulation, SizedCause
 
 LOOK_EVERY_S = 0.25
 
@@ -76,15 +75,17 @@ def simulate(
 
     from compd.clock import MonotonicClock
     from compd.configuration import load
-    from compd.live.system.realtime import use_fifo
-    from compd.simulation.campaign.plan_reader import read_plan
-    from compd.simulation.causes.hidden_cause import write_answer
-    from compd.simulation.truth.mechanism import Mechanism
-    from compd.simulation.truth.strengths import FULLY_MEASURED
-    from compd.simulation.truth.weather import AirAtZero
-    from compd.simulation.truth.world import World
-    from compd.simulation.wires.server import Simulation
-    from compd.simulation.wires.simulation_directory import SEALED_ANSWER
+    from compd.live.system import use_fifo
+    from compd.simulation import (
+        FULLY_MEASURED,
+        SEALED_ANSWER,
+        AirAtZero,
+        Mechanism,
+        Simulation,
+        World,
+        read_plan,
+        write_answer,
+    )
 
     configuration = load(config)
     measured = [quantity.name for quantity in configuration.wiring.quantities]
@@ -141,8 +142,7 @@ def _address(broker: str | None) -> tuple[str, int] | None:
 
 def _hidden(configuration: Configuration, seed: int, numbers: Sequence[int], texts: Sequence[str]) -> list[SizedCause]:
     """The causes to be hidden: drawn from numbers, or stated."""
-    from compd.simulation.campaign.sizing import CauseSizer
-    from compd.simulation.causes.hidden_cause import draw_hidden, parse_hidden
+    from compd.simulation import CauseSizer, draw_hidden, parse_hidden
 
     sizer = CauseSizer(configuration.geometry, configuration.wiring, seed)
     return [sizer.size(cause) for cause in (*(draw_hidden(n, sizer.mechanism) for n in numbers), *parse_hidden(texts))]
@@ -202,7 +202,7 @@ def _status(simulation: Simulation) -> Text:
     """One line: what it does, where its tip is, how warm it is, how far its frame has moved."""
     from rich.text import Text
 
-    from compd.simulation.truth.frame import DISTANCES
+    from compd.simulation import DISTANCES
 
     truth, sense = simulation.truth(), simulation.world.sense
     doing = {

@@ -13,7 +13,7 @@ from compd.cli.options import OverwriteOption
 from compd.units import UM_PER_MM
 
 if TYPE_CHECKING:
-    from compd.simulation.wires.instrument_sampling import Looks
+    from compd.simulation import Looks
 
 _ANSWER_TIMEOUT_S = 15.0
 # So long at rest, every gauge has been read anew.
@@ -61,10 +61,9 @@ def tracker(
     from datetime import datetime
 
     from compd.errors import CompdError, Problem
-    from compd.files.atomic_files import write_files
-    from compd.files.output_file import check_replaceable
-    from compd.instruments.writers.registry import FORMATS
-    from compd.simulation.wires.instrument_sampling import Looks
+    from compd.files import check_replaceable, write_files
+    from compd.instruments import FORMATS
+    from compd.simulation import Looks
 
     written = FORMATS[shape.value]
     _check_options(shape, link, points, unit)
@@ -121,7 +120,7 @@ def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate
     from compd.client import connect
     from compd.clock import MonotonicClock
     from compd.errors import CompdError, Problem
-    from compd.simulation.wires.control_client import ControlClient
+    from compd.simulation import ControlClient
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     apart_mm, at_rest = [], 0
@@ -158,7 +157,7 @@ def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate
 
 def _for_join(shape: ExportFormat, link: int | None, points: bool, unit: str, rate_hz: float) -> str:
     """Options without which `compd join` asks, because the file says nothing of it."""
-    from compd.instruments.writers.registry import FORMATS
+    from compd.instruments import FORMATS
 
     written = FORMATS[shape.value]
     given = [

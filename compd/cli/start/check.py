@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from compd.commissioning.jump_trials import BelievedJump, FeignedJump
-    from compd.commissioning.line_budget import LineBudget
+    from compd.commissioning import BelievedJump, FeignedJump, LineBudget
     from compd.configuration import Configuration
     from compd.errors import Problem
 
@@ -35,7 +34,7 @@ def check(
     with the time that a cycle takes on this computer.
     """
     if schema:
-        from compd.configuration.schema import json_schema
+        from compd.configuration import json_schema
 
         typer.echo(json.dumps(json_schema(), indent=2))
         return
@@ -77,7 +76,7 @@ def check(
 
 def print_zero(configuration: Configuration) -> None:
     """Print the lengths at machine zero that a tape measure shows."""
-    from compd.configuration.operation import FRAME_DISTANCES
+    from compd.configuration import FRAME_DISTANCES
     from compd.machine_builder import build_model
 
     zero = build_model(configuration.geometry, configuration.wiring).zero
@@ -93,7 +92,7 @@ def print_blind_spots(configuration: Configuration) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from compd.commissioning.blind_spots import BLIND_SPOTS, DRIFT_UM, figures_of, shown_by
+    from compd.commissioning import BLIND_SPOTS, DRIFT_UM, figures_of, shown_by
 
     console = Console()
     figures = figures_of(configuration)
@@ -117,11 +116,15 @@ def print_blind_spots(configuration: Configuration) -> None:
 
 def print_lines(configuration: Configuration) -> list[Problem]:
     """Print what the lines carry and which jumps their gauges can feign; the warnings that follow."""
-    from compd.commissioning.jump_trials import feigned_jumps, jump_warnings, reply_warnings
-    from compd.commissioning.line_budget import line_budgets
-    from compd.commissioning.line_warnings import budget_warnings
-    from compd.commissioning.pushed_periods import period_warnings
-    from compd.commissioning.shared_addresses import shared_address_warnings
+    from compd.commissioning import (
+        budget_warnings,
+        feigned_jumps,
+        jump_warnings,
+        line_budgets,
+        period_warnings,
+        reply_warnings,
+        shared_address_warnings,
+    )
 
     budgets = line_budgets(configuration)
     jumps = feigned_jumps(configuration, budgets)
@@ -138,7 +141,7 @@ def print_lines(configuration: Configuration) -> list[Problem]:
 
 def _print_cycle(configuration: Configuration) -> list[Problem]:
     """Print what a cycle takes on this computer; the warning that follows."""
-    from compd.commissioning.cycle_time import cycle_warnings, measure_cycle, python_effect_times
+    from compd.commissioning import cycle_warnings, measure_cycle, python_effect_times
 
     cycle = measure_cycle(configuration)
     typer.echo(
@@ -153,7 +156,7 @@ def _print_cycle(configuration: Configuration) -> list[Problem]:
 def token_warnings(configuration: Configuration) -> list[Problem]:
     """What would keep the daemon from using the token's file; run by another user, check may not be able to read it."""
     from compd.errors import DaemonError
-    from compd.live.service.tcp_access import TcpAccess
+    from compd.live.service import TcpAccess
 
     try:
         TcpAccess.of(configuration.sockets.tcp)
@@ -181,7 +184,7 @@ def _print_budgets(budgets: Sequence[LineBudget]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.report.terminal_table import keep_words_whole
+    from compd.report import keep_words_whole
 
     table = Table(
         "line",
@@ -216,8 +219,8 @@ def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from compd.commissioning.jump_trials import named_together
-    from compd.report.terminal_table import keep_words_whole
+    from compd.commissioning import named_together
+    from compd.report import keep_words_whole
 
     title = "Largest jump that is believed of a machine at rest; on the move it is larger"
     table = Table(

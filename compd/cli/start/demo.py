@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from compd.demo.session import DemoSession
+    from compd.demo import DemoSession
 
 
 def demo(
@@ -44,11 +44,9 @@ def demo(
     from rich.console import Console
     from rich.live import Live as LiveText
 
-    from compd.configuration import load
-    from compd.configuration.shipped import shipped_configuration
-    from compd.demo.page import progress, summarise, verdict, write_demo_page
-    from compd.demo.session import SPEEDUP, run_demo
-    from compd.report.page import check_page_path
+    from compd.configuration import load, shipped_configuration
+    from compd.demo import SPEEDUP, progress, run_demo, summarise, verdict, write_demo_page
+    from compd.report import check_page_path
 
     page.parent.mkdir(parents=True, exist_ok=True)
     check_page_path(page)
@@ -78,16 +76,14 @@ def _load_daemon() -> None:
 
 
 def _show_live(config: Path | None, seed: int, port: int) -> None:
-    from compd.configuration import load
-    from compd.configuration.shipped import shipped_configuration
-    from compd.demo.live import SPEEDUP, run_live
-    from compd.page.guard import Token, hashed, new_token
-    from compd.page.run import run_page
+    from compd.configuration import load, shipped_configuration
+    from compd.demo import LIVE_SPEEDUP, run_live
+    from compd.page import Token, hashed, new_token, run_page
 
     configuration = load(config or shipped_configuration("tripod-cmm.yaml"))
     token = new_token()
     typer.echo(
-        f"{configuration.machine}, simulated; its weather {SPEEDUP:g} times faster than real. "
+        f"{configuration.machine}, simulated; its weather {LIVE_SPEEDUP:g} times faster than real. "
         "Starting it and the daemon ..."
     )
     _load_daemon()
@@ -111,19 +107,24 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
 def _show_linuxcnc(seed: int, program: Path | None, effect: str) -> None:
     from rich.console import Console
 
-    from compd.configuration import load
-    from compd.configuration.shipped import shipped_configuration
-    from compd.demo.linuxcnc.demonstration import SHIPPED_PROGRAM, SPEEDUP, run_linuxcnc_demo
-    from compd.demo.linuxcnc.page import summarise, verdict, write_linuxcnc_page
-    from compd.report.page import check_page_path
+    from compd.configuration import load, shipped_configuration
+    from compd.demo import (
+        LINUXCNC_SPEEDUP,
+        SHIPPED_PROGRAM,
+        linuxcnc_verdict,
+        run_linuxcnc_demo,
+        summarise_linuxcnc,
+        write_linuxcnc_page,
+    )
+    from compd.report import check_page_path
 
     page = Path("out/linuxcnc/program.html")
     page.parent.mkdir(parents=True, exist_ok=True)
     check_page_path(page)
     console = Console(highlight=False)
     console.print(
-        f"LinuxCNC, headless, on a simulated hexapod with gauges on real ptys; weather {SPEEDUP:g} times faster than "
-        f"real. {effect.partition('=')[0]} is hidden in the machine. About ten minutes."
+        f"LinuxCNC, headless, on a simulated hexapod with gauges on real ptys; weather {LINUXCNC_SPEEDUP:g} times "
+        f"faster than real. {effect.partition('=')[0]} is hidden in the machine. About ten minutes."
     )
     _load_daemon()
     demo = run_linuxcnc_demo(
@@ -134,7 +135,7 @@ def _show_linuxcnc(seed: int, program: Path | None, effect: str) -> None:
         console.print,
         program or SHIPPED_PROGRAM,
     )
-    console.print(summarise(demo))
-    console.print(verdict(demo))
+    console.print(summarise_linuxcnc(demo))
+    console.print(linuxcnc_verdict(demo))
     write_linuxcnc_page(page, demo)
     console.print(f"The same as a picture: {page}")

@@ -10,8 +10,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from compd.commissioning.doctor.finding import Computer, Finding, advice, fault, good, unknown
-from compd.configuration.lines import LineSettings, ModbusTcpLine, TcpLine
-from compd.configuration.pushed_lines import MqttLine, OpcUaLine
+from compd.configuration import LineSettings, ModbusTcpLine, MqttLine, OpcUaLine, TcpLine
 
 _BY_ID, _BY_PATH = "/dev/serial/by-id", "/dev/serial/by-path"
 # Their other end is held by another program as a matter of course.

@@ -18,11 +18,10 @@ from compd.comparison.criteria import ComparisonCriteria
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.machine_builder import build_model
-from compd.model.machine import MachineModel
-from compd.model.kinematics.motion import Movement
-from compd.model.effects.observations import Observations
-from compd.model.observer import observe
-from compd.recording.recording import Recording
+from compd.model import MachineModel, observe
+from compd.model.effects import Observations
+from compd.model.kinematics import Movement
+from compd.recording import Recording
 
 
 def align_recording(

@@ -29,17 +29,22 @@ from compd.comparison.alignment.registration import (
 )
 from compd.comparison.display_unit import in_place_unit
 from compd.errors import CompdError
-from compd.model.effects.deltas import Deltas, deltas_by_effect, split_by_port, sum_deltas
-from compd.model.effects.effect import ConstantValues, Effect, FittedEffect, Port
-from compd.model.effects.effect_basis import evaluate_basis
-from compd.model.effects.effect_needs import unmet_needs
-from compd.model.machine import MachineModel
-from compd.model.effects.observations import Observations
-from compd.model.prediction import predict
-from compd.model.sensitivity import Sensitivity, sensitivities
-from compd.model.kernels.solve_status import MEANING, Reason
-from compd.recording.gaps import filled
-from compd.recording.recording import Recording, UsableRows
+from compd.model import MachineModel, Sensitivity, predict, sensitivities
+from compd.model.effects import (
+    ConstantValues,
+    Deltas,
+    Effect,
+    FittedEffect,
+    Observations,
+    Port,
+    deltas_by_effect,
+    evaluate_basis,
+    split_by_port,
+    sum_deltas,
+    unmet_needs,
+)
+from compd.model.kernels import MEANING, Reason
+from compd.recording import Recording, UsableRows, filled
 from compd.result_tables import Columns, data_frame, html_table
 from compd.units import REFERENCE_UNITS, UM_PER_MM
 

@@ -15,12 +15,11 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.velocity import velocities
 from compd.errors import Problem, RecordingError
-from compd.model.effects.deltas import Deltas
-from compd.model.kinematics.motion import Movement
-from compd.model.effects.observations import Observations
-from compd.model.observer import observe_external
-from compd.tables.columns import is_sensitivity
-from compd.recording.recording import Recording
+from compd.model import observe_external
+from compd.model.effects import Deltas, Observations
+from compd.model.kinematics import Movement
+from compd.recording import Recording
+from compd.tables import is_sensitivity
 from compd.travel_direction import row_directions
 from compd.units import REFERENCE_UNITS, UM_PER_MM
 

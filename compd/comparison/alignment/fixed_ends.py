@@ -19,9 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.statistics.least_squares import solve_least_squares
-from compd.statistics.robust import robust_regression
 from compd.errors import Problem, RecordingError
+from compd.statistics import robust_regression, solve_least_squares
 
 # Gauss-Newton on a sphere from its algebraic fit converges in three or four steps.
 STEPS = 20

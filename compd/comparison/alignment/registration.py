@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.criteria import ComparisonCriteria
-from compd.statistics.robust import LEAST_SIGMA, robust_sigma
+from compd.statistics import LEAST_SIGMA, robust_sigma
 
 # Converges in three or four rounds: each drops the rows that the last one shows to be outliers.
 ROUNDS = 10

@@ -8,10 +8,10 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
 from compd.comparison.comparison import NO_QUANTITY
 from compd.comparison.contributions import deltas_without
 from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.recording_comparison import compare
 from compd.comparison.stream.block_queue import HandOver, computed_blocks
 from compd.comparison.stream.carried_effects import NOTHING_CARRIED, CarriedState, advance_effects
 from compd.comparison.stream.fixed_terms import NOTHING, BlockNuisance, FixedTerms, fixed_terms
@@ -20,8 +20,7 @@ from compd.comparison.stream.residual_totals import BlockResiduals, ResidualTota
 from compd.comparison.stream.sample import Sample
 from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.comparison.stream.time_envelope import TimeEnvelope
-from compd.model.effects.deltas import Deltas, sum_deltas
-from compd.model.effects.effect import FittedEffect
+from compd.model.effects import Deltas, FittedEffect, sum_deltas
 from compd.units import UM_PER_MM
 
 

@@ -1,4 +1,4 @@
-"""Fitting effects on a recording of any length: the steps of `compd.comparison.effect_fit`, each a pass through all rows.
+"""Fitting effects on a recording of any length: the steps of `compd.comparison.effect_fit` as passes through all rows.
 
 A fit on the sample is where it starts. It also fixes what Huber's weights count in, and beyond which residual a row is
 an outlier. Each pass adds up the normal equations of a Gauss-Newton step over all rows, and of each cluster for the
@@ -21,8 +21,6 @@ from compd.comparison.initial_states import initial_states
 from compd.comparison.nuisance import nuisance_columns
 from compd.comparison.outliers import OutlierLimits, outlier_limits
 from compd.comparison.quantity_ranges import Ranges, joined_ranges, quantity_ranges
-from compd.statistics.least_squares import solve_least_squares
-from compd.statistics.robust import huber_weights, robust_sigma
 from compd.comparison.stream.block_queue import HandOver, computed_blocks
 from compd.comparison.stream.carried_effects import (
     NOTHING_CARRIED,
@@ -36,8 +34,8 @@ from compd.comparison.stream.fixed_terms import session_places
 from compd.comparison.stream.normal_equations import ClusterNormals
 from compd.comparison.stream.recording_stream import Block, RecordingStream, align_block
 from compd.comparison.stream.sample import Sample
-from compd.model.effects.deltas import sum_deltas
-from compd.model.effects.effect import FittedEffect
+from compd.model.effects import FittedEffect, sum_deltas
+from compd.statistics import huber_weights, robust_sigma, solve_least_squares
 from compd.units import UM_PER_MM
 
 

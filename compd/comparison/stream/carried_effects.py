@@ -13,10 +13,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effects.deltas import Deltas, Memories, basis_deltas
-from compd.model.effects.effect import FittedEffect, Memory
-from compd.model.effects.effect_basis import evaluate_basis
-from compd.model.effects.observations import Observations
+from compd.model.effects import Deltas, FittedEffect, Memories, Memory, Observations, basis_deltas, evaluate_basis
 
 # Array of an effect's memory, place in it, and the fitted number by which it acts.
 StateKey: TypeAlias = tuple[int, int, int]

@@ -13,8 +13,8 @@ import numpy as np
 from compd.arrays import IntArray
 from compd.comparison.neighbour_block import BLOCKS
 from compd.comparison.stream.sample import Sample
-from compd.recording.recording import BLOCKS as FOLDS
-from compd.recording.recording import Recording
+from compd.recording import BLOCKS as FOLDS
+from compd.recording import Recording
 
 
 class RowClusters:

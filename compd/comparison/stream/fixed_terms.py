@@ -15,7 +15,7 @@ from compd.comparison.initial_states import InitialState, initial_states
 from compd.comparison.nuisance import nuisance_parameters
 from compd.comparison.outliers import OutlierLimits, outlier_limits
 from compd.comparison.stream.carried_effects import EffectRows, StateKey
-from compd.model.effects.effect import FittedEffect
+from compd.model.effects import FittedEffect
 from compd.units import UM_PER_MM
 
 # The whole model, among the names of what is switched off.

@@ -8,8 +8,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.nuisance import LEAST_SHARE
-from compd.statistics.cluster_covariance import covariance_of_normals
-from compd.statistics.least_squares import normal_norms, solve_normal
+from compd.statistics import covariance_of_normals, normal_norms, solve_normal
 
 
 class Sums(NamedTuple):

@@ -11,11 +11,10 @@ from typing import NamedTuple
 from compd.comparison.alignment.align_recording import align_observations, recorded_observations
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.open import recorded_machine
-from compd.configuration import Configuration
-from compd.configuration.shipped import Machine
+from compd.configuration import Configuration, Machine
 from compd.errors import Problem, RecordingError
-from compd.recording.blocks import recording_blocks, row_count
-from compd.recording.recording import Recording
+from compd.recording import Recording, recording_blocks
+from compd.tables import row_count
 
 # In memory a comparison takes 9 kB a row: more rows than these would take more than 2 GB.
 LONG_ROWS = 200_000

@@ -12,14 +12,14 @@ from compd.arrays import FloatArray, IntArray
 from compd.comparison.alignment.align_recording import align_observations, recorded_observations, session_starts
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
-from compd.statistics.replicates import MOST_ROWS as MOST_ROWS_OF_VISIT
 from compd.comparison.stream.recording_stream import Block, RecordingStream
 from compd.comparison.thinning import SEED
 from compd.errors import Problem, RecordingError
 from compd.machine_builder import build_model
-from compd.model.machine import MachineModel
-from compd.model.effects.observations import Observations
-from compd.recording.recording import Recording
+from compd.model import MachineModel
+from compd.model.effects import Observations
+from compd.recording import Recording
+from compd.statistics import MOST_ROWS as MOST_ROWS_OF_VISIT
 
 # They know a standard deviation within 0.5 %, and the limit of outliers alike; a comparison of them takes 0.2 GB.
 SAMPLE_ROWS = 20_000

@@ -13,8 +13,7 @@ import yaml
 
 from compd.arrays import FloatArray
 from compd.demo.linuxcnc.motion_log import MotionSample
-from compd.recording.sidecar import sidecar_contents
-from compd.recording.writer import write_recording
+from compd.recording import sidecar_contents, write_recording
 
 # Calibrated corners in {M}, mm, each outermost in x, y and z: the three faces that meet there are probed.
 CORNERS_mm = (

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from compd.configuration.shipped import shipped_configuration
+from compd.configuration import shipped_configuration
 from compd.errors import DaemonError, Problem
 
 # LinuxCNC refuses to run as root. Debian has this user everywhere, and it owns nothing.

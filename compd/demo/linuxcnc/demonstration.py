@@ -24,11 +24,10 @@ from compd.demo.processes import Command, run_commands
 from compd.demo.simulated_daemon import simulated_daemon
 from compd.errors import CompdError, DaemonError, Problem
 from compd.gauge import Quality
-from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.wires.control_client import ControlClient
+from compd.simulation import ControlClient, Mechanism
 
 # A minute of demonstration is half an hour of weather and warm-up.
-SPEEDUP = 30.0
+LINUXCNC_SPEEDUP = 30.0
 # The machine stands at machine zero until the controller commands it.
 ZERO_HOLD_S = 600.0
 SHIPPED_PROGRAM = Path(__file__).parent / "program.ngc"
@@ -71,7 +70,7 @@ def run_linuxcnc_demo(
     effects: Sequence[str],
     tell: Callable[[str], None],
     program: Path = SHIPPED_PROGRAM,
-    speedup: float = SPEEDUP,
+    speedup: float = LINUXCNC_SPEEDUP,
 ) -> LinuxCncDemo:
     """Probe while the machine warms up; run the program without corrections and with them; diagnose what was probed,
     adopt what was found, and run the program again.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, rms
-from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation import Mechanism
 from compd.units import UM_PER_MM
 
 # The machine is at rest when its nominal commands have been the same for so long, s.

@@ -9,14 +9,13 @@ from rich.table import Table as TerminalTable
 
 from compd.arrays import rms
 from compd.demo.linuxcnc.demonstration import ADOPTED, OFF, ON, LinuxCncDemo
-from compd.report.page import COLOURS, Panel, style_figure, write_page
-from compd.report.page_table import PageTable
+from compd.report import COLOURS, PageTable, Panel, style_figure, write_page
 
 COLUMNS = ("tip error, um", "at rest, rms", "largest", "moving, rms", "largest")
 RUN_COLOURS = {OFF: COLOURS["worst"], ON: COLOURS["middle"], ADOPTED: COLOURS["best"]}
 
 
-def summarise(demo: LinuxCncDemo) -> TerminalTable:
+def summarise_linuxcnc(demo: LinuxCncDemo) -> TerminalTable:
     table = TerminalTable(title="distance of the true tip from where the program wants it")
     for number, name in enumerate(COLUMNS):
         table.add_column(name, justify="right" if number else "left", no_wrap=True)
@@ -25,7 +24,7 @@ def summarise(demo: LinuxCncDemo) -> TerminalTable:
     return table
 
 
-def verdict(demo: LinuxCncDemo) -> str:
+def linuxcnc_verdict(demo: LinuxCncDemo) -> str:
     """The result in one sentence. The whole program counts where it has no rests."""
     errors = demo.errors.values()
     resting = all(len(run.at_rest_um) for run in errors)
@@ -52,7 +51,7 @@ def write_linuxcnc_page(path: Path, demo: LinuxCncDemo) -> None:
         ),
     ]
     footer = "LinuxCNC on a simulated machine, gauges on real ptys; the truth shares no code with the model."
-    write_page(path, "compd demo: LinuxCNC", verdict(demo), panels, footer)
+    write_page(path, "compd demo: LinuxCNC", linuxcnc_verdict(demo), panels, footer)
 
 
 def _rows(demo: LinuxCncDemo) -> list[tuple[str, ...]]:

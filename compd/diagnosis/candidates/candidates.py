@@ -9,11 +9,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.period_search import longest_period, promising_constants
+from compd.comparison import AlignedRecording, longest_period, promising_constants
 from compd.diagnosis.criteria import Criteria
-from compd.model.effects.effect import ConstantValues, Effect
-from compd.model.effects.effect_needs import unmet_needs
+from compd.model.effects import ConstantValues, Effect, unmet_needs
 from compd.units import UM_PER_MM
 
 Kind: TypeAlias = Literal["effect", "proxy", "constant", "description", "change"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate
 
 # Moments that are tried beside the sessions' starts, evenly over the rows; and of the starts so many at most, evenly

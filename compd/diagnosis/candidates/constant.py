@@ -8,14 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.alignment.measured_attitude import LABELS as ATTITUDE_LABELS
-from compd.comparison.alignment.measured_attitude import MM_PER_RAD
-from compd.comparison.alignment.measured_attitude import UNIT as ATTITUDE_UNIT
-from compd.statistics.least_squares import column_norms, solve_least_squares
+from compd.comparison import LABELS as ATTITUDE_LABELS
+from compd.comparison import MM_PER_RAD, AlignedRecording
+from compd.comparison import UNIT as ATTITUDE_UNIT
 from compd.diagnosis.candidates.candidates import Candidate
-from compd.model.effects.effect import ConstantValues, Effect, Parameter, memoryless_basis
-from compd.model.effects.observations import Observations
+from compd.model.effects import ConstantValues, Effect, Observations, Parameter, memoryless_basis
+from compd.statistics import column_norms, solve_least_squares
 from compd.units import UM_PER_MM
 
 CONSTANT = "constant"

@@ -7,7 +7,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import ParameterEstimate
-from compd.model.effects.effect import Effect
+from compd.model.effects import Effect
 
 # Share of its width by which a plausible range may be exceeded: ranges are from handbooks, and round, and an effect of
 # nearly the right form misses its number by as much.

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate, searched_parameters, variant
-from compd.model.effects.effect import Effect
-from compd.model.effects.effect_needs import needed_quantities, unmet_needs
+from compd.model.effects import Effect, needed_quantities, unmet_needs
 
 _PREFIX = "temperature_"
 

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.period_search import neighbouring_periods
+from compd.comparison import AlignedRecording, neighbouring_periods
 from compd.diagnosis.candidates.candidates import Candidate, variant
 
 # Values between neighbours that are tried: a grid of time constants a factor of two apart becomes one of 1.15.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.descriptions.search_covariates import (
     STAYED_THE_SAME,
     Kind,
@@ -22,8 +22,7 @@ from compd.diagnosis.descriptions.search_covariates import (
 )
 from compd.diagnosis.descriptions.term_formula import CONSTANTS, PARAMETERS, formula_text
 from compd.diagnosis.descriptions.term_grids import LAGS_S, ROUNDING, knees, periods, refined_periods, step_times_s
-from compd.model.effects.effect import Effect, Port
-from compd.model.effects.effect_basis import evaluate_basis
+from compd.model.effects import Effect, Port, evaluate_basis
 from compd.model.library import find_effect
 from compd.units import UM_PER_MM, unit_of
 

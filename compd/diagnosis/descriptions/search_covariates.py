@@ -14,8 +14,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.covariate import why_no_covariate
+from compd.comparison import AlignedRecording, why_no_covariate
 from compd.units import UNIT_KINDS, unit_of
 
 # What a covariate is, by its unit: it decides in which forms a residual may follow it.

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.statistics.periodogram import PeriodLimits, strongest_periods
 from compd.diagnosis.descriptions.search_covariates import SearchCovariate, round_within
+from compd.statistics import PeriodLimits, strongest_periods
 from compd.units import unit_of
 
 # Time constants of a lag, s: from a fan's minutes to a granite plate's morning.

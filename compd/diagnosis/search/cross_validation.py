@@ -9,10 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.errors import Problem, RecordingError
-from compd.recording.recording import BLOCKS
-from compd.recording.sidecar import PLACE, TIME
+from compd.recording import BLOCKS, PLACE, TIME
 
 # A column with more different values than this is a quantity, and divided into BLOCKS classes of equally many rows.
 MOST_VALUES = 12

@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.descriptions.empirical_terms import EmpiricalTerm, empirical_terms
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.regression import Regressors
 from compd.diagnosis.search.significance import OrthogonalComplement
-from compd.model.effects.effect import Effect
+from compd.model.effects import Effect
 
 # Values between neighbours of a grid that are tried for a step, a knee or a period.
 REFINED_VALUES = 9

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.special import chdtr, chdtrc, gammaln
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import GrossRows
+from compd.statistics import LEAST_SIGMA, robust_regression, trimmed_scale
 
 # Ridge of the robust fit, as a share of each column's squared norm: there may be more columns than rows determine.
 RIDGE = 1e-4

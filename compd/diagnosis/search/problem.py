@@ -10,11 +10,7 @@ from scipy.linalg import orth
 from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.comparison import Comparison
-from compd.comparison.neighbour_block import neighbour_blocks
-from compd.comparison.nuisance import nuisance_columns
-from compd.statistics.robust import LEAST_SIGMA, trimmed_scale
+from compd.comparison import AlignedRecording, Comparison, neighbour_blocks, nuisance_columns
 from compd.diagnosis.candidates.candidates import Candidate, CandidatePool
 from compd.diagnosis.candidates.constant import constant_candidate, split_constants
 from compd.diagnosis.criteria import Criteria
@@ -22,7 +18,8 @@ from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search.gross_rows import RowWeights, weigh_rows
 from compd.diagnosis.search.regression import RegressionData, Regressors
 from compd.diagnosis.search.subset_losses import SubsetLosses
-from compd.recording.gaps import filled
+from compd.recording import filled
+from compd.statistics import LEAST_SIGMA, trimmed_scale
 from compd.units import UM_PER_MM
 
 

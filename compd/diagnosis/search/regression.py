@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.statistics.least_squares import ridge_inverse, solve_ridge
+from compd.statistics import ridge_inverse, solve_ridge
 
 # Ridge of a parameter without a plausible range, as a share of its column's sum of squares: conditioning alone.
 LEAST_RIDGE = 1e-9

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.comparison.initial_states import initial_state_columns
+from compd.comparison import initial_state_columns
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.diagnosis.candidates.refined_constants import refined_variants
 from compd.diagnosis.search.problem import DiagnosisProblem

@@ -11,8 +11,8 @@ from compd.diagnosis.words.phrases import (
     thermal_in_one_session,
     untested_here,
 )
-from compd.model.formula.keys import FormulaDeclaration
-from compd.text.numbers_as_text import join_words
+from compd.model.formula import FormulaDeclaration
+from compd.text import join_words
 
 # What a formula says of telling it from others where the person who wrote it said nothing.
 NO_WORDS = FormulaDeclaration.model_fields["separated_by"].default

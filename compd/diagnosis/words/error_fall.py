@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from compd.diagnosis.verdict import Diagnosis
-from compd.text.numbers_as_text import fall_text, number_text, percent_text
+from compd.text import fall_text, number_text, percent_text
 
 # Where a floor is from, in words.
 _SOURCES = {"repeats": "repeats", "declared": "declared"}

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from compd.comparison.comparison import Comparison
+from compd.comparison import Comparison
 from compd.diagnosis.findings import ConstantFinding, DiagnosisStep, EmpiricalFinding, GrossRows, UntestedEffect
 from compd.diagnosis.verdict import Diagnosis
-from compd.model.effects.effect import Effect
-from compd.model.formula.keys import FormulaDeclaration
+from compd.model.effects import Effect
+from compd.model.formula import FormulaDeclaration
 from compd.model.library import BUNDLED
-from compd.text.numbers_as_text import chance_text, estimate_text, estimates_text, join_words, number_text, percent_text
+from compd.text import chance_text, estimate_text, estimates_text, join_words, number_text, percent_text
 
 # What a formula says of its physics where the person who wrote it said nothing.
 _NO_PHYSICS = FormulaDeclaration.model_fields["physics"].default

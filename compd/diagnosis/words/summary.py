@@ -9,7 +9,7 @@ from __future__ import annotations
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import error_fall
 from compd.diagnosis.words.phrases import change_text, followed_text, rivals_text, shown_by, was_any_tried
-from compd.text.numbers_as_text import join_words, number_text
+from compd.text import join_words, number_text
 
 CANNOT_KNOW = "how much of it is noise cannot be known"
 

@@ -24,8 +24,7 @@ from compd.diagnosis.words.phrases import (
     was_any_tried,
 )
 from compd.diagnosis.words.summary import CANNOT_KNOW
-from compd.text.labelled_lines import LabelledText, fit_lines
-from compd.text.numbers_as_text import fall_text, join_words, number_text, percent_text
+from compd.text import LabelledText, fall_text, fit_lines, join_words, number_text, percent_text
 
 # What a terminal shows without scrolling, and its usual width.
 MOST_LINES = 12

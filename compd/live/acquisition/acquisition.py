@@ -14,20 +14,17 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.configuration.lines import LineSettings
-from compd.configuration.pushed_lines import PushedLineSettings
+from compd.configuration import LineSettings, PushedLineSettings
 from compd.gauge import Gauge, LineFault, Quality
-from compd.lines import open_line
-from compd.lines.modbus_tcp import ModbusTcp
+from compd.lines import ModbusTcp, open_line
 from compd.live.acquisition.gauge_trust import Judge
-from compd.live.acquisition.shared_endpoints import Peers
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.polled_round import OpenLine, PolledRound
 from compd.live.acquisition.pushed_round import PushedRound
 from compd.live.acquisition.round_trigger import RoundBuffer
-from compd.live.memory.latest import Latest
-from compd.live.memory.poll_requests import PollRequests
-from compd.live.system.realtime import sharpen_timers
+from compd.live.acquisition.shared_endpoints import Peers
+from compd.live.memory import Latest, PollRequests
+from compd.live.system import sharpen_timers
 
 log = structlog.get_logger()
 

@@ -26,10 +26,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
-from compd.stated_noise import DIFFERENCE_SIGMAS
 from compd.gauge import ReadingMotion
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.reading import ROUNDS_UNTIL_DUE
+from compd.stated_noise import DIFFERENCE_SIGMAS
 
 # Over longer, s, no speed is measured: a drift that is older says little of now.
 LONGEST_WINDOW_S = 1.0

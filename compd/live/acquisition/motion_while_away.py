@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from compd.live.memory.trust_memory import Doubt, TrustMemory
+from compd.live.memory import Doubt, TrustMemory
 
 # Where all gauges were away, s, until those that are back are compared without those that are not.
 _WAIT_FOR_OTHERS_S = 2.0

@@ -12,8 +12,7 @@ from compd.clock import Clock
 from compd.gauge import Gauge, Quality, Reading, bad
 from compd.live.acquisition.gauge_trust import GaugeTrust, Judge
 from compd.live.acquisition.round_trigger import RoundBuffer, stamped
-from compd.live.memory.latest import Latest
-from compd.live.memory.readings import LONGEST_DETAIL
+from compd.live.memory import LONGEST_DETAIL, Latest
 from compd.pushed_gauge import Heard
 
 log = structlog.get_logger()

@@ -15,15 +15,14 @@ from contextlib import contextmanager
 from typing import Protocol
 
 from compd.clock import Clock
-from compd.configuration.lines import PolledLine
+from compd.configuration import PolledLine
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines.echo import explained
-from compd.lines.stream import shown
+from compd.lines import explained, shown
 from compd.live.acquisition.absent_gauges import AbsentGauges
 from compd.live.acquisition.polled_gauge import DAMAGED, LONGEST_REST_S, BackOff, PolledGauge
 from compd.live.acquisition.reply_order import ReplyOrder
 from compd.live.acquisition.round_trigger import RoundBuffer, send_trigger
-from compd.live.memory.poll_requests import PollRequests
+from compd.live.memory import PollRequests
 
 # Shortest time from one round of polls to the next, s. Modbus TCP answers in 0.1 ms: polled without a pause, it would
 # take the interpreter from the other lines, and a processor from everybody.

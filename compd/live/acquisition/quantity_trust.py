@@ -19,7 +19,7 @@ import numpy as np
 
 from compd.gauge import Quality, Reading, bad
 from compd.live.acquisition.possible_motion import GaugeSample
-from compd.live.memory.trust_memory import Doubt, TrustMemory
+from compd.live.memory import Doubt, TrustMemory
 
 # So long a quantity may be implausible, s: longer than a burst of interference, shorter than the usual `loop.hold_s`.
 LASTING_S = 1.0

@@ -19,6 +19,7 @@ from itertools import pairwise
 
 from compd.gauge import Quality, Reading, bad
 from compd.live.acquisition.motion_estimate import LONGEST_WINDOW_S, MotionEstimate
+from compd.live.acquisition.motion_while_away import all_back, moved_while_away, scales_stood, stood_still
 from compd.live.acquisition.possible_motion import (
     BASE_S,
     WINDOW_S,
@@ -32,8 +33,7 @@ from compd.live.acquisition.possible_motion import (
 from compd.live.acquisition.scatter import LatestScatter, RestScatter
 from compd.live.acquisition.steps import Steps
 from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
-from compd.live.acquisition.motion_while_away import all_back, moved_while_away, scales_stood, stood_still
-from compd.live.memory.trust_memory import Doubt, TrustMemory
+from compd.live.memory import Doubt, TrustMemory
 
 # After a gap, s, until the others have been read that have begun to move at the same time.
 _WAIT_FOR_MOTION_S = 0.3

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
+from compd.configuration import TriggerBytes, TriggerWrite
 from compd.gauge import Gauge, Reading
-from compd.live.memory.latest import Latest
+from compd.live.memory import Latest
 
 
 def send_trigger(trigger: TriggerBytes | TriggerWrite, line: Any) -> float:

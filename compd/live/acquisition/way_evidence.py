@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.live.acquisition.possible_motion import GaugeSample
-from compd.live.memory.trust_memory import Doubt, TrustMemory
+from compd.live.memory import Doubt, TrustMemory
 
 # Over this time, s, before and after a gap the ratio of the links' ways is taken: some polls, and little of a curve.
 SIDE_S = 0.06

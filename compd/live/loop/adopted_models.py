@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from compd.live.loop.model_loader import ModelLoader, Models, ModelText
-from compd.live.memory.shared_message import SharedMessage
+from compd.live.memory import SharedMessage
 
 # Two model files with ledgers of years; memory that is not used costs nothing.
 _CAPACITY = 64 * 1024 * 1024

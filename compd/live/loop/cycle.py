@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation.compensation import compensate_cmm
-from compd.compensation.values import Compensation, GaugeValues, WarmStart
+from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm
 from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_readings import Scales, read_comparators, read_scales
@@ -29,13 +28,13 @@ from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import UsableComparators
-from compd.live.loop.states import Mode, State
 from compd.live.loop.tip_bound import refused_bound, tip_bound, with_place
 from compd.live.loop.tip_uncertainty import TipUncertainty, has_grown, noise_now, tip_uncertainty
 from compd.live.loop.wiring import MachineWires
-from compd.live.memory.latest import Snapshot
-from compd.model.machine import MachineModel
-from compd.model.kernels.solve_status import MEANING, Reason
+from compd.live.memory import Snapshot
+from compd.model import MachineModel
+from compd.model.kernels import MEANING, Reason
+from compd.setpoint_states import Mode, State
 
 TARGET_TOO_OLD = (
     "the controller's target is too old (sockets.target.valid_for_s): it sends one again, or its role ends by "

@@ -12,9 +12,9 @@ from compd.live.loop.cycle_state import CycleInputs, CycleSettings
 from compd.live.loop.degraded import GroupReadings, degraded_comparators
 from compd.live.loop.model_loader import LiveModel
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
-from compd.live.loop.states import State
 from compd.live.loop.wiring import Wires
-from compd.live.memory.latest import Snapshot
+from compd.live.memory import Snapshot
+from compd.setpoint_states import State
 
 
 def read_comparators(

@@ -10,8 +10,8 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation.values import WarmStart
-from compd.configuration.operation import LimitSettings, LoopSettings
+from compd.compensation import WarmStart
+from compd.configuration import LimitSettings, LoopSettings
 from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.machine_zero import MachineZero
@@ -19,10 +19,8 @@ from compd.live.loop.model_loader import Models
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.live.loop.tip_uncertainty import scatter_limits_mm
 from compd.live.loop.wiring import MachineWires
-from compd.live.memory.latest import Snapshot
-from compd.model.effect_memory import EffectMemory
-from compd.model.machine import MachineModel
-from compd.model.uncertainty import GaugeNoise
+from compd.live.memory import Snapshot
+from compd.model import EffectMemory, GaugeNoise, MachineModel
 
 # The uncertainty of the tip changes over seconds, as the machine warms up or crosses its workspace.
 _UNCERTAINTY_EVERY_S = 1.0

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration.operation import LoopSettings
+from compd.configuration import LoopSettings
 from compd.live.loop.reasons import Lost
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 
 GROUPS = ("joints", "frame", "effects")
 

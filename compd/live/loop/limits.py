@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration.operation import LimitSettings
-from compd.live.loop.states import State
+from compd.configuration import LimitSettings
+from compd.setpoint_states import State
 
 # A step may exceed the slew limit by this much, which is rounding, without being reported as slewing.
 _ROUNDING_MM = 1e-12

@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Sequence
 
 from compd.clock import Clock
-from compd.live.system import realtime
 from compd.live.loop.commands import Commands
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
-from compd.live.memory.latest import Latest
+from compd.live.memory import Latest
+from compd.live.system import QuietCollector, sleep_until
 
 
 class Loop:
@@ -26,11 +26,11 @@ class Loop:
         sinks: Sequence[Callable[[Setpoint], None]],
         clock: Clock,
         timing: LoopTiming | None = None,
-        sleep_until: Callable[[float], None] = realtime.sleep_until,
+        sleep_until: Callable[[float], None] = sleep_until,
     ) -> None:
         """`sinks` take every setpoint, and must not wait. `timing`: where the loops of other processes go on."""
         self.timing = timing or LoopTiming(cycle.period_s)
-        self.collector = realtime.QuietCollector()
+        self.collector = QuietCollector()
         self._cycle = cycle
         self._latest = latest
         self._commands = commands

@@ -12,9 +12,7 @@ import structlog
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.errors import Problem, StateError
-from compd.files.atomic_files import read_small_file, write_files
-from compd.files.checksum import CHECKSUM, checksum_of
-from compd.files.file_kind import FileKind
+from compd.files import CHECKSUM, FileKind, checksum_of, read_small_file, write_files
 
 FILE_NAME = "machine-zero.json"
 # The machine zero before the present one, as its file was.

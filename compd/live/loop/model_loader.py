@@ -13,21 +13,18 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation.values import GaugeValues, WarmStart
-from compd.configuration.yaml_reader import LARGEST_BYTES
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.configuration import LARGEST_BYTES
 from compd.errors import Problem, StateError
-from compd.files.atomic_files import read_small_file
+from compd.files import read_small_file
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.wiring import Beyond, MachineWires, WiredValues, Wires
-from compd.live.memory.latest import Snapshot
-from compd.model.effects.effect import FittedEffect
-from compd.model.effects.effect_needs import needed_quantities, unmet_needs
-from compd.model.machine import MachineModel
-from compd.model.effects.observations import available_settings
-from compd.model_file.model_file import ModelFile, Range, read_model_file
+from compd.live.memory import Snapshot
+from compd.model import MachineModel
+from compd.model.effects import FittedEffect, available_settings, needed_quantities, unmet_needs
+from compd.model_file import ModelFile, Range, read_model_file
 from compd.plugins import OWN_CODE, Code
-from compd.recording.checks import limit_of
+from compd.recording import limit_of
 
 _HASH_DIGITS = 16
 

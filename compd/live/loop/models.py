@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation.values import Compensation, GaugeValues, WarmStart
+from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleState
 from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.loop.setpoint import ShadowResult
-from compd.live.memory.latest import Snapshot
-from compd.model.effect_memory import EffectMemory, carry_over
-from compd.model.machine import MachineModel
-from compd.model.kernels.solve_status import MEANING, Reason
+from compd.live.memory import Snapshot
+from compd.model import EffectMemory, MachineModel, carry_over
+from compd.model.kernels import MEANING, Reason
 
 
 def adopt_models(state: CycleState, models: Models) -> CycleState:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-from compd.live.loop.states import Mode
+from compd.setpoint_states import Mode
 
 MAGIC = b"CMPD"
 LAYOUT_VERSION = 1

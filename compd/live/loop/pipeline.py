@@ -12,7 +12,7 @@ from compd.live.loop.cycle_state import CycleSettings
 from compd.live.loop.model_loader import ModelLoader, Models
 from compd.live.loop.tip_uncertainty import stated_noise
 from compd.live.loop.wiring import MachineWires
-from compd.live.memory.latest import Latest
+from compd.live.memory import Latest
 from compd.machine_builder import build_model
 from compd.plugins import OWN_CODE, Code
 

@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart
 from compd.live.loop.commands import Target
 from compd.live.loop.models import compensate
 from compd.live.loop.wiring import MachineWires
-from compd.model.effect_memory import carry_over
-from compd.model.machine import MachineModel
+from compd.model import MachineModel, carry_over
 
 # A joint runs out and a frame grows by some hundredths of a millimetre: a change beyond this, mm, is no measurement.
 _IMPLAUSIBLE_MM = 1.0

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation.values import WarmStart
+from compd.compensation import WarmStart
 from compd.errors import StateError
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.directions import Directions
@@ -20,10 +20,9 @@ from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import ModelNames, Models
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.stale_policy import ComparatorSet
-from compd.live.loop.states import Mode, State
-from compd.live.memory.latest import Snapshot
-from compd.live.memory.readings import Readings
-from compd.model.effect_memory import EffectMemory
+from compd.live.memory import Readings, Snapshot
+from compd.model import EffectMemory
+from compd.setpoint_states import Mode, State
 
 _PICKLE_PROTOCOL = 5
 NO_MODELS = ModelNames({}, {})

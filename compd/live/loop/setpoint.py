@@ -11,7 +11,7 @@ import numpy as np
 import orjson
 
 from compd.arrays import FloatArray
-from compd.compensation.values import CorrectionShares
+from compd.compensation import CorrectionShares
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.packet_layout import (
@@ -23,7 +23,7 @@ from compd.live.loop.packet_layout import (
     PACKET_LINKS,
     PACKET_SIZE,
 )
-from compd.live.loop.states import Mode, State
+from compd.setpoint_states import Mode, State
 
 # 0.1 nm: a hundredth of the resolution of the best comparators.
 _DECIMALS_MM = 7

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 
 from compd.gauge import Reading
 from compd.live.loop.wiring import Wire
-from compd.live.memory.latest import Snapshot
+from compd.live.memory import Snapshot
 
 
 def skew_between(length_times_s: Sequence[float], oldest_s: float, newest_s: float) -> float:

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration.operation import LoopSettings
+from compd.configuration import LoopSettings
 from compd.live.loop.reasons import Lost
-from compd.live.loop.states import State
 from compd.live.loop.wiring import Beyond
+from compd.setpoint_states import State
 
 # How long the correction is held, at most, while the daemon ends.
 _LONGEST_END_S = 1.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from compd.live.memory.shared_array import shared_floats
+from compd.live.memory import shared_floats
 
 BIN_US = 1.0
 _BINS = 10_000  # 10 ms; later ones share the last bin, the largest is kept exactly

@@ -22,14 +22,14 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation.values import Compensation
+from compd.compensation import Compensation
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleSettings
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators
 from compd.live.loop.tip_uncertainty import TipUncertainty
 from compd.live.loop.wired_readings import tip_bound_um
 from compd.live.loop.wiring import MachineWires
-from compd.live.memory.latest import Snapshot
+from compd.live.memory import Snapshot
 from compd.units import UM_PER_MM
 
 # Of the causes of a correction, joints and frame come first.

@@ -10,15 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation.values import GaugeValues
+from compd.compensation import GaugeValues
 from compd.configuration import Configuration
-from compd.stated_noise import SCATTER_RATIO
 from compd.live.loop.wiring import Beyond, MachineWires
-from compd.live.memory.latest import Snapshot
-from compd.model.effect_memory import EffectMemory
-from compd.model.machine import MachineModel
-from compd.model.tip_derivative import tip_derivatives
-from compd.model.uncertainty import GaugeNoise, parameter_variance
+from compd.live.memory import Snapshot
+from compd.model import EffectMemory, GaugeNoise, MachineModel, parameter_variance, tip_derivatives
+from compd.stated_noise import SCATTER_RATIO
 from compd.units import UM_PER_MM
 
 # A length is the difference of so many: now and at machine zero.

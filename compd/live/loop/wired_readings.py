@@ -18,8 +18,8 @@ from numba import types
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray, IntArray
-from compd.live.memory.readings import OK_NUMBER, SLOTS
 from compd.jit import COUNT, FLAG, INDICES, NUMBERS, SCALAR, helper, loop
+from compd.live.memory import OK_NUMBER, SLOTS
 from compd.reading import ROUNDS_UNTIL_DUE
 from compd.units import UM_PER_MM
 

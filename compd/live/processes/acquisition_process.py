@@ -9,13 +9,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from compd.clock import Clock
-from compd.live.acquisition.acquisition import Acquisition
-from compd.live.acquisition.cross_checks.cross_checks import LOOK_EVERY_S
-from compd.live.memory.shared_message import SharedMessage
-from compd.live.system.child_process import OUT_OF_MEMORY
-from compd.live.memory.control import Control, Phase
-from compd.live.system.memory_limit import limit_memory
-from compd.live.system.realtime import LARGEST_SHARE, RationedPriority
+from compd.live.acquisition import LOOK_EVERY_S, Acquisition
+from compd.live.memory import Control, Phase, SharedMessage
+from compd.live.system import LARGEST_SHARE, OUT_OF_MEMORY, RationedPriority, limit_memory
 
 # A driver in the middle of a poll may take so long to let go of its line.
 _STOP_WITHIN_S = 0.5

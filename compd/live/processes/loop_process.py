@@ -12,23 +12,31 @@ from dataclasses import dataclass
 import structlog
 
 from compd.clock import Clock
-from compd.configuration.operation import LoopSettings
+from compd.configuration import LoopSettings
 from compd.errors import CompdError, Problem, StateError
-from compd.live.system import realtime
-from compd.live.loop.adopted_models import AdoptedModels
-from compd.live.loop.commands import Commands
-from compd.live.loop.cycle import step
-from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
-from compd.live.loop.directions import Directions
-from compd.live.loop.loop import Loop
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import LiveModel, ModelLoader, Models, ModelText, warn_of_datum
-from compd.live.loop.ring_entries import CyclePacker, CycleUnpacker, SentSetpoint
-from compd.live.loop.setpoint import Setpoint
-from compd.live.loop.timing import LoopTiming
-from compd.live.memory.latest import Latest
-from compd.live.memory.shared_ring import SharedRing
-from compd.live.memory.control import Control
+from compd.live.loop import (
+    AdoptedModels,
+    Commands,
+    CycleInputs,
+    CyclePacker,
+    CycleSettings,
+    CycleState,
+    CycleUnpacker,
+    Directions,
+    LiveModel,
+    Loop,
+    LoopTiming,
+    MachineZero,
+    ModelLoader,
+    Models,
+    ModelText,
+    SentSetpoint,
+    Setpoint,
+    step,
+    warn_of_datum,
+)
+from compd.live.memory import Control, Latest, SharedRing
+from compd.live.system import limit_wake_latency, lock_memory, sharpen_timers, use_fifo
 
 # Cycles that a loop computes before the first that counts.
 _TRIAL_CYCLES = 20
@@ -95,7 +103,7 @@ class LoopProcess:
         loop = self._loop()
         self._prepare(loop)
         self._try_cycles(self._state_left(models, forget))
-        realtime.use_fifo(self.settings.loop.priority)
+        use_fifo(self.settings.loop.priority)
         loop.run(lambda: self.control.keeps_turn(number), self.control.ending, self._state_left(models, forget))
 
     def run_successor(self, number: int, request: ModelChange) -> None:
@@ -115,7 +123,7 @@ class LoopProcess:
             _log.warning("model refused", file=request.name, reason=reason)
             self.answer(request.number, None, reason)
             return
-        realtime.use_fifo(self.settings.loop.priority)
+        use_fifo(self.settings.loop.priority)
         if not control.await_turn(number, _TURN_WITHIN_S):
             self.answer(request.number, None, "the loop does not answer")
             return
@@ -163,15 +171,15 @@ class LoopProcess:
     def _prepare(self, loop: Loop) -> None:
         """Ask the system for what real time needs. What it does not permit is told, and the loop runs without it."""
         settings = self.settings.loop
-        realtime.sharpen_timers()
+        sharpen_timers()
         permissions = {"quiet_collector": loop.collector.start(self.clock.monotonic())}
         if settings.lock_memory:
-            permissions["locked_memory"] = realtime.lock_memory()
+            permissions["locked_memory"] = lock_memory()
         if (latency_us := wake_latency_us(settings)) is not None:
-            permissions["wake_latency"] = realtime.limit_wake_latency(latency_us)
-        permissions["sched_fifo"] = realtime.use_fifo(settings.priority)
+            permissions["wake_latency"] = limit_wake_latency(latency_us)
+        permissions["sched_fifo"] = use_fifo(settings.priority)
         # what follows must not get in the way of the loop that has the turn
-        realtime.use_fifo(_TRIAL_PRIORITY)
+        use_fifo(_TRIAL_PRIORITY)
         self.control.realtime.write({name: permission._asdict() for name, permission in permissions.items()})
 
     def _try_cycles(self, state: CycleState) -> None:

@@ -9,18 +9,12 @@ from dataclasses import dataclass
 import structlog
 
 from compd.clock import Clock
-from compd.live.system.journal import Journal
-from compd.live.loop.ring_entries import SentSetpoint
-from compd.live.loop.states import State
-from compd.live.memory.control import Control, Phase
+from compd.live.loop import SentSetpoint
+from compd.live.memory import Control, Phase
 from compd.live.processes.log_relay import LogRelay
-from compd.live.system.realtime import RationedPriority, sharpen_timers, shorten_switch_interval
-from compd.live.service.last_readings import LastReadings
-from compd.live.service.model_switch import ModelSwitch
-from compd.live.service.publisher import Publisher
-from compd.live.service.requests import Requests
-from compd.live.service.udp_sender import UdpSender
-from compd.live.service.zero_capture import ZeroCapture
+from compd.live.service import LastReadings, ModelSwitch, Publisher, Requests, UdpSender, ZeroCapture
+from compd.live.system import Journal, RationedPriority, sharpen_timers, shorten_switch_interval
+from compd.setpoint_states import State
 
 # Characters. A reason that names every gauge of a machine has thousands; the log has it whole.
 _LONGEST_HEADLINE = 500

@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Protocol
 
 from compd.errors import CompdError
-from compd.files.atomic_files import sync_directory
+from compd.files import sync_directory
 from compd.live.record.appended_file import AppendedFile
-from compd.tables.columns import number_text
-from compd.recording.open_part import ARROW, OpenPartFormat, close_part
-from compd.tables.table_file import CSV, PARQUET
-from compd.tables.table_format import TableFormat
+from compd.recording import ARROW, OpenPartFormat, close_part
+from compd.tables import CSV, PARQUET, TableFormat, number_text
 
 # One value of every column; None where nothing was measured.
 Row = Sequence[float | None]

@@ -35,9 +35,7 @@ from compd.live.record.part_table import close_left_parts
 from compd.live.record.readings_feed import FeedItem
 from compd.live.record.recording_part import ORDER, RecordingPart
 from compd.live.record.table_rows import Message
-from compd.tables.table_file import PARQUET
-from compd.tables.parquet_table import arrow_modules
-from compd.tables.table_format import TableFormat
+from compd.tables import PARQUET, TableFormat, arrow_modules
 
 _WRITE_EVERY_S = 0.5
 # 100 s of a 200 Hz burst, about 80 MB: a disk that stalls for longer is a fault.

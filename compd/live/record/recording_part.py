@@ -6,14 +6,14 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from compd.configuration.yaml_reader import LARGEST_BYTES
-from compd.files.atomic_files import read_small_file, sync_directory, write_new_file
+from compd.configuration import LARGEST_BYTES
+from compd.files import read_small_file, sync_directory, write_new_file
 from compd.live.record.appended_file import AppendedFile
 from compd.live.record.part_table import part_table
 from compd.live.record.table_rows import Message, TableRows
-from compd.recording.sidecar import sidecar_contents, sidecar_text
-from compd.tables.table_format import TableFormat
-from compd.text.json_text import encode_compact
+from compd.recording import sidecar_contents, sidecar_text
+from compd.tables import TableFormat
+from compd.text import encode_compact
 
 CYCLES_SUFFIX = ".cycles.jsonl"
 MODEL_MARK = ".model-"

@@ -11,19 +11,23 @@ from typing import NamedTuple
 
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
-from compd.live.loop.cycle import step
-from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
-from compd.live.loop.model_loader import LiveModel, Models
-from compd.live.loop.setpoint import Setpoint
-from compd.live.loop.tip_uncertainty import stated_noise
-from compd.live.loop.pipeline import Pipeline, build_pipeline
+from compd.live.loop import (
+    CycleInputs,
+    CycleSettings,
+    CycleState,
+    LiveModel,
+    Models,
+    Pipeline,
+    Setpoint,
+    build_pipeline,
+    stated_noise,
+    step,
+)
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER
 from compd.live.record.table_rows import Message
-from compd.live.service.readings_message import RecordedCycle, parse_readings
-from compd.live.service.state_json import FORMER_TIP_NOISE
-from compd.tables.columns import SKEW_COLUMN
-from compd.recording.open_part import ARROW, OpenPart
-from compd.tables.table_file import CSV, SUFFIXES, row_count
+from compd.live.service import FORMER_TIP_NOISE, RecordedCycle, parse_readings
+from compd.recording import ARROW, OpenPart
+from compd.tables import CSV, SKEW_COLUMN, SUFFIXES, row_count
 
 # Of a part's messages the first two say who spoke, and what the columns are.
 _FIRST_CLASSES = ("VERSION", "WATCH")

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from compd.live.record.part_table import Row
-from compd.tables.columns import SKEW_COLUMN, approach_columns, decimals
+from compd.tables import SKEW_COLUMN, approach_columns, decimals
 from compd.units import UM_PER_MM
 
 Message = Mapping[str, Any]

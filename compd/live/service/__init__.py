@@ -1,1 +1,5 @@
 """What clients see: sockets, messages, requests, and what is done on request beside the loop."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

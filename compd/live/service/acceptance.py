@@ -13,7 +13,7 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.live.memory.trust_memory import Doubt, TrustMemory
+from compd.live.memory import Doubt, TrustMemory
 from compd.live.service.messages import line
 
 # Votes look at 0.3 s of readings at most. Of a gauge that is read less often it is told that it has not been read yet.

@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.model import MachineModel, tip_by_links
+from compd.model.kernels import Reason
+from compd.model.kinematics import Pose, forward_kinematics
 from compd.rotation import compose, rotation_matrix, rotation_vector, to_inner, to_outer
-from compd.model.kinematics.link_kinematics import Pose, forward_kinematics
-from compd.model.machine import MachineModel
-from compd.model.sensitivity import tip_by_links
-from compd.model.kernels.solve_status import Reason
 from compd.units import UM_PER_MM
 
 # 0.1 nm, as uncertainties in a SETPOINT.

@@ -8,7 +8,7 @@ import threading
 import time
 from contextlib import suppress
 
-from compd.files.atomic_files import close_descriptor
+from compd.files import close_descriptor
 
 # Descriptors that wait to be closed. With more the one before them hangs, and no further ones are taken.
 MOST_WAITING = 64

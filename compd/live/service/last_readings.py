@@ -19,10 +19,9 @@ import structlog
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.clock import Clock
-from compd.files.atomic_files import write_files
-from compd.files.checksum import CHECKSUM, checksum_of
-from compd.live.memory.trust_memory import Doubt, TrustMemory
-from compd.live.system.port_names import changed_ports
+from compd.files import CHECKSUM, checksum_of, write_files
+from compd.live.memory import Doubt, TrustMemory
+from compd.live.system import changed_ports
 
 FILE_NAME = "last-readings.json"
 _FORMAT = 1

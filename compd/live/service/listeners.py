@@ -7,7 +7,7 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 
-from compd.configuration.operation import SocketSettings
+from compd.configuration import SocketSettings
 from compd.errors import DaemonError, Problem
 
 _UNIX_SOCKET_MODE = 0o660  # the daemon's user and group

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from compd.live.loop.setpoint import Setpoint
-from compd.live.loop.states import Mode, State
-from compd.live.memory.shared_ring import SharedRing
+from compd.live.loop import Setpoint
+from compd.live.memory import SharedRing
+from compd.setpoint_states import Mode, State
 
 # Within two periods, and not sooner than 20 ms, clients are told that there is no setpoint. A part of that time is left
 # for the way to them.

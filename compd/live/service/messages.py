@@ -14,8 +14,7 @@ from typing import Any, NamedTuple, NoReturn, Self
 
 from pydantic import ValidationError
 
-from compd.text.json_text import encode_compact
-from compd.text.secrets import holds_secret
+from compd.text import encode_compact, holds_secret
 
 PROTOCOL = 1
 MAX_LINE_BYTES = 4096

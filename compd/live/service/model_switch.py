@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 import structlog
 
 from compd.clock import Clock
-from compd.configuration.yaml_reader import LARGEST_BYTES
-from compd.files.atomic_files import read_descriptor
-from compd.live.loop.model_loader import ModelText
-from compd.live.memory.control import Control
+from compd.configuration import LARGEST_BYTES
+from compd.files import read_descriptor
+from compd.live.loop import ModelText
+from compd.live.memory import Control
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 
 # A file of 1 MB is read in milliseconds, from a network in a second.

@@ -20,16 +20,15 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.live.loop.ring_entries import CycleUnpacker, SentSetpoint
-from compd.live.loop.setpoint import Setpoint
-from compd.live.memory.shared_ring import RingReader, SharedRing
+from compd.live.loop import CycleUnpacker, SentSetpoint, Setpoint
+from compd.live.memory import RingReader, SharedRing
 from compd.live.service.client_session import ClientSession, Stream
+from compd.live.service.connection_limits import WRONG_TOKEN_REST_S, prepare_tcp, seat_lost, seat_refused
 from compd.live.service.descriptor_bin import DescriptorBin
 from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import Requests
-from compd.live.service.connection_limits import WRONG_TOKEN_REST_S, prepare_tcp, seat_lost, seat_refused
 
 # Between two looks for clients that are to lose their place.
 _LOOK_EVERY_S = 0.25

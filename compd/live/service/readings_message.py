@@ -13,18 +13,12 @@ from typing import Any, NamedTuple
 
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading, ReadingMotion
-from compd.live.loop.commands import Target
-from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.ring_entries import SentCycle
-from compd.live.loop.setpoint import setpoint_line
-from compd.live.loop.wiring import MachineWires
-from compd.live.memory.latest import Snapshot
-from compd.live.memory.readings import Readings
+from compd.live.loop import CycleInputs, CycleState, MachineWires, MachineZero, SentCycle, Target, setpoint_line
+from compd.live.memory import Readings, Snapshot
 from compd.live.service.messages import line
 from compd.live.service.state_json import from_plain, to_plain
-from compd.tables.columns import FRAME_COLUMNS, joint_columns, scale_columns
-from compd.text.json_text import omit_unknown
+from compd.tables import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.text import omit_unknown
 
 
 class RecordedCycle(NamedTuple):

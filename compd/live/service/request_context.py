@@ -9,8 +9,8 @@ from typing import Any, Literal
 import structlog
 
 from compd.clock import Clock, MonotonicClock
-from compd.configuration.operation import TargetSettings
-from compd.live.loop.commands import Commands, Target
+from compd.configuration import TargetSettings
+from compd.live.loop import Commands, Target
 from compd.live.service.client_session import ClientSession
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 from compd.live.service.model_switch import ModelWish

@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from compd.compensation.values import WarmStart
-from compd.live.loop.cycle_state import CycleState
-from compd.live.loop.stale_policy import ComparatorSet
-from compd.model.effect_memory import EffectMemory
-from compd.model.kinematics.motion import Motion
+from compd.compensation import WarmStart
+from compd.live.loop import ComparatorSet, CycleState
+from compd.model import EffectMemory
+from compd.model.kinematics import Motion
 
 # The tags are part of the recordings' format: they stay as they are when a class is renamed.
 _KINDS: Mapping[str, Any] = {

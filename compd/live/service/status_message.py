@@ -10,19 +10,12 @@ from typing import Any
 from compd.clock import Clock
 from compd.errors import StateError
 from compd.gauge import Quality
-from compd.live.loop.adopted_models import AdoptedModels
-from compd.live.loop.commands import Commands
-from compd.live.loop.reasons import waiting_text
-from compd.live.loop.skew import skew_of
-from compd.live.loop.timing import LoopTiming
-from compd.live.loop.wiring import MachineWires
-from compd.live.memory.latest import Latest
-from compd.live.memory.trust_memory import TrustMemory
-from compd.live.system.port_names import changed_ports
-from compd.live.memory.control import Control
+from compd.live.loop import AdoptedModels, Commands, LoopTiming, MachineWires, skew_of, waiting_text
+from compd.live.memory import Control, Latest, TrustMemory
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender
-from compd.text.json_text import omit_unknown
+from compd.live.system import changed_ports
+from compd.text import omit_unknown
 from compd.units import UM_PER_MM
 
 

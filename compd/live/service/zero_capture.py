@@ -15,13 +15,11 @@ import structlog
 from compd.clock import Clock
 from compd.errors import Problem, StateError
 from compd.gauge import Quality
-from compd.live.loop.commands import Commands
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.wiring import MachineWires
-from compd.live.memory.latest import Latest
+from compd.live.loop import Commands, MachineWires, MachineZero
+from compd.live.memory import Latest
 from compd.live.service.background_job import BackgroundJob
 from compd.live.service.messages import ErrorCode, ProtocolError, line
-from compd.text.json_text import omit_unknown
+from compd.text import omit_unknown
 
 # Several polls of a comparator, to average its noise, and short enough for a person to wait.
 _WINDOW_S = 1.0

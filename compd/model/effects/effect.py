@@ -14,8 +14,8 @@ from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.effect_dispatch import kernel_number
 from compd.model.effects.observations import Observations
+from compd.model.kernels import kernel_number
 from compd.reference_conditions import Datum
 
 Port: TypeAlias = Literal[

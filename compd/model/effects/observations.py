@@ -12,11 +12,9 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import CompdError, Problem
-from compd.rotation import to_outer
-from compd.model.kinematics.link_kinematics import Mechanism
+from compd.model.kinematics import Arrangement, Contact, Mechanism, link_forces
 from compd.reference_conditions import standard_value, value_at_zero
-from compd.model.kinematics.statics import link_forces
-from compd.model.kinematics.tool import Arrangement, Contact
+from compd.rotation import to_outer
 
 # What a machine of known kinematics gives in every recording and live: its pose with all lengths and directions, the
 # scales, which way the links last moved and how fast, and the rows' order in time.

@@ -8,13 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effects.effect import Basis, BasisProgram, ConstantValues, Effect, Memory, Port
-from compd.model.effects.effect_needs import needed_quantities
+from compd.model.effects import (
+    Basis,
+    BasisProgram,
+    ConstantValues,
+    Effect,
+    Memory,
+    Observations,
+    Port,
+    needed_quantities,
+)
 from compd.model.formula.columns import column_codes
 from compd.model.formula.formula import Formula
 from compd.model.formula.program import write_program
-from compd.model.kernels.effect_dispatch import FORMULA
-from compd.model.effects.observations import Observations
+from compd.model.kernels import FORMULA
 
 AXES = ("x", "y", "z")
 # Ports that take a vector at each of their places; `reference` also a rotation.

@@ -9,10 +9,9 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem
-from compd.model.effects.effect import Port
+from compd.model.effects import Observations, Port
 from compd.model.formula.program import ColumnCodes
 from compd.model.kernels import formula as machine_code
-from compd.model.effects.observations import Observations
 
 PER_LINK: tuple[Port, ...] = ("scale", "link", "base_joint", "platform_joint")
 READING_PORTS: tuple[Port, ...] = ("scale", "joint", "frame")

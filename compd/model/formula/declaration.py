@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from compd.errors import ConfigurationError, Problem
-from compd.model.effects.effect import Constant, Effect, Parameter
+from compd.model.effects import Constant, Effect, Parameter
 from compd.model.formula.basis import (
     SENSITIVITY_PORTS,
     VECTORS,

@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.model.formula.program import ColumnCodes, write_program
-from compd.model.kernels.formula import formula_factors
+from compd.model.kernels import formula_factors
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,5 @@
 """Compiled numerics: one source for one snapshot and for N rows."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

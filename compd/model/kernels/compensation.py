@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
+from compd.jit import COUNT, FLAG, INDEX_ROWS, INDICES, NUMBERS, ROW_MATRICES, ROWS, helper, loop
 from compd.model.kernels.effect_row import EFFECT_MACHINE
 from compd.model.kernels.effects_on_machine import add_effect, add_effects, set_row
-from compd.jit import COUNT, FLAG, INDEX_ROWS, INDICES, NUMBERS, ROW_MATRICES, ROWS, helper, loop
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import (
     copy_frame,
@@ -23,8 +23,8 @@ from compd.model.kernels.machine_solver import (
 )
 from compd.model.kernels.motion import advance_motion
 from compd.model.kernels.reason_codes import OK
-from compd.rotation import to_inner_frame
 from compd.model.kernels.solver_structures import EFFECTS, GIVEN, MODELS, RESULTS, WORKSPACES
+from compd.rotation import to_inner_frame
 
 
 @helper

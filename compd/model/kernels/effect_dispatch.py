@@ -10,9 +10,9 @@ import pkgutil
 from importlib import import_module
 from typing import Any
 
+from compd.jit import helper
 from compd.model.kernels import effects
 from compd.model.kernels.formula import set_formula_basis
-from compd.jit import helper
 
 FORMULA = 0
 

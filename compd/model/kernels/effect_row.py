@@ -37,7 +37,7 @@ ROW = np.dtype(
     ]
 )
 
-# Fields as in `compd.model.effects.observations.MachineConstants`; links and axes: of its kinematics, 0 where that is unknown.
+# Fields as in `compd.model.effects.MachineConstants`; links and axes: of its kinematics, 0 where that is unknown.
 MACHINE = np.dtype(
     [
         ("links", np.int64),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from compd.arrays import FloatArray, IntArray
+from compd.jit import COUNT, INDEX_ROWS, NUMBERS, ROW_MATRICES, ROWS, loop
 from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.effect_row import EFFECT_MACHINE, EFFECT_ROWS
-from compd.jit import COUNT, INDEX_ROWS, NUMBERS, ROW_MATRICES, ROWS, loop
 
 
 @loop([COUNT, EFFECT_ROWS, EFFECT_MACHINE, ROWS, INDEX_ROWS, NUMBERS, NUMBERS, ROW_MATRICES])

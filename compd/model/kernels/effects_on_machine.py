@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.effect_dispatch import set_basis
 from compd.jit import helper
+from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import copy_frame, copy_pose, inverse_pose, solve_frame
 from compd.model.kernels.reason_codes import OK
-from compd.rotation import to_outer_frame
 from compd.model.kernels.solver_structures import FRAME, LENGTHS
+from compd.rotation import to_outer_frame
 
 
 @helper

@@ -23,9 +23,9 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
+from compd.jit import INDEX_ROWS, NUMBERS, ROW_MATRICES, helper, loop
 from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.model.kernels.link_forces import axial_force_at_zero, set_axial_forces
-from compd.jit import INDEX_ROWS, NUMBERS, ROW_MATRICES, helper, loop
 from compd.model.kernels.memory import lag_step
 
 # Operations: each takes its operands from the stack, the last one on top, and leaves its result there. The argument of

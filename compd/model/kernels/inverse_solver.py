@@ -11,11 +11,10 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.loop_closure import evaluate_closure, is_turned_over, platform_radius, pose_is_finite
 from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.model.kernels.loop_closure import evaluate_closure, is_turned_over, platform_radius, pose_is_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NO_CONVERGENCE, NOT_FINITE, OK, OTHER_ASSEMBLY, UNREACHABLE
-from compd.rotation import orthonormalise, rotate_in_place
 from compd.model.kernels.solve_status import (
     AMPLIFICATION_LIMIT,
     ITERATION_LIMIT,
@@ -23,6 +22,7 @@ from compd.model.kernels.solve_status import (
     STEP_LIMIT,
     STEP_TOLERANCE_MM,
 )
+from compd.rotation import orthonormalise, rotate_in_place
 
 
 @helper

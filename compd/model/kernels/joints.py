@@ -6,7 +6,7 @@ import math
 
 from compd.arrays import FloatArray, IntArray
 from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.model.kernels.linear import all_finite
+from compd.linear import all_finite
 from compd.model.kernels.reason_codes import NOT_FINITE, OK
 
 

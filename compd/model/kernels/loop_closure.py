@@ -17,7 +17,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.model.kernels.linear import all_finite
+from compd.linear import all_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NOT_FINITE, OK
 
 # Two joint centres nearer than this coincide: the link between them has no direction.

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 from compd.arrays import FloatArray
+from compd.jit import helper
 from compd.model.kernels.forward_solver import solve_forward
 from compd.model.kernels.inverse_solver import solve_inverse
-from compd.jit import helper
 from compd.model.kernels.octahedron_frame import solve_octahedron
 from compd.rotation import to_inner_frame, to_outer_frame
 

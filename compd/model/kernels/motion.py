@@ -11,7 +11,7 @@ import math
 
 from compd.arrays import FloatArray
 from compd.jit import NUMBERS, ROWS, helper, loop
-from compd.model.kernels.linear import all_finite
+from compd.linear import all_finite
 from compd.travel_direction import Travel, advance
 
 # Time constant of the average velocity: unaveraged, one step of a scale, 10 nm, within a cycle of 1 ms is 10 um/s.

@@ -25,9 +25,8 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.model.kernels.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NO_CONVERGENCE, NOT_FINITE, OK, OTHER_ASSEMBLY, UNREACHABLE
-from compd.rotation import set_rotation_vector
 from compd.model.kernels.solve_status import (
     AMPLIFICATION_LIMIT,
     ITERATION_LIMIT,
@@ -35,6 +34,7 @@ from compd.model.kernels.solve_status import (
     STEP_LIMIT,
     STEP_TOLERANCE_MM,
 )
+from compd.rotation import set_rotation_vector
 
 # Equation (3): distance u_k runs from support k // 2 to this plate point.
 PLATE_POINT_OF_DISTANCE = (0, 2, 0, 1, 1, 2)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
+from compd.jit import INDEX_ROWS, INDICES, NUMBERS, ROWS, SCALAR, helper, loop
 from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.effect_row import EFFECT_MACHINE
 from compd.model.kernels.effects_on_machine import set_row
-from compd.jit import INDEX_ROWS, INDICES, NUMBERS, ROWS, SCALAR, helper, loop
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import forward_pose, set_contact, solve_frame
 from compd.model.kernels.reason_codes import OK

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.loop_closure import evaluate_closure
 from compd.jit import helper
-from compd.model.kernels.linear import lu_factor, lu_solve
+from compd.linear import lu_factor, lu_solve
+from compd.model.kernels.loop_closure import evaluate_closure
 from compd.model.kernels.machine_solver import solve_frame
 
 # As `compd.model.sensitivity.DIFFERENCE_STEP_MM`.

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
 from compd.jit import MATRIX, VECTOR, kernel
-from compd.model.kernels.octahedron_frame import edge_lengths, octahedron, place_base
+from compd.model.kernels import edge_lengths, octahedron, place_base
 
 
 class FrameGeometry(NamedTuple):

@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
 from compd.errors import KinematicsError, Problem
+from compd.model.kernels import AMPLIFICATION_LIMIT
 from compd.model.kinematics.frame import Frame, FrameGeometry, distances_mm
-from compd.model.kernels.solve_status import AMPLIFICATION_LIMIT
 
 
 class FrameJacobians(NamedTuple):

@@ -14,9 +14,7 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.loop_closure import closure
-from compd.model.kernels.forward_solver import forward
-from compd.model.kernels.inverse_solver import inverse
+from compd.model.kernels import closure, forward, inverse
 
 
 class Mechanism(NamedTuple):

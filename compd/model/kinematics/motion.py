@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.kernels.motion import track_motions
+from compd.model.kernels import track_motions
 
 
 class Motion(NamedTuple):

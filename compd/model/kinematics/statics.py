@@ -16,7 +16,7 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels.link_forces import forces
+from compd.model.kernels import forces
 from compd.model.kinematics.link_kinematics import Mechanism, check_mechanism
 
 

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
 from compd.model.kinematics.frame import FrameGeometry
-from compd.rotation import to_inner, to_outer
 from compd.model.kinematics.link_kinematics import Pose
+from compd.rotation import to_inner, to_outer
 
 
 class Contact(NamedTuple):

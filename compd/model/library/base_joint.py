@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.model.effects.effect import Constant, Effect, KernelBasis, Parameter
+from compd.model.effects import Constant, Effect, KernelBasis, Parameter
 from compd.model.kernels.effects import base_joint
 
 EFFECTS = (

@@ -6,14 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from compd.configuration.document import Document, read_entries
-from compd.configuration.section import unknown_key
-from compd.configuration.shipped import shipped_effects
+from compd.configuration import Document, read_entries, shipped_effects, unknown_key
 from compd.errors import CompdError, ConfigurationError, PluginError, Problem
-from compd.files.file_kind import FileKind
-from compd.model.effects.effect import Effect
-from compd.model.formula.declaration import formula_effect
-from compd.model.formula.keys import FormulaDeclaration
+from compd.files import FileKind
+from compd.model.effects import Effect
+from compd.model.formula import FormulaDeclaration, formula_effect
 from compd.model.library import find_effect, load_library
 from compd.plugins import load_module
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.model.effects.effect import Effect, KernelBasis, Parameter
+from compd.model.effects import Effect, KernelBasis, Parameter
 from compd.model.kernels.effects import frame
 
 EFFECTS = (

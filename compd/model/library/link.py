@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.model.effects.effect import Constant, Effect, KernelBasis, Parameter
+from compd.model.effects import Constant, Effect, KernelBasis, Parameter
 from compd.model.kernels.effects import link
 
 _EXPANSION_RANGE = "Super-Invar rod 0-0.8, steel 11-12.5, aluminium 23"

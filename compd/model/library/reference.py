@@ -3,7 +3,7 @@ shows, x, y, z in mm and the rotation vector in rad. It is no error of the machi
 
 from __future__ import annotations
 
-from compd.model.effects.effect import Effect, KernelBasis, Parameter
+from compd.model.effects import Effect, KernelBasis, Parameter
 from compd.model.kernels.effects import reference
 
 EFFECTS = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.model.effects.effect import Constant, Effect, KernelBasis, Parameter
+from compd.model.effects import Constant, Effect, KernelBasis, Parameter
 from compd.model.kernels.effects import scale
 
 # Gratings on the market, from interferential (2 um) to magnetic (1 mm and more).

@@ -7,7 +7,7 @@ from the arrangement (`compd.model.kinematics.tool`), so that a parameter has th
 
 from __future__ import annotations
 
-from compd.model.effects.effect import Effect, KernelBasis, Parameter
+from compd.model.effects import Effect, KernelBasis, Parameter
 from compd.model.kernels.effects import tool
 
 EFFECTS = (

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compd.errors import RecordingError
-from compd.files.atomic_files import file_stamp
-from compd.instruments.export import ReadOptions
-from compd.instruments.preview import ExportPreview, preview_export
-from compd.joining.join import choose_by
+from compd.files import file_stamp
+from compd.instruments import ExportPreview, ReadOptions, preview_export
+from compd.joining import choose_by
 
 # Files that are kept as they were read: two persons may look at two, and change what their columns are.
 _KEPT = 4

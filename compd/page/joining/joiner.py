@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compd.errors import RecordingError
-from compd.instruments.export import InstrumentExport
-from compd.joining.join import match_export
-from compd.joining.summary import summary_lines
+from compd.instruments import InstrumentExport
+from compd.joining import match_export, summary_lines
 from compd.page.joining.choices import Choices, read_choices
 from compd.page.joining.export_table import ExportReader, table_contents
 from compd.page.joining.exports import Exports
@@ -17,7 +16,7 @@ from compd.page.joining.named_files import missing, named
 from compd.page.joining.trial import tried
 from compd.page.recording_machine import machine_of
 from compd.page.recordings import NAME
-from compd.recording.writer import write_recording
+from compd.recording import write_recording
 
 
 class _Join(NamedTuple):

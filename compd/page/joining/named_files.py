@@ -8,8 +8,8 @@ from typing import Any
 
 from compd.errors import Problem, RecordingError
 from compd.page.recordings import NAME, recording_tables
-from compd.recording.sidecar import read_sidecar
-from compd.tables.table_file import CSV
+from compd.recording import read_sidecar
+from compd.tables import CSV
 
 
 def gauges_and_plans(directory: Path) -> tuple[list[str], list[str]]:

@@ -7,14 +7,18 @@ from typing import Any
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, RecordingError
-from compd.instruments.export import InstrumentExport
-from compd.instruments.track import track_of
-from compd.joining.at_rest import RestJoin
-from compd.joining.by_time import JoinResult
-from compd.joining.clock_offset import ClockOffset, agreement_curve
-from compd.joining.join import JoinOptions, choose_by, match_export
-from compd.joining.summary import summary_lines
-from compd.recording.reader import read_recording
+from compd.instruments import InstrumentExport, track_of
+from compd.joining import (
+    ClockOffset,
+    JoinOptions,
+    JoinResult,
+    RestJoin,
+    agreement_curve,
+    choose_by,
+    match_export,
+    summary_lines,
+)
+from compd.recording import read_recording
 from compd.units import UM_PER_MM
 
 

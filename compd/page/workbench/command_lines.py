@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from compd.configuration.shipped import Machine
+from compd.configuration import Machine
 
 
 class CommandLines(NamedTuple):

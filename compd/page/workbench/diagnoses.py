@@ -12,7 +12,7 @@ from compd.page.workbench.diagnosis_job import DiagnosisJob
 from compd.page.workers.workers import Workers
 
 if TYPE_CHECKING:
-    from compd.configuration.shipped import Machine
+    from compd.configuration import Machine
 
 # Each takes a processor, and the memory of a process of its own; the daemon runs on the same computer.
 MOST_RUNNING = 2

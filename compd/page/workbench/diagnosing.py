@@ -9,10 +9,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from compd.api.diagnosis import diagnose
-from compd.api.long_recordings import open_whole_or_sample
-from compd.configuration.shipped import Machine
-from compd.diagnosis.verdict import Diagnosis
+from compd.api import diagnose, open_whole_or_sample
+from compd.configuration import Machine
+from compd.diagnosis import Diagnosis
 from compd.page.workbench.evidence import evidence
 from compd.page.workbench.opened_recording import model_of
 
@@ -49,7 +48,7 @@ class Diagnosing:
 
     def page(self) -> bytes:
         """The page of what was found, compressed: the script for its figures is some megabytes."""
-        from compd.report.diagnosis_page import write_diagnosis_page
+        from compd.report import write_diagnosis_page
 
         assert self._diagnosis is not None
         is_sample = self._aligned.recording.rows < self._recorded_rows
@@ -62,7 +61,7 @@ class Diagnosing:
 def _text(diagnosis: Diagnosis) -> str:
     from rich.console import Console
 
-    from compd.report.diagnosis_text import print_diagnosis
+    from compd.report import print_diagnosis
 
     text = io.StringIO()
     print_diagnosis(Console(file=text, width=_WIDTH, highlight=False), diagnosis, [])

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from compd.clock import Clock, MonotonicClock
-from compd.diagnosis.stages import ONLY_WHERE_NEEDED, STAGES
+from compd.diagnosis import ONLY_WHERE_NEEDED, STAGES
 from compd.page.workers.limits import WorkerLimits
 from compd.page.workers.workers import Workers
 
 if TYPE_CHECKING:
-    from compd.configuration.shipped import Machine
+    from compd.configuration import Machine
 
 _STATE = "compd.page.workbench.diagnosing:Diagnosing"
 # It ends as soon as its page is drawn.

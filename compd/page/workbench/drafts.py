@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 
-from compd.comparison.comparison import Comparison
-from compd.model.effects.effect import Effect
+from compd.comparison import Comparison
+from compd.model.effects import Effect
 from compd.page.workbench.candidates import Candidates
 
 # So many browsers can write at once.

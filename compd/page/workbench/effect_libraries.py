@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from compd.configuration.shipped import shipped_effects
+from compd.configuration import shipped_effects
 from compd.errors import Problem, StateError
 
 # Of the file of one's own effects, beside the model files.

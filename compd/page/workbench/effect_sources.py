@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from compd.errors import CompdError
-from compd.model.effects.effect import Effect
-from compd.model.library.effects_file import gather_effects, load_effects
+from compd.model.effects import Effect
+from compd.model.library import gather_effects, load_effects
 from compd.page.workbench.own_effects import OwnEffects
 
 

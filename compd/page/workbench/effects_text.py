@@ -13,9 +13,9 @@ from typing import Any
 
 import yaml
 
-from compd.configuration.yaml_reader import parse_yaml
+from compd.configuration import parse_yaml
 from compd.errors import Problem, StateError
-from compd.model.library.effects_file import EFFECTS_FILE
+from compd.model.library import EFFECTS_FILE
 
 _KEY = "effects"
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")

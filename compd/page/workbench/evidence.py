@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from compd.diagnosis.findings import DiagnosisStep
-from compd.diagnosis.verdict import Diagnosis
-from compd.diagnosis.words.error_fall import ErrorFall, error_fall
-from compd.diagnosis.words.summary_lines import summary_lines
-from compd.report.diagnosis_evidence import (
+from compd.diagnosis import Diagnosis, DiagnosisStep, ErrorFall, error_fall, summary_lines
+from compd.report import (
+    PageTable,
     by_noise_text,
     candidates_table,
     constant_table,
@@ -22,9 +20,7 @@ from compd.report.diagnosis_evidence import (
     untested_table,
     without_gain,
 )
-from compd.report.page_table import PageTable
-from compd.text.json_text import nan_to_null
-from compd.text.numbers_as_text import estimate_text, fall_text, number_text, percent_text
+from compd.text import estimate_text, fall_text, nan_to_null, number_text, percent_text
 
 
 def evidence(diagnosis: Diagnosis) -> dict[str, Any]:

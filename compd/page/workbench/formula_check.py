@@ -8,12 +8,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from compd.errors import CompdError, Problem
-from compd.model.effects.effect import Effect
-from compd.model.effects.effect_needs import unmet_needs
-from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, column_needs
-from compd.model.formula.declaration import formula_effect
-from compd.model.formula.functions import FUNCTIONS, NUMBERS
-from compd.model.effects.observations import Observations
+from compd.model.effects import Effect, Observations, unmet_needs
+from compd.model.formula import ANYWHERE, FUNCTIONS, NUMBERS, OF_LINK, OF_READING, column_needs, formula_effect
 from compd.page.workbench.own_effects import library_id_problems, too_large
 
 _WHERE = "formula"

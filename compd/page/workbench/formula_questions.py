@@ -5,15 +5,22 @@ from __future__ import annotations
 from typing import Any, get_args
 
 from compd.errors import Problem
-from compd.model.effects.effect import PORTS
-from compd.model.effects.effect_basis import port_size
-from compd.model.effects.effect_needs import external_ports
-from compd.model.formula.basis import AXES, VECTORS
-from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK, column_needs, link_column
-from compd.model.formula.functions import FUNCTIONS, LAG, NUMBERS
-from compd.model.formula.keys import FormulaDeclaration
-from compd.model.formula.parser import LONGEST
-from compd.model.effects.observations import Observations
+from compd.model.effects import PORTS, Observations, external_ports, port_size
+from compd.model.formula import (
+    ANYWHERE,
+    AXES,
+    FUNCTIONS,
+    LAG,
+    LONGEST,
+    NUMBERS,
+    OF_LINK,
+    OF_READING,
+    PER_LINK,
+    VECTORS,
+    FormulaDeclaration,
+    column_needs,
+    link_column,
+)
 from compd.page.workbench.formula_check import check
 from compd.page.workbench.workbench import Workbench
 

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from compd.api.models import add_effect
-from compd.diagnosis.model_changes import refit, remove, undo
+from compd.api import add_effect
+from compd.diagnosis import refit_model, remove_effect, undo_step
 from compd.errors import Problem, StateError
-from compd.model.effects.effect import Effect
-from compd.model_file.model_document import read_stored, write_stored
-from compd.model_file.model_file import EffectNumber, ModelFile
+from compd.model.effects import Effect
+from compd.model_file import EffectNumber, ModelFile, read_stored, write_stored
 from compd.page.workbench.opened_recording import OpenedRecording, model_of
-from compd.text.json_text import nan_to_null
+from compd.text import nan_to_null
 
 
 def proposed(opened: OpenedRecording, kind: str, effect: str, library: Mapping[str, Effect]) -> OpenedRecording:
@@ -29,9 +28,9 @@ def proposed(opened: OpenedRecording, kind: str, effect: str, library: Mapping[s
                 raise StateError(Problem(where="step", what="no such effect", value=effect))
             changed = add_effect(model, library[effect], aligned)
         case "remove":
-            changed = remove(model, effect, aligned)
+            changed = remove_effect(model, effect, aligned)
         case "fit":
-            changed = refit(model, aligned)
+            changed = refit_model(model, aligned)
         case _:
             raise StateError(Problem(where="step", what="is not known", value=kind, allowed="add, remove, fit"))
     return replace(opened, model=changed)
@@ -47,7 +46,7 @@ def undone(opened: OpenedRecording) -> OpenedRecording:
     path = opened.model_path
     if not path.exists():
         raise StateError(Problem(where=str(path), what="has no step to undo"))
-    write_stored(path, undo(read_stored(path), str(path)))
+    write_stored(path, undo_step(read_stored(path), str(path)))
     return replace(opened, model=model_of(path, opened.aligned))
 
 

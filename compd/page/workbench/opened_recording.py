@@ -9,16 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from compd.api.long_recordings import open_whole_or_sample
+from compd.api import open_whole_or_sample
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
-from compd.comparison.comparison import Comparison
-from compd.configuration.shipped import Machine
-from compd.model_file.model_file import ModelFile, read_model_file
+from compd.comparison import AlignedRecording, Comparison, compare
+from compd.configuration import Machine
+from compd.model_file import ModelFile, read_model_file
 from compd.page.packed import packed
 from compd.plugins import NO_CODE
-from compd.text.json_text import nan_to_null
+from compd.text import nan_to_null
 
 # Pictures have about so many rows at most; numbers are always of all rows.
 MOST_PICTURED = 5000

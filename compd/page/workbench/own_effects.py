@@ -7,13 +7,12 @@ import threading
 from collections.abc import Mapping
 from pathlib import Path
 
-from compd.configuration.yaml_reader import read_text
+from compd.configuration import read_text
 from compd.errors import CompdError, Problem, StateError
-from compd.files.atomic_files import file_stamp, write_files
-from compd.model.effects.effect import Effect
-from compd.model.formula.declaration import formula_effect
-from compd.model.library import load_library
-from compd.model.library.effects_file import gather_effects
+from compd.files import file_stamp, write_files
+from compd.model.effects import Effect
+from compd.model.formula import formula_effect
+from compd.model.library import gather_effects, load_library
 from compd.page.workbench.effects_text import Declaration, entries_of, with_entry, without_entry
 
 # An effect that is searched in more combinations of its constants, or has more numbers, takes a page's time.

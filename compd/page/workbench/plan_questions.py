@@ -8,19 +8,16 @@ from typing import Any, get_args
 
 import numpy as np
 
-from compd.api.measurements import plan_measurement
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.planning.measurement_plan import MeasurementPlan
-from compd.planning.measurement_programmes import recorded_limits
-from compd.planning.plan_formats import DWELL_S, PlanFormat
-from compd.planning.setting_programmes import recorded_settings
+from compd.api import plan_measurement
+from compd.comparison import AlignedRecording
 from compd.errors import CompdError
-from compd.model.effects.effect import Effect
+from compd.model.effects import Effect
 from compd.page.workbench.formula_check import words
 from compd.page.workbench.plan_endings import ENDINGS
 from compd.page.workbench.plan_request import PlanRequest, field_of, read_request
 from compd.page.workbench.workbench import Workbench
 from compd.plan_file import TIP_COLUMNS
+from compd.planning import DWELL_S, MeasurementPlan, PlanFormat, recorded_limits, recorded_settings
 
 # Plans whose files can still be downloaded.
 _MOST_KEPT = 8

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
-from compd.api.measurements import Range
+from compd.api import Range
 from compd.errors import CompdError, Problem
 
 FEWEST_ROWS, MOST_ROWS = 2, 400

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.comparison import Comparison
-from compd.model.effects.effect import ConstantValues
+from compd.comparison import Comparison
+from compd.model.effects import ConstantValues
 from compd.page.packed import packed
 
 

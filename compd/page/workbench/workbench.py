@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from compd.planning.measurement_plan import MeasurementPlan
 from compd.errors import CompdError, Problem, RecordingError, StateError
-from compd.files.atomic_files import file_stamp, write_files
-from compd.live.loop.model_loader import ModelText
-from compd.model.effects.effect_needs import can_concern
+from compd.files import file_stamp, write_files
+from compd.live.loop import ModelText
+from compd.model.effects import can_concern
 from compd.model.library import load_library
 from compd.page.recording_machine import machine_of
 from compd.page.workbench.candidates import Candidates
@@ -23,7 +22,8 @@ from compd.page.workbench.model_changes import proposed, step_summary, undone, w
 from compd.page.workbench.opened_recording import OpenedRecording, open_for_page
 from compd.page.workbench.own_effects import OwnEffects
 from compd.page.workbench.trial import Trial
-from compd.recording.exclusions import exclude_rows, include_rows
+from compd.planning import MeasurementPlan
+from compd.recording import exclude_rows, include_rows
 
 
 class Workbench:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 
-from compd.live.system.child_process import end_with_parent
+from compd.live.system import end_with_parent
 
 for _library in ("OPENBLAS", "OMP", "MKL", "NUMBA", "NUMEXPR"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"

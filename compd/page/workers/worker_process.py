@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from compd.errors import CompdError
-from compd.live.system.memory_limit import limit_memory
-from compd.text.json_text import nan_to_null
+from compd.live.system import limit_memory
+from compd.text import nan_to_null
 
 _NICE = 10
 # The system ends a worker first where memory is short: at most 1000.

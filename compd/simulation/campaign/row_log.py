@@ -8,8 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration.operation import Wiring
-from compd.tables.columns import (
+from compd.configuration import Wiring
+from compd.simulation.truth.fixed_places import FixedPlaces
+from compd.simulation.truth.indicated_tip import IndicatedTip
+from compd.simulation.truth.instruments import ReferenceInstrument
+from compd.simulation.truth.world import World
+from compd.tables import (
     ATTITUDE_COLUMNS,
     DISTANCE_COLUMN,
     POSITION_COLUMNS,
@@ -17,10 +21,6 @@ from compd.tables.columns import (
     link_reference_column,
     scale_columns,
 )
-from compd.simulation.truth.fixed_places import FixedPlaces
-from compd.simulation.truth.indicated_tip import IndicatedTip
-from compd.simulation.truth.instruments import ReferenceInstrument
-from compd.simulation.truth.world import World
 
 UM = 1e-3
 

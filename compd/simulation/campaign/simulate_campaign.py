@@ -7,17 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compd.configuration.shipped import Machine, load_machine
+from compd.configuration import Machine, load_machine
 from compd.errors import CompdError, Problem
-from compd.recording.ball_plate import write_plate
-from compd.tables.table_file import written_path
-from compd.recording.writer import write_recording
+from compd.recording import write_plate, write_recording
 from compd.simulation.campaign.plan_reader import read_plan
 from compd.simulation.campaign.simulated_recording import FIXED, simulate_recording
 from compd.simulation.causes.hidden_cause import draw_hidden, parse_hidden, write_answer
 from compd.simulation.truth.instruments import Kind
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
+from compd.tables import written_path
 
 
 @dataclass(frozen=True)

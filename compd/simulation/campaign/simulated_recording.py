@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
-from compd.recording.sidecar import sidecar_contents
+from compd.recording import sidecar_contents
 from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import CampaignPlan, draw_campaign_plan
 from compd.simulation.campaign.planned_campaign import PlannedCampaign

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.errors import CompdError, Problem
-from compd.files.atomic_files import write_files
+from compd.files import write_files
 from compd.simulation.causes.catalogue import CAUSES, possible_causes, shuffle_causes
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism

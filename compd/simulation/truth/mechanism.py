@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
-from compd.configuration.geometry import Geometry, ToolOnPlatformSettings
+from compd.configuration import Geometry, ToolOnPlatformSettings
 from compd.simulation.truth.closure import Closure, Posture, homogeneous
 
 

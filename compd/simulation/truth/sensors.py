@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration.geometry import Geometry
-from compd.configuration.operation import Wiring
+from compd.configuration import Geometry, Wiring
 from compd.simulation.truth.frame import DISTANCES
 from compd.simulation.truth.joints import Balls
 from compd.simulation.truth.strengths import Strengths

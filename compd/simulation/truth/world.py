@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration.geometry import Geometry
-from compd.configuration.operation import Wiring
+from compd.configuration import Geometry, Wiring
 from compd.errors import CompdError, KinematicsError, Problem
 from compd.simulation.truth.cause import Cause, Interval
 from compd.simulation.truth.closure import Posture

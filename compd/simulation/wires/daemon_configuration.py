@@ -8,11 +8,9 @@ from typing import Any
 
 import yaml
 
-from compd.configuration import Configuration, load
-from compd.configuration.document import read_document
+from compd.configuration import Configuration, load, read_document
 from compd.errors import ConfigurationError, Problem
-from compd.files.atomic_files import write_files
-from compd.files.output_file import check_replaceable
+from compd.files import check_replaceable, write_files
 from compd.simulation.wires.simulation_directory import DAEMON_SOCKET, STATE, WRITTEN_BY
 from compd.simulation.wires.tcp_port import ANY, LOOPBACK
 

@@ -21,7 +21,7 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
-from compd.configuration.round_trigger import TriggerWrite
+from compd.configuration import TriggerWrite
 from compd.simulation.wires.device import SimulatedRegisterDevice
 from compd.simulation.wires.latch import Latch
 

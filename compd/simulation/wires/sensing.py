@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from compd.configuration import Configuration
-from compd.configuration.crosscheck import resolve_channel
+from compd.configuration import Configuration, resolve_channel
 from compd.simulation.wires.device import Sense
 
 # Source by unit for a channel that is not wired or that the simulated machine does not have; otherwise 0.

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from compd.clock import Clock
-from compd.configuration import Configuration
-from compd.configuration.lines import LineSettings
+from compd.configuration import Configuration, LineSettings
 from compd.plugins import SIMULATED_GAUGES, load
 from compd.simulation.truth.follow_motion import MotorCommand
 from compd.simulation.truth.instruments import INTERFEROMETER, TRACKER

@@ -18,8 +18,7 @@ from pymodbus.framer.ascii import FramerAscii
 from pymodbus.framer.rtu import FramerRTU
 
 from compd.clock import Clock, MonotonicClock
-from compd.configuration.lines import PolledLine, SerialPortSettings
-from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
+from compd.configuration import PolledLine, SerialPortSettings, TriggerBytes, TriggerWrite
 from compd.simulation.wires.device import SimulatedByteDevice, SimulatedRegisterDevice
 from compd.simulation.wires.latch import Latch, TriggeredDevices
 from compd.simulation.wires.line_fault import SILENT, UNPLUGGED, checked_fault

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from compd.simulation.wires.device import Sense, SimulatedByteDevice
+from compd.simulation import Sense, SimulatedByteDevice
 
 BEYOND = 0.01  # of the range: how far a transducer goes beyond its calibrated ends before it saturates
 # In how many of the channel's unit (mm, N, hPa) one of the wire's units is.

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.injection.cells.cell import Cell
 from tests.injection.cells.situation import PLACES_MM, Situation
 from tests.injection.cells.verdict import Verdict, judge

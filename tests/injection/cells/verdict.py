@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from compd.live.loop.states import Mode
+from compd.setpoint_states import Mode
 from tests.injection.truth import Truth
 from tests.support.watching import Message, Seen
 

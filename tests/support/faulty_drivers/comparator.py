@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, bad, good
-from compd.simulation.wires.device import Sense, SimulatedByteDevice
+from compd.simulation import Sense, SimulatedByteDevice
 
 LARGEST_MM = 99.9999
 

@@ -12,12 +12,13 @@ import pytest
 
 from compd.arrays import rms
 from compd.configuration import load
+from compd.demo import SHIPPED_PROGRAM, run_linuxcnc_demo
 from compd.demo.linuxcnc.controller import LinuxCnc, obstacle
-from compd.demo.linuxcnc.demonstration import ADOPTED, OFF, ON, SHIPPED_PROGRAM, run_linuxcnc_demo
+from compd.demo.linuxcnc.demonstration import ADOPTED, OFF, ON
 from compd.demo.linuxcnc.motion_log import TipErrors, read_motion_log, tip_errors
 from compd.demo.live import take_zero
 from compd.demo.simulated_daemon import simulated_daemon
-from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation import Mechanism
 from tests.support.simulated import HEXAPOD
 
 pytestmark = [pytest.mark.skipif(bool(obstacle()), reason=obstacle())]

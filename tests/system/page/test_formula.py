@@ -7,7 +7,7 @@ import re
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import SHOWN, page_without_machine, workbench_tabs

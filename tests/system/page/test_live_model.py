@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import pytest
 
 from compd.client import connect
-from compd.configuration.shipped import load_machine
+from compd.configuration import load_machine
 from tests.support.live_page import LivePage, page_process, until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import SHOWN, open_recording

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import page_without_machine, workbench_tabs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.support.live_page import opened, until
 from tests.support.sampled import sampled
 from tests.support.scripted_page import scripted

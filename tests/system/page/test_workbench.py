@@ -6,9 +6,9 @@ import json
 
 import pytest
 
-from compd.api.models import add_effect
-from compd.model_file.model_document import read_stored
-from compd.recording.sidecar import read_sidecar
+from compd.api import add_effect
+from compd.model_file import read_stored
+from compd.recording import read_sidecar
 from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import SHOWN, page_without_machine, workbench_tabs

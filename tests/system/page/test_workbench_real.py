@@ -6,9 +6,9 @@ import shutil
 
 import pytest
 
-from compd.api.models import add_effect
-from compd.configuration.shipped import shipped_effects
-from compd.model_file.model_document import read_stored
+from compd.api import add_effect
+from compd.configuration import shipped_effects
+from compd.model_file import read_stored
 from tests.support.live_page import until
 from tests.support.paths import SHARED
 from tests.support.workbench_page import page_without_machine

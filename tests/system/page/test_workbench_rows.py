@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.api.diagnosis import compare
-from compd.comparison.open import open_recording
+from compd.api import compare
+from compd.comparison import open_recording
 from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import page_without_machine

@@ -11,7 +11,7 @@ import shutil
 
 import pytest
 
-from compd.model_file.model_document import read_stored
+from compd.model_file import read_stored
 from tests.support.hidden_run import hidden_run
 from tests.support.hidden_visits import check_visits, survey_visits
 from tests.support.live_page import page_process, until

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.injection import faults
 from tests.injection.rig import InjectedMachine
 from tests.injection.trial import BACK_WITHIN_S, settle

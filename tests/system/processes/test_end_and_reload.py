@@ -12,7 +12,7 @@ import yaml
 
 from compd.client import Client, connect
 from compd.errors import DaemonError
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.support.daemon_process import Daemon, Pidfds
 from tests.support.process_checks import check_undisturbed, cycles_kept, is_ok, is_valid
 from tests.support.processes import RATE_HZ

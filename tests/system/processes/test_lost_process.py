@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.support.daemon_process import Daemon, Pidfds
 from tests.support.process_checks import is_ok, is_valid, started_again, starts
 from tests.support.sampled import sampled

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.support.daemon_process import Daemon, Pidfds
 from tests.support.misbehaving import DIAL_PROCESS
 from tests.support.process_checks import check_undisturbed, cycles_kept, is_ok, is_valid, started_again, starts

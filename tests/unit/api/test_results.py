@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.comparison import Comparison
-from compd.planning.measurement_plan import MeasurementPlan
-from compd.diagnosis.verdict import Diagnosis
+from compd.comparison import AlignedRecording, Comparison
+from compd.diagnosis import Diagnosis
 from compd.errors import CompdError, ConfigurationError, PluginError, RecordingError, StateError
-from compd.model.effects.effect import Effect, Parameter
-from compd.model_file.model_file import ModelFile
+from compd.model.effects import Effect, Parameter
+from compd.model_file import ModelFile
+from compd.planning import MeasurementPlan
 from compd.result_tables import MOST_ROWS, data_frame, html_table
 from tests.support.measured import SIGMA_UM, gauges, hidden, record
 

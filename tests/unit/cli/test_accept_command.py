@@ -7,9 +7,9 @@ from contextlib import nullcontext
 import pytest
 from typer.testing import CliRunner
 
+from compd.cli.app import app
 from compd.cli.live.accept import not_believed
 from compd.cli.live.zero import changes_text
-from compd.cli.main import app
 
 GAUGES = [
     {"channel": "scale_1.position", "quality": "distrusted", "detail": "came back 5.000 mm away: reference it"},

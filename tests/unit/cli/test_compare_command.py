@@ -16,7 +16,7 @@ from compd.cli.measurements.compare import compare
 from compd.cli.measurements.effect import add, fit, remove, undo
 from compd.cli.measurements.ledger import ledger
 from compd.errors import CompdError, RecordingError, StateError
-from compd.model_file.model_file import read_model_file
+from compd.model_file import read_model_file
 from tests.support.external import write_external
 from tests.support.measured import gauges, hidden, record
 

@@ -13,11 +13,11 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from compd.cli.measurements.diagnose import diagnose
-from compd.diagnosis.findings import CandidateResult, UntestedEffect
-from compd.diagnosis.verdict import Diagnosis
-from compd.diagnosis.words.summary_lines import MOST_LINES, WIDTH, summary_lines
+from compd.diagnosis import WIDTH, CandidateResult, Diagnosis, summary_lines
+from compd.diagnosis.findings import UntestedEffect
+from compd.diagnosis.words.summary_lines import MOST_LINES
 from compd.model.library import find_effect
-from compd.report.diagnosis_text import print_diagnosis
+from compd.report import print_diagnosis
 from tests.support.diagnoses import (
     FRAME,
     Noise,

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from plotly.graph_objects import Figure
 
-from compd.comparison.recording_comparison import compare
-from compd.comparison.open import open_recording
+from compd.comparison import compare, open_recording
 from compd.model.library import load_library
 from compd.report.figures import plot_residual_vectors, plot_workspace_map
 from compd.report.small_multiples import NOT_RECORDED

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from compd.cli.measurements.fleet import fleet
 from compd.errors import CompdError
-from compd.fleet.table import write_table
+from compd.fleet import write_table
 from tests.support.fleets import machine, result
 
 PROBLEM = "lost.csv: cannot be read\n    next: copy it again"

@@ -10,9 +10,9 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from compd.arrays import FloatArray
-from compd.cli.main import app
+from compd.cli.app import app
 from compd.errors import RecordingError
-from compd.recording.reader import read_recording
+from compd.recording import read_recording
 from tests.support.points_at_rest import in_own_frame
 from tests.unit.joining.test_at_rest import one_row_per_place
 

@@ -14,9 +14,9 @@ import compd
 from compd.cli.measurements.compare import compare
 from compd.cli.measurements.diagnose import diagnose
 from compd.cli.measurements.effect import add, fit
+from compd.comparison import draw_sample
 from compd.comparison.stream import recording_stream
-from compd.comparison.stream.sample import draw_sample
-from compd.model_file.model_file import read_model_file
+from compd.model_file import read_model_file
 from tests.support.measured import gauges, hidden, record
 
 ROWS = 400

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from compd.cli.main import app
-from compd.planning.plan_formats import MARKS, target_name
+from compd.cli.app import app
 from compd.errors import CompdError
-from compd.files.output_file import check_replaceable
-from compd.simulation.truth.mechanism import Mechanism
+from compd.files import check_replaceable
+from compd.planning import MARKS
+from compd.planning.plan_formats import target_name
+from compd.simulation import Mechanism
 from tests.support.hidden_effects import record_with_effects
 from tests.support.simulated import tripod
 from tests.unit.instruments.test_gcode import COMMENT, WORDS

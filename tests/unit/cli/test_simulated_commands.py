@@ -14,8 +14,7 @@ from compd.cli.simulated.tracker import ExportFormat, tracker
 from compd.clock import MonotonicClock
 from compd.configuration import load
 from compd.errors import CompdError, DaemonError
-from compd.simulation.truth.world import World
-from compd.simulation.wires.server import Simulation
+from compd.simulation import Simulation, World
 from tests.support.simulated import TRIPOD, run_directory
 
 

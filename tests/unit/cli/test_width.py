@@ -7,12 +7,12 @@ from rich.console import Console
 from rich.table import Table
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 from compd.cli.reflow import reflowed
-from compd.gauge_tools.driver_catalogue import catalogue
 from compd.configuration import load
-from compd.report.terminal_table import keep_words_whole
-from compd.text.numbers_as_text import number_text
+from compd.gauge_tools import catalogue
+from compd.report import keep_words_whole
+from compd.text import number_text
 from tests.support.paths import CONFIG
 
 CUT = "…"

@@ -13,16 +13,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from compd.gauge_tools.driver_catalogue import polled_drivers
-from compd.conformance import faults
+from compd.conformance import DriverUnderTest, driver_under_test, faults, run_conformance
 from compd.conformance.cases import CaseResult, Subject, run_case
 from compd.conformance.faults import Fault
 from compd.conformance.harness import ASKED_AGAIN_TIMEOUTS
-from compd.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.conformance.value_cases import share_of
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
-from compd.lines.modbus_rtu import RtuMaster
-from compd.simulation.wires.device import SimulatedByteDevice
+from compd.gauge_tools import polled_drivers
+from compd.lines import RtuMaster
+from compd.simulation import SimulatedByteDevice
 from tests.support.sampled import sampled
 
 NAMES = polled_drivers()

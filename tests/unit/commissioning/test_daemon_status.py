@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 from compd.commissioning.daemon_health import Health, daemon_status, worst_gauges
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.unit.live.test_client import scripted
 
 VERSION = {"class": "VERSION", "protocol": 1, "machine": "tripod"}

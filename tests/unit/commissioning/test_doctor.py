@@ -21,8 +21,7 @@ from compd.commissioning.doctor.system import (
     tcp_finding,
     unit_finding,
 )
-from compd.configuration import load
-from compd.configuration.lines import LineSettings, ModbusTcpLine, SerialLine
+from compd.configuration import LineSettings, ModbusTcpLine, SerialLine, load
 from tests.support.paths import CONFIG
 
 PORT = "/dev/serial/by-id/usb-FTDI_A1-if00-port0"

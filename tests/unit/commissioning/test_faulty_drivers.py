@@ -8,11 +8,10 @@ import re
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.main import app
-from compd.gauge_tools.driver_catalogue import polled_drivers
-from compd.conformance.case_result import CaseResult
-from compd.conformance.report import DriverUnderTest, driver_under_test, run_conformance
+from compd.cli.app import app
+from compd.conformance import CaseResult, DriverUnderTest, driver_under_test, run_conformance
 from compd.gauge import Channel
+from compd.gauge_tools import polled_drivers
 from compd_drivers.modbus import Modbus
 from compd_drivers.modbus_description import ModbusOptions
 from tests.support.faulty_drivers import DRIVERS

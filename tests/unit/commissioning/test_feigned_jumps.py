@@ -21,11 +21,11 @@ from compd.commissioning.jump_trials import (
 )
 from compd.commissioning.line_budget import line_budgets
 from compd.configuration import Configuration, load
-from compd.stated_noise import tolerance_mm
 from compd.gauge import DataSheetNoise, Gauge, GaugeOptions, Quality, Reading, good
-from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample, MotionLimits, unseen_jump_mm
-from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
-from compd.live.memory.trust_memory import TrustMemory
+from compd.live.acquisition import MotionLimits, ReadingTrust, TrustSettings, unseen_jump_mm
+from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
+from compd.live.memory import TrustMemory
+from compd.stated_noise import tolerance_mm
 from tests.support.command import run_in_process
 from tests.support.live_models import file_with
 from tests.support.paths import CONFIG

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from compd.gauge_tools.gauge_statistics import GaugeStatistics
 from compd.gauge import Channel, Quality, bad, good
+from compd.gauge_tools import GaugeStatistics
 
 
 def test_statistics() -> None:

@@ -18,8 +18,7 @@ from compd.commissioning.line_budget import (
     line_budgets,
 )
 from compd.commissioning.line_warnings import budget_warnings, line_warnings
-from compd.configuration import load
-from compd.configuration.lines import ModbusAsciiLine, ModbusRtuLine, ModbusTcpLine, SerialLine
+from compd.configuration import ModbusAsciiLine, ModbusRtuLine, ModbusTcpLine, SerialLine, load
 from tests.support.paths import CONFIG
 
 

@@ -13,9 +13,10 @@ from typing import Any
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.gauge_tools.probe import PresetCandidate, announcements, preset_candidates, probe_port
-from compd.configuration.lines import ModbusRtuLine, SerialLine
+from compd.configuration import ModbusRtuLine, SerialLine
 from compd.gauge import Quality
+from compd.gauge_tools import announcements, preset_candidates
+from compd.gauge_tools.probe import PresetCandidate, probe_port
 from compd.lines import open_stream
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine

@@ -10,11 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.recording_comparison import compare
-from compd.configuration import load
-from compd.configuration.shipped import shipped_configuration
+from compd.configuration import load, shipped_configuration
 from compd.errors import CompdError, RecordingError
-from compd.recording.reader import read_recording
-from compd.recording.writer import write_recording
+from compd.recording import read_recording, write_recording
 from tests.support.measured import SIGMA_UM, Floats, aligned, gauges, hidden, record, tips_mm, tripod
 from tests.support.paths import SHARED
 

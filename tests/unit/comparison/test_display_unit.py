@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.recording_comparison import compare
 from compd.comparison.comparison import Comparison
 from compd.comparison.covariate import covariates
 from compd.comparison.display_unit import format_error
 from compd.comparison.open import open_recording
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.comparison.recording_comparison import compare
+from compd.diagnosis import diagnose
 from compd.model.library import load_library
-from compd.report.comparison_page import write_comparison_page
+from compd.report import write_comparison_page
 from tests.support.command import run_in_process
 from tests.support.external import measured_places, write_external
 

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from compd.comparison.noise_floor import noise_floor, repeat_scatter
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import gauge_noise
-from compd.statistics.last_digit import last_digit_um
-from compd.statistics.replicates import replicate_pairs
-from compd.statistics.robust import SCALE_EFFICIENCY
+from compd.statistics import SCALE_EFFICIENCY, last_digit_um, replicate_pairs
 from tests.support.measured import GAUGE_SIGMA_UM, aligned, gauges, record
 
 Floats = NDArray[np.float64]

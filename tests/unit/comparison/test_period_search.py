@@ -9,8 +9,8 @@ import pytest
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
 from compd.comparison.period_search import promising_constants
+from compd.comparison.recording_comparison import compare
 from compd.comparison.shape_search import search_constants
 from compd.model.library import find_effect
 from tests.support.external_recordings import record_external

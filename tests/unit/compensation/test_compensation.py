@@ -8,10 +8,10 @@ import pytest
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.errors import KinematicsError
+from compd.model import MachineModel, machine_model
+from compd.model.kernels import Reason, require
+from compd.model.kinematics import Contact, ToolOnPlate
 from compd.rotation import rotation_matrix, rotation_vector, to_inner
-from compd.model.machine import MachineModel, machine_model
-from compd.model.kernels.solve_status import Reason, require
-from compd.model.kinematics.tool import Contact, ToolOnPlate
 from tests.support.model_machines import (
     Floats,
     hexapod,

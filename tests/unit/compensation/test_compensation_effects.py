@@ -10,15 +10,10 @@ import pytest
 
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import GaugeValues, WarmStart
-from compd.model.effects.deltas import deltas_by_effect, sum_deltas
-from compd.model.effects.effect import Effect, FittedEffect
-from compd.model.machine import MachineModel, machine_constants
-from compd.model.kinematics.motion import Movement, update_motion
-from compd.model.effects.observations import Observations
-from compd.model.observer import observe
-from compd.model.prediction import predict
-from compd.model.kernels.solve_status import Reason
-from compd.model.kinematics.tool import ToolOnPlate
+from compd.model import MachineModel, machine_constants, observe, predict
+from compd.model.effects import Effect, FittedEffect, Observations, deltas_by_effect, sum_deltas
+from compd.model.kernels import Reason
+from compd.model.kinematics import Movement, ToolOnPlate, update_motion
 from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD, constants_of, random_inputs
 
 ON_PLATE = replace(TRIPOD, arrangement=ToolOnPlate(TRIPOD.zero.contact.tip_M_mm))

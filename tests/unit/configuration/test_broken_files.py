@@ -10,8 +10,8 @@ import pytest
 from compd.configuration.machine_configuration import Examined
 from compd.errors import ConfigurationError, Problem, StateError
 from compd.machine_check import examine_whole, load_whole
-from compd.model_file.model_document import read_stored
-from compd.recording.sidecar import read_sidecar
+from compd.model_file import read_stored
+from compd.recording import read_sidecar
 from tests.support.paths import CONFIG
 
 TRIPOD = (CONFIG / "tripod-cmm.yaml").read_text()

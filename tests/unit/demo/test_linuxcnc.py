@@ -20,9 +20,8 @@ from compd.demo.linuxcnc.artefact import (
 from compd.demo.linuxcnc.controller import LinuxCnc, ProgramStopped
 from compd.demo.linuxcnc.motion_log import read_motion_log, tip_errors, wanted_tips_mm
 from compd.errors import DaemonError
-from compd.recording.sidecar import sidecar_contents
-from compd.recording.writer import write_recording
-from compd.simulation.truth.mechanism import Mechanism
+from compd.recording import sidecar_contents, write_recording
+from compd.simulation import Mechanism
 from tests.support.simulated import hexapod
 
 PERIOD_S = 0.01

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from compd.diagnosis.candidate_result import explained_fraction
-from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.findings import CandidateResult
+from compd.diagnosis.recording_diagnosis import diagnose
 from tests.support.external_recordings import along, record_external
 
 ROWS = 240

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.recording_diagnosis import diagnose

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from compd.comparison import read_with_machine
 from compd.comparison.alignment.align_recording import align_recording
-from compd.comparison.open import read_with_machine
-from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.holdout import evaluate_holdout
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
 from tests.support.hidden_effects import LIBRARY, record_with_effects
 from tests.support.paths import SHARED

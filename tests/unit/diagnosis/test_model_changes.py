@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 import compd
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.diagnosis.model_changes import add, remove
+from compd.comparison import AlignedRecording
+from compd.diagnosis.model_changes import add_to_model, remove_effect
 from compd.model.library import load_library
-from compd.model_file.model_file import ModelFile
+from compd.model_file import ModelFile
 from tests.support.measured import aligned, gauges, hidden, record
 
 ROWS = 90
@@ -47,12 +47,18 @@ def test_what_is_fitted_without_the_quantities_at_zero_says_so(tmp_path: Path) -
     unknown = recorded(tmp_path, "old", {})
     model = compd.add_effect(compd.add_effect(None, "link_expansion", known), "tool_offset", known)
     assert datums(model)["link_expansion"] == "machine zero"
-    for changed in (add(model, "link_zero", LIBRARY["link_zero"], unknown), remove(model, "tool_offset", unknown)):
+    for changed in (
+        add_to_model(model, "link_zero", LIBRARY["link_zero"], unknown),
+        remove_effect(model, "tool_offset", unknown),
+    ):
         assert datums(changed)["link_expansion"] == "20 degC"
         changed.write(tmp_path / "m.yaml")
         entry = yaml.safe_load((tmp_path / "m.yaml").read_text(encoding="utf-8"))["effects"][0]
         assert (entry["effect"], entry["counts_from"]) == ("link_expansion", "20 degC")
-    for changed in (add(model, "link_zero", LIBRARY["link_zero"], known), remove(model, "tool_offset", known)):
+    for changed in (
+        add_to_model(model, "link_zero", LIBRARY["link_zero"], known),
+        remove_effect(model, "tool_offset", known),
+    ):
         assert datums(changed)["link_expansion"] == "machine zero"
 
 

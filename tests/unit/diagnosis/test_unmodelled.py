@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.effect_fit import fit, initial_effect
+from compd.comparison import fit, initial_effect
 from compd.diagnosis.candidates.candidates import Candidate, library_pool
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.unmodelled import with_disturbances

@@ -12,7 +12,7 @@ import pytest
 from compd.arrays import FloatArray
 from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
-from compd.model.effects.effect import Effect
+from compd.model.effects import Effect
 from tests.support.external_recordings import SIGMA_UM, along, record_external
 from tests.support.sampled import sampled
 

@@ -11,27 +11,28 @@ from typing import Any
 import pytest
 
 from compd.comparison.criteria import ComparisonCriteria
-from compd.configuration.machine_configuration import SECTIONS
-from compd.configuration.schema import json_schema
-from compd.diagnosis.criteria import Criteria
+from compd.configuration import SECTIONS, json_schema
+from compd.diagnosis import Criteria
 from compd.fleet.criteria import FleetCriteria
 from compd.gauge import Quality
+from compd.live.loop import Setpoint
 from compd.live.loop.packet_layout import PACKET_BODY, PACKET_FIELDS, PACKET_SIZE
-from compd.live.loop.setpoint import Setpoint
-from compd.live.loop.states import Mode, State
 from compd.live.service.messages import ErrorCode
 from compd.live.service.requests import REQUESTS, SENT_MESSAGES
 from compd.model.effects.effect_needs import NEEDS
+from compd.model.formula import FUNCTIONS
 from compd.model.formula.declaration import FormulaDeclaration, FormulaParameter
-from compd.model.formula.functions import FUNCTIONS
 from compd.model.library import BUNDLED
-from compd.model_file.model_document import EffectEntry, ModelDocument, ModelStep, ParameterEntry
+from compd.model_file import ModelStep
+from compd.model_file.model_document import EffectEntry, ModelDocument, ParameterEntry
 from compd.plugins import GAUGES, load, names
+from compd.recording import SECTIONS as SIDECAR
 from compd.recording.checks import LIMITS
-from compd.tables.columns import COLUMN_KINDS, parse_name
 from compd.recording.reference import Reference
-from compd.recording.sidecar import SECTIONS as SIDECAR
 from compd.recording.sidecar import Exclusion
+from compd.setpoint_states import Mode, State
+from compd.tables import parse_name
+from compd.tables.columns import COLUMN_KINDS
 from docs.generate import __main__ as generate
 from docs.generate.commands import CommandEntry, entries
 from docs.generate.live_examples import Exchange

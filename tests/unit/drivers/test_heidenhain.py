@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines.stream import StreamLine
+from compd.lines import StreamLine
 from compd_drivers.heidenhain_nd28x import HeidenhainNd28x
 from tests.support.wire_rig import InstantClock, ScriptedPort
 

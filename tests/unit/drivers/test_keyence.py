@@ -6,7 +6,7 @@ import pytest
 from pydantic import ValidationError
 
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines.stream import StreamLine
+from compd.lines import StreamLine
 from compd_drivers.keyence_gt2_dlrs1a import KeyenceGt2DlRs1a
 from tests.support.wire_rig import InstantClock, ScriptedPort
 

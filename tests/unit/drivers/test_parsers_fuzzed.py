@@ -18,8 +18,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines.modbus_rtu import RtuMaster, crc16
-from compd.lines.stream import StreamLine
+from compd.lines import RtuMaster, StreamLine
+from compd.lines.modbus_rtu import crc16
 from compd.plugins import GAUGES, load
 from tests.support.wire_rig import InstantClock, ScriptedPort
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from compd.gauge_tools.driver_catalogue import catalogue, driver_description
-from compd.conformance.report import driver_under_test, run_conformance
+from compd.conformance import driver_under_test, run_conformance
 from compd.errors import PluginError
+from compd.gauge_tools import catalogue, driver_description
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd_drivers.preset_directory import PresetDirectory
 from tests.support.paths import ROOT

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compd.gauge import Quality
-from compd.lines.checksums import CHECKSUMS
+from compd.lines import CHECKSUMS
 from compd_drivers.reply_format import ReplyFormat
 from compd_drivers.simulated.serial_ascii import SimulatedAscii
 from tests.support.ascii_gauge import CHANNEL, fault, gauge, poll

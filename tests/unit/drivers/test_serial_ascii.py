@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from compd.gauge import LineFault, Quality
-from compd.lines.stream import StreamLine
+from compd.lines import StreamLine
 from tests.support.ascii_gauge import CHANNEL, fault, gauge, line_with, poll
 from tests.support.wire_rig import InstantClock, ScriptedPort
 

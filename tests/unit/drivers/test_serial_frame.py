@@ -11,8 +11,7 @@ import yaml
 from pydantic import ValidationError
 
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines.checksums import CHECKSUMS
-from compd.lines.stream import StreamLine
+from compd.lines import CHECKSUMS, StreamLine
 from compd_drivers.serial_frame import SerialFrame
 from compd_drivers.simulated.serial_frame import SimulatedFrame
 from tests.support.wire_rig import InstantClock, ScriptedPort

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from compd.conformance.report import driver_under_test, run_conformance
+from compd.conformance import driver_under_test, run_conformance
 from compd.gauge import LineFault, Quality
 from compd_drivers.simulated.serial_ascii import SimulatedAscii
 from tests.support.ascii_gauge import gauge, line_with

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines.stream import StreamLine
+from compd.lines import StreamLine
 from tests.support.ascii_gauge import gauge, line_with
 from tests.support.wire_rig import InstantClock, ScriptedPort
 

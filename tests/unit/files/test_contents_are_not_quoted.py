@@ -16,38 +16,33 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 from compd.cli.problems import print_problems
 from compd.clock import MonotonicClock
-from compd.gauge_description.capture import read_capture
-from compd.gauge_tools.gauge_file import gauge_of_file
-from compd.gauge_tools.open_gauge import PortArguments
 from compd.configuration import load
 from compd.errors import CompdError
-from compd.fleet.recordings import find_recordings
-from compd.instruments.export import SHAPES, ReadOptions
-from compd.instruments.preview import preview_export
-from compd.instruments.read import read_export
+from compd.fleet import find_recordings
+from compd.gauge_description import read_capture
+from compd.gauge_tools import PortArguments, gauge_of_file
+from compd.instruments import SHAPES, ReadOptions, preview_export, read_export
 from compd.lines.mqtt_tls import tls_context
 from compd.lines.opc_ua_login import _certificate, _private_key
+from compd.live.loop import load_zero
 from compd.live.loop.machine_zero import FILE_NAME as ZERO_NAME
-from compd.live.loop.machine_zero import load_zero
-from compd.live.memory.trust_memory import TrustMemory
-from compd.live.record.replay import CYCLES_SUFFIX, RecordedCycles
+from compd.live.memory import TrustMemory
+from compd.live.record import RecordedCycles
+from compd.live.record.replay import CYCLES_SUFFIX
+from compd.live.service import LastReadings
 from compd.live.service.last_readings import FILE_NAME as LAST_NAME
-from compd.live.service.last_readings import LastReadings
 from compd.live.service.tcp_access import read_token
-from compd.model.library.effects_file import load_effects
+from compd.model.library import load_effects
+from compd.model_file import read_stored
 from compd.model_file.model_document import read_document as read_model_document
-from compd.model_file.model_document import read_stored
-from compd.page.token_file import read_tokens
+from compd.page import read_tokens
 from compd.page.workbench.effects_text import entries_of
-from compd.recording.ball_plate import read_plate
-from compd.recording.exclusions import exclude_rows
-from compd.recording.open_part import OpenPart
 from compd.plan_file import read_plan_file
-from compd.recording.reader import read_recording
-from compd.recording.sidecar import read_sidecar
+from compd.recording import OpenPart, exclude_rows, read_recording, read_sidecar
+from compd.recording.ball_plate import read_plate
 from compd_drivers.preset_directory import PresetDirectory
 from tests.support.paths import CONFIG
 from tests.support.sampled import sampled

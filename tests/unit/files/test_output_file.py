@@ -7,10 +7,10 @@ import os
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 from compd.errors import CompdError
 from compd.files.output_file import check_replaceable
-from compd.report.page import check_page_path, write_page
+from compd.report import check_page_path, write_page
 
 PRECIOUS = "row,time_s,reference_x_mm\n1,0.0,1.25\n"
 

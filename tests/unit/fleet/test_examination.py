@@ -13,8 +13,8 @@ import yaml
 import compd
 from compd.errors import CompdError
 from compd.fleet import machine_examination as module
-from compd.fleet.machine_examination import examination
 from compd.fleet.fleet_recording import FleetRecording
+from compd.fleet.machine_examination import examination
 from compd.fleet.recording_result import ABOVE_FLOOR
 from compd.fleet.recordings import find_recordings
 from tests.support.measured import gauges, hidden, record

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.commissioning.blind_spots import BLIND_SPOTS
+from compd.commissioning import BLIND_SPOTS
 from tests.injection.case import Way
 from tests.injection.cells import __main__ as run
 from tests.injection.cells import workers

@@ -9,10 +9,10 @@ import re
 import numpy as np
 import pytest
 
-from compd.planning.plan_formats import plan_targets, target_bytes
 from compd.errors import CompdError
 from compd.instruments.writers.gcode import FeedAndDwell
 from compd.instruments.writers.target import Way
+from compd.planning.plan_formats import plan_targets, target_bytes
 
 # One line: a comment without parentheses in it, or words of a letter and a number without an exponent.
 COMMENT = re.compile(r"\([ -'*-~]*\)")

@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.comparison.recording_comparison import compare
-from compd.comparison.open import open_recording
-from compd.configuration.shipped import load_machine
+from compd.comparison import compare, open_recording
+from compd.configuration import load_machine
 from compd.errors import RecordingError
-from compd.instruments.export import InstrumentExport
+from compd.instruments import InstrumentExport
 from compd.joining.at_rest import By, RestJoin, join_at_rest
 from compd.joining.by_time import Instrument
-from compd.recording.reader import read_recording
-from compd.simulation.truth.mechanism import Mechanism
+from compd.recording import read_recording
+from compd.simulation import Mechanism
 from tests.support.planned_measurements import plan_file
 from tests.support.points_at_rest import in_own_frame, points, write_gauges
 from tests.support.simulated import tripod

@@ -13,14 +13,11 @@ from typer.testing import CliRunner
 from compd.arrays import FloatArray
 from compd.cli.measurements.join import join as join_command
 from compd.errors import RecordingError
-from compd.instruments.export import ReadOptions
-from compd.instruments.read import read_export
-from compd.instruments.track import Track
-from compd.instruments.track import track_of as track_of_export
+from compd.instruments import ReadOptions, Track, read_export
+from compd.instruments import track_of as track_of_export
 from compd.joining.by_time import Instrument, join_reference
 from compd.joining.clock_offset import agreement_curve, estimate_offset
-from compd.recording.reader import read_recording
-from compd.recording.writer import write_recording
+from compd.recording import read_recording, write_recording
 from tests.support.sampled import sampled
 from tests.support.two_clocks import TipPath, random_path, track_of
 

@@ -10,8 +10,7 @@ import pytest
 from compd.arrays import FloatArray
 from compd.errors import RecordingError
 from compd.joining.dwells import dwell_columns, find_dwells
-from compd.recording.reader import read_recording
-from compd.recording.recording import Recording
+from compd.recording import Recording, read_recording
 from tests.support.points_at_rest import write_gauges
 from tests.support.two_clocks import TipPath, random_path
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from compd.errors import CompdError, ConfigurationError
-from compd.model.library.effects_file import gather_effects, load_effects, named_effect
+from compd.model.library import gather_effects, load_effects, named_effect
 
 STAGE = """\
 - id: stage_offset

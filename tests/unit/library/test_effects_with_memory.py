@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from compd.model.kinematics.motion import Movement
+from compd.model.kinematics import Movement
 from tests.support.effect_rows import TRIPOD, delta_mm, rows_at_tips
 from tests.support.model_machines import Floats
 

@@ -12,12 +12,19 @@ import pytest
 
 import compd.model.library
 from compd.errors import CompdError, PluginError
-from compd.model.effects.deltas import deltas_by_effect, port_size
-from compd.model.effects.effect import PORTS, Effect, FittedEffect
-from compd.model.effects.effect_basis import evaluate_basis
-from compd.model.effects.effect_needs import can_concern, needed_quantities, unmet_needs
+from compd.model.effects import (
+    PORTS,
+    Effect,
+    FittedEffect,
+    can_concern,
+    deltas_by_effect,
+    evaluate_basis,
+    needed_quantities,
+    unmet_needs,
+)
+from compd.model.effects.deltas import port_size
+from compd.model.kinematics import update_motion
 from compd.model.library import BUNDLED, find_effect, load_library
-from compd.model.kinematics.motion import update_motion
 from tests.support.effect_rows import (
     HEXAPOD,
     LIBRARY,

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from compd.model.effects.deltas import Deltas, effect_deltas
-from compd.model.effects.effect import FittedEffect
-from compd.model.kinematics.motion import Movement
-from compd.model.prediction import predict
+from compd.model import predict
+from compd.model.effects import Deltas, FittedEffect, effect_deltas
+from compd.model.kinematics import Movement
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, delta_mm, row_at_zero, rows_at_tips, solve_tip
 from tests.support.model_machines import Floats, tips
 

@@ -11,8 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import compd
-from compd.model.effects.effect import Effect
-from compd.model.effects.effect_basis import evaluate_basis
+from compd.model.effects import Effect, evaluate_basis
 from tests.support.external_recordings import external_rows
 from tests.support.model_machines import Floats
 from tests.support.paths import SHARED

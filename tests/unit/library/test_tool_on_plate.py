@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.comparison import AlignedRecording
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.configuration import load
-from compd.model.effects.effect import FittedEffect
-from compd.model.machine import MachineModel, machine_constants, machine_model
-from compd.model.kinematics.tool import ToolOnPlate
+from compd.model import MachineModel, machine_constants, machine_model
+from compd.model.effects import FittedEffect
+from compd.model.kinematics import ToolOnPlate
 from tests.support.effect_rows import DETAILS, LIBRARY, all_quantities
 from tests.support.model_machines import Floats, tripod_parts
 from tests.support.simulated import TRIPOD, tripod_with_tool_on_plate

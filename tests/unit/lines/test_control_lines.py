@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from structlog.testing import capture_logs
 
 from compd.clock import MonotonicClock
-from compd.configuration.lines import powered
+from compd.configuration import powered
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from compd.lines.control_lines import ControlLines

@@ -11,7 +11,7 @@ from compd.lines.echo import HINT, explained
 from compd.lines.modbus_rtu import RtuMaster
 from compd.lines.stream import StreamLine
 from compd.live.acquisition.acquisition import LineThread
-from compd.live.memory.latest import Latest
+from compd.live.memory import Latest
 from tests.support.ascii_gauge import gauge
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 from tests.unit.lines.test_modbus_rtu import counting_slave

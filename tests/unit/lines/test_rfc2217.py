@@ -18,7 +18,7 @@ from serial.rfc2217 import PortManager
 from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line
-from compd.live.acquisition.acquisition import Acquisition
+from compd.live.acquisition import Acquisition
 from tests.support.ascii_gauge import gauge
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
 

@@ -10,7 +10,7 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
-from compd.simulation.wires.device import SimulatedByteDevice
+from compd.simulation import SimulatedByteDevice
 from compd.simulation.wires.simulated_line import DAMAGES, SimulatedLine
 from tests.support.wire_rig import SETTINGS, outcome, rig
 

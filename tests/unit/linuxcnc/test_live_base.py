@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation import Mechanism
 from tests.support.paths import CONFIG
 from tests.support.simulated import hexapod
 from tests.unit.linuxcnc import conftest  # noqa: F401  puts the bridge's folder on the path

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.support.bridge_daemon import BridgeDaemon
 from tests.support.hand_clock import HandClock
 from tests.support.simulated import run_directory

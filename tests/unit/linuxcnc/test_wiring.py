@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from compd.simulation.truth.mechanism import Mechanism
+from compd.simulation import Mechanism
 from tests.support.live_machine import machine
 from tests.support.paths import CONFIG
 from tests.support.simulated import HEXAPOD, hexapod, section

@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from compd.errors import StateError
-from compd.live.loop.states import State
 from compd.live.record.replay import RecordedCycles, replay_cycles
-from compd.model_file.model_file import ModelFile
+from compd.model_file import ModelFile
+from compd.setpoint_states import State
 from tests.support.live_machine import machine
 from tests.support.live_models import file_with
 from tests.support.measured import hidden

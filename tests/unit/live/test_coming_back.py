@@ -10,15 +10,15 @@ import pytest
 
 from compd.configuration import Configuration, load
 from compd.gauge import Quality, Reading, good
-from compd.live.system import port_names
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import Doubt
-from compd.live.system.port_names import changed_ports
-from compd.live.system.port_names import port_names as ports_of
 from compd.live.service import last_readings
 from compd.live.service.last_readings import LastReadings
+from compd.live.system import serial_names as port_names
+from compd.live.system.serial_names import changed_ports
+from compd.live.system.serial_names import port_names as ports_of
 from compd.live.wired_trust import wired_memory, wired_trust
 from tests.support.hand_clock import HandClock
 from tests.support.paths import CONFIG

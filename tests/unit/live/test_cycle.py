@@ -14,8 +14,8 @@ from compd.gauge import Quality
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
 from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.states import Mode, State
 from compd.live.service.state_json import to_plain
+from compd.setpoint_states import Mode, State
 from tests.support.live_machine import CONFIG, HOLD_S, PERIOD_S, RAW_AT_ZERO_MM, STEP_MM, Machine, machine
 from tests.support.sampled import sampled
 

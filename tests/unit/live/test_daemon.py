@@ -17,8 +17,7 @@ import structlog
 
 from compd.client import connect
 from compd.clock import MonotonicClock
-from compd.configuration import Configuration, load
-from compd.configuration.operation import SocketSettings, StateSettings
+from compd.configuration import Configuration, SocketSettings, StateSettings, load
 from compd.errors import DaemonError
 from compd.gauge import Quality, bad, good
 from compd.live import daemon as daemon_module

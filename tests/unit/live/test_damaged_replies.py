@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from compd.clock import Clock
+from compd.commissioning import line_budgets
+from compd.commissioning.line_budget import USUAL_TURNAROUND_S, character_bits
+from compd.configuration import load
 from compd.conformance.faults import Piece
 from compd.conformance.virtual import VirtualWire
-from compd.commissioning.line_budget import USUAL_TURNAROUND_S, character_bits, line_budgets
-from compd.configuration import load
-from compd.stated_noise import tolerance_mm
 from compd.gauge import Reading
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.acquisition.possible_motion import MotionLimits
@@ -26,8 +26,9 @@ from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
-from compd.simulation.wires.modbus_slaves import ModbusSlaves
+from compd.simulation import ModbusSlaves
 from compd.simulation.wires.simulated_line import ByteDevices
+from compd.stated_noise import tolerance_mm
 from tests.support.paths import CONFIG
 from tests.support.wire_rig import PATIENCE_S
 

@@ -21,8 +21,8 @@ from compd.live.loop.cycle import step
 from compd.live.loop.directions import Directions
 from compd.live.loop.model_loader import Models
 from compd.live.loop.ring_entries import CyclePacker, CycleUnpacker
-from compd.live.loop.states import State
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
+from compd.setpoint_states import State
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine
 from tests.support.live_models import file_with, thermal, warm, with_noise
 from tests.unit.live.test_daemon import StillGauges, configuration, first, running

@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compd.compensation.values import GaugeValues
+from compd.compensation import GaugeValues
 from compd.gauge import Quality, ReadingMotion, bad, good
 from compd.live.loop.commands import Target
-from compd.live.loop.states import State
 from compd.live.loop.tip_uncertainty import stated_noise, tip_uncertainty
 from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.live.service.message_keys.readings import ReadingsKeys
 from compd.live.service.state_json import to_plain
-from compd.model.effect_memory import EffectMemory
+from compd.model import EffectMemory
+from compd.setpoint_states import State
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 from tests.support.live_models import with_noise
 from tests.support.recorded_run import Run

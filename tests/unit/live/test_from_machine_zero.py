@@ -15,8 +15,8 @@ from compd.gauge import Quality
 from compd.live import daemon as daemon_module
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import Models
-from compd.live.loop.states import State
 from compd.live.service.zero_capture import ZeroCapture
+from compd.setpoint_states import State
 from tests.support.live_machine import PERIOD_S, Machine, machine
 from tests.support.live_models import file_with, warm
 from tests.unit.live.test_daemon import StillGauges, configuration, first, running

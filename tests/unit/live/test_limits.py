@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compd.configuration.operation import LimitSettings
+from compd.configuration import LimitSettings
 from compd.live.loop.limits import limit_correction
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 
 LARGEST_MM = 0.2
 SLEW_MM_PER_S = 0.5

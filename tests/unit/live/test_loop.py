@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import pytest
 
-from compd.configuration.operation import LoopSettings
+from compd.configuration import LoopSettings
 from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
 from compd.live.loop.loop import Loop
-from compd.live.loop.states import State
 from compd.live.loop.timing import Histogram, LoopTiming
 from compd.live.system.realtime import sleep_until
+from compd.setpoint_states import State
 from tests.support.live_machine import machine
 
 PERIOD_S = 1 / 128  # exact in binary: tick times compare with ==

@@ -12,7 +12,7 @@ import pytest
 
 from compd.configuration import load
 from compd.errors import Problem, StateError
-from compd.files.checksum import checksum_of
+from compd.files import checksum_of
 from compd.gauge import Quality, bad, good
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import FILE_NAME, OLD_FILE_NAME, MachineZero, load_zero

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.live.loop.states import State
 from compd.live.service.messages import MAX_LINE_BYTES, line
 from compd.live.service.model_switch import ModelWish
 from compd.live.service.requests import REQUESTS, Asker
+from compd.setpoint_states import State
 from tests.support.service import PERIOD_S, VERSION, setpoint
 
 

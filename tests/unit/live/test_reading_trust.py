@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from compd.stated_noise import tolerance_mm
 from compd.gauge import Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, good
 from compd.live.acquisition.polled_gauge import PolledGauge
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
@@ -18,6 +17,7 @@ from compd.live.memory.readings import pack
 from compd.live.memory.trust_memory import TrustMemory
 from compd.plugins import GAUGES as GAUGES_GROUP
 from compd.plugins import load, names
+from compd.stated_noise import tolerance_mm
 
 NOISE_UM = 0.1
 POLL_S = 0.005

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.configuration.operation import LoopSettings
+from compd.configuration import LoopSettings
 from compd.live.processes.loop_process import wake_latency_us
 from compd.live.system.realtime import limit_wake_latency
 

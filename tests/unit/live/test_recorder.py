@@ -14,7 +14,7 @@ from compd.errors import Problem, RecordingError, StateError
 from compd.gauge import Quality
 from compd.live.record.recorder import Recorder, RecordingLimits
 from compd.live.record.replay import RecordedCycles, replay_cycles
-from compd.recording.reader import read_recording
+from compd.recording import read_recording
 from tests.support.live_machine import Machine, machine
 from tests.support.recorded_run import ROOMY, Run, rows_of
 from tests.support.small_disk import room_for

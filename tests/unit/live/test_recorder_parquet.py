@@ -17,9 +17,8 @@ from compd.clock import MonotonicClock
 from compd.errors import RecordingError
 from compd.live.record.recorder import Recorder
 from compd.live.record.replay import RecordedCycles, replay_cycles
-from compd.recording.convert import convert_recording
-from compd.recording.reader import read_recording
-from compd.tables.table_format import TableFormat
+from compd.recording import convert_recording, read_recording
+from compd.tables import TableFormat
 from tests.support.live_machine import machine
 from tests.support.recorded_run import ROOMY, Run
 from tests.support.small_disk import room_for

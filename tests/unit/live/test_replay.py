@@ -16,13 +16,13 @@ from compd.cli.live.replay import replay as replay_command
 from compd.errors import Problem, RecordingError, StateError
 from compd.live.loop.cycle import step
 from compd.live.loop.model_loader import Models
-from compd.live.loop.states import State
 from compd.live.record.compared_table import differing_cells
 from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.live.service.readings_message import parse_readings
 from compd.live.service.state_json import from_plain, to_plain
-from compd.model.effect_memory import EffectMemory
-from compd.model.kinematics.motion import Motion
+from compd.model import EffectMemory
+from compd.model.kinematics import Motion
+from compd.setpoint_states import State
 from tests.support.live_machine import CONFIG, machine
 from tests.support.live_models import file_with
 from tests.support.recorded_run import ROOMY, Run

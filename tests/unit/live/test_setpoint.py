@@ -10,10 +10,10 @@ import zlib
 import numpy as np
 import pytest
 
-from compd.compensation.values import CorrectionShares
+from compd.compensation import CorrectionShares
 from compd.live.loop.packet_layout import PACKET_SIZE
 from compd.live.loop.setpoint import Setpoint, SetpointValues
-from compd.live.loop.states import Mode, State
+from compd.setpoint_states import Mode, State
 
 HASH = bytes.fromhex("0123456789abcdef")
 

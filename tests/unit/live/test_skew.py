@@ -12,8 +12,8 @@ from compd.configuration import load
 from compd.errors import ConfigurationError
 from compd.gauge import Quality, good
 from compd.live.loop.commands import Target
-from compd.live.loop.states import State
-from compd.recording.reader import read_recording
+from compd.recording import read_recording
+from compd.setpoint_states import State
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 from tests.support.paths import CONFIG
 from tests.support.recorded_run import Run

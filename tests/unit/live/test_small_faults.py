@@ -13,10 +13,10 @@ import pytest
 
 from compd.configuration import load
 from compd.gauge import Quality, Reading, good
-from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.acquisition.cross_checks.cross_checks import LOOK_EVERY_S, Votes
-from compd.live.memory.latest import Latest
+from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.loop.pipeline import build_pipeline
+from compd.live.memory.latest import Latest
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from tests.support.paths import CONFIG
 

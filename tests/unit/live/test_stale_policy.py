@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from compd.configuration.operation import LoopSettings
+from compd.configuration import LoopSettings
 from compd.gauge import Quality
 from compd.live.loop.reasons import WAITS_FOR_PERSON, Lost
 from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
-from compd.live.loop.states import State
+from compd.setpoint_states import State
 from tests.support.live_machine import PERIOD_S, machine
 
 HOLD_S = 4.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from compd.cli.live.watch import state_colour, view
-from compd.live.loop.states import State, state_named
+from compd.setpoint_states import State, state_named
 from docs.generate.states import page
 
 CODES = ["starting", "no_zero", "ok", "slewing", "clamped", "hold", "fade", "stop", "refused", "degraded", "fault"]

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compd.compensation.compensation import compensate_cmm
-from compd.compensation.values import GaugeValues, WarmStart
-from compd.live.loop.states import State
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm
+from compd.setpoint_states import State
 from tests.support.live_machine import machine
 from tests.support.moving_machine import DEPARTS_S, DIGIT_MM, NOISE_MM, Fault, configured, told, track
 

@@ -9,13 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compd.compensation.compensation import compensate_cmm
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.configuration import load
 from compd.gauge import ReadingMotion
 from compd.live.loop.model_loader import Models
-from compd.live.loop.states import State
 from compd.live.loop.tip_uncertainty import radius_95
+from compd.setpoint_states import State
 from tests.support.live_machine import Machine, machine
 from tests.support.live_models import file_with, thermal, with_noise
 

@@ -8,15 +8,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from compd.configuration.operation import FrameVote, VoteSettings
-from compd.stated_noise import tolerance_mm
+from compd.configuration import FrameVote, VoteSettings
 from compd.gauge import good
+from compd.live.acquisition.cross_checks.cross_checks import LOOK_EVERY_S, Votes
+from compd.live.acquisition.cross_checks.machine_view import WiredLength
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
-from compd.live.acquisition.cross_checks.machine_view import WiredLength
-from compd.live.acquisition.cross_checks.cross_checks import LOOK_EVERY_S, Votes
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
+from compd.stated_noise import tolerance_mm
 
 NOISE_UM, STEP_MM, POLL_S = 0.05, 0.00001, 0.01
 SCALES = ("scale_1.position", "scale_2.position", "scale_3.position")

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from compd.errors import KinematicsError
-from compd.model.kinematics.frame import Frame, FrameGeometry, base_pose, distances_mm, solve_frame
-from compd.model.kinematics.instantaneous import base_pose_jacobian, frame_difference, instantaneous_frame, inverse_frame_jacobian
-from compd.rotation import rotation_matrix
-from compd.model.machine import machine_model
 from compd.model.kernels.solve_status import Reason, require
+from compd.model.kinematics.frame import Frame, FrameGeometry, base_pose, distances_mm, solve_frame
+from compd.model.kinematics.instantaneous import (
+    base_pose_jacobian,
+    frame_difference,
+    instantaneous_frame,
+    inverse_frame_jacobian,
+)
+from compd.model.machine import machine_model
+from compd.rotation import rotation_matrix
 from tests.support.model_machines import Floats, hexapod, move_machine, ring, rotation, tripod, tripod_parts
 
 MODEL = tripod()

@@ -8,16 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import CompdError
 from compd.model.effects.deltas import effect_deltas
 from compd.model.effects.effect import ConstantValues, Effect, FittedEffect, Memory, memoryless_basis
 from compd.model.effects.effect_basis import evaluate_basis, recounted
 from compd.model.effects.effect_needs import is_measured, unmet_needs
+from compd.model.effects.observations import Observations
 from compd.model.library import BUNDLED
 from compd.model.machine import MachineModel, machine_constants
-from compd.model.effects.observations import Observations
 from tests.support.effect_rows import (
     DETAILS,
     HEXAPOD,

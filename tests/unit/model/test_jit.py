@@ -77,10 +77,7 @@ def test_kernels_work_where_nothing_can_be_kept(tmp_path: Path) -> None:
 @pytest.mark.sample
 def test_processes_that_start_together_do_not_spoil_each_others_kernels(tmp_path: Path) -> None:
     """numba names a kernel by what its process compiled before, so these two do not agree on the name."""
-    ours = (
-        "import numpy as np; from compd.rotation import compose;"
-        "print(compose(np.eye(3), np.eye(3)).sum())"
-    )
+    ours = "import numpy as np; from compd.rotation import compose;print(compose(np.eye(3), np.eye(3)).sum())"
     other = f"import numba; numba.njit(lambda x: x + 1)(1); {ours}"
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import fsolve
 
+from compd.model.kernels.solve_status import AMPLIFICATION_LIMIT, Reason, require
 from compd.model.kinematics.frame import solve_frame
-from compd.rotation import rotation_matrix, rotation_vector
 from compd.model.kinematics.link_kinematics import Mechanism, Pose, closure_at, forward_kinematics, inverse_kinematics
 from compd.model.machine import MachineModel, machine_model
-from compd.model.kernels.solve_status import AMPLIFICATION_LIMIT, Reason, require
+from compd.rotation import rotation_matrix, rotation_vector
 from tests.support.model_machines import (
     Floats,
     hexapod,

@@ -7,13 +7,12 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from compd.configuration import load
-from compd.configuration.geometry import Geometry
+from compd.configuration import Geometry, load
 from compd.errors import KinematicsError
 from compd.machine_builder import build_model, joint_weights
-from compd.rotation import rotation_matrix
-from compd.model.machine import MachineModel, machine_model
 from compd.model.kinematics.tool import Contact, ToolOnPlate
+from compd.model.machine import MachineModel, machine_model
+from compd.rotation import rotation_matrix
 from tests.support.model_machines import hexapod, hexapod_parts, rotation, tripod, tripod_parts
 from tests.support.paths import CONFIG
 

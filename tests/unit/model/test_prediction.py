@@ -12,20 +12,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.compensation.compensation import compensate_cmm
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.model.effects.deltas import deltas_by_effect, effect_deltas, sum_deltas
 from compd.model.effects.effect import PORTS, FittedEffect, Port
 from compd.model.effects.effect_basis import evaluate_basis, port_size
-from compd.rotation import compose, rotation_vector
-from compd.model.kinematics.link_kinematics import inverse_kinematics, scale_for_length_mm
-from compd.model.machine import MachineModel
-from compd.model.kinematics.motion import Movement
 from compd.model.effects.observations import Observations
+from compd.model.kernels.solve_status import Reason
+from compd.model.kinematics.link_kinematics import inverse_kinematics, scale_for_length_mm
+from compd.model.kinematics.motion import Movement
+from compd.model.kinematics.tool import ToolOnPlate
+from compd.model.machine import MachineModel
 from compd.model.prediction import perturb_machine, predict
 from compd.model.sensitivity import link_residuals, sensitivities
-from compd.model.kernels.solve_status import Reason
-from compd.model.kinematics.tool import ToolOnPlate
+from compd.rotation import compose, rotation_vector
 from tests.support.effect_derivatives import effect_sensitivity
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, observe_rows, random_inputs
 from tests.support.model_machines import Floats

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from numba.core import event
 
-from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import CompdError
 from compd.model.effects.effect import ConstantValues, Effect, FittedEffect, Memory
 from compd.model.effects.effect_basis import evaluate_basis
-from compd.model.machine import MachineModel, machine_constants
 from compd.model.effects.observations import Observations
+from compd.model.machine import MachineModel, machine_constants
 from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD, constants_of, random_inputs
 from tests.support.formulas import written
 from tests.support.model_machines import Floats

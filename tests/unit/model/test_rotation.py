@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy.spatial.transform import Rotation
 
-from compd.model.kernels import linear
-from compd import rotation
+from compd import linear, rotation
 from compd.rotation import compose, rotation_matrix, rotation_vector, to_inner, to_outer
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.model.kinematics.link_kinematics import forward_kinematics, inverse_kinematics
-from compd.model.machine import MachineModel
 from compd.model.kernels.solve_status import Reason, require
+from compd.model.kinematics.link_kinematics import forward_kinematics, inverse_kinematics
 from compd.model.kinematics.statics import link_forces
+from compd.model.machine import MachineModel
 from tests.support.model_machines import hexapod, rotation, tips, tripod
 
 TRIPOD, HEXAPOD = tripod(), hexapod()

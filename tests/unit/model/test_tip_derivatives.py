@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.compensation.compensation import compensate_cmm
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm
+from compd.model.effect_memory import EffectMemory
 from compd.model.effects.effect import Effect, FittedEffect
 from compd.model.effects.effect_basis import evaluate_basis
-from compd.model.effect_memory import EffectMemory
+from compd.model.effects.observations import Observations
+from compd.model.kinematics.motion import Movement
 from compd.model.library import load_library
 from compd.model.machine import MachineModel
-from compd.model.kinematics.motion import Movement
-from compd.model.effects.observations import Observations
 from compd.model.observer import observe
 from compd.model.sensitivity import sensitivities
 from compd.model.tip_derivative import TipDerivatives, tip_derivatives

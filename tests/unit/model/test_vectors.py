@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.model.kinematics.frame import solve_frame
 from compd.model.kinematics.link_kinematics import forward_kinematics, inverse_kinematics
-from compd.model.machine import MachineModel, machine_model
 from compd.model.kinematics.statics import link_forces
 from compd.model.kinematics.tool import Contact, ToolOnPlatform
+from compd.model.machine import MachineModel, machine_model
 from tests.support.model_machines import TRIPOD_WEIGHTS, Floats, column, worked_cases
 
 LENGTH_MM = 1e-9

@@ -86,7 +86,7 @@ def test_an_unknown_error_stays_unknown(tmp_path: Path) -> None:
 
 
 def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
-    from compd.model.effects.effect import FittedEffect
+    from compd.model.effects import FittedEffect
     from compd.model.library import find_effect
 
     path = tmp_path / "m.yaml"

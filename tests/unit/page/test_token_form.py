@@ -7,7 +7,7 @@ import asyncio
 import pytest
 from starlette.testclient import TestClient
 
-from compd.live.service.connection_limits import WRONG_TOKEN_REST_S
+from compd.live.service import WRONG_TOKEN_REST_S
 from compd.page.guard import COOKIE, MOST_HEADERS, Guard, Token, hashed
 from compd.page.recordings import Recordings
 from compd.page.server import Server

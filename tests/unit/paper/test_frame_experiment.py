@@ -11,16 +11,15 @@ import pytest
 from typer.testing import CliRunner
 
 from compd.arrays import FloatArray
-from compd.cli.main import app
-from compd.configuration import Configuration, load
-from compd.configuration.shipped import shipped_configuration
+from compd.cli.app import app
+from compd.configuration import Configuration, load, shipped_configuration
 from compd.gauge import DataSheetNoise
 from compd.machine_builder import build_model
-from compd.model.kinematics.frame import FrameGeometry, solve_frame
-from compd.model.machine import MachineModel
+from compd.model import MachineModel
+from compd.model.kinematics import FrameGeometry, solve_frame
 from compd.paper import frame_experiment, frame_page
 from compd.paper.frame_experiment import SIZES_MM, FrameResult
-from compd.simulation.truth.strengths import Strengths
+from compd.simulation import Strengths
 from docs.pictures import instantaneous_frame
 
 # The ends of t1..t3, u1..u6 by equation (3) of the paper, counted from 0: supports 0..2, then plate points 3..5.
@@ -34,7 +33,7 @@ def configuration(request: pytest.FixtureRequest) -> Configuration:
 
 @pytest.fixture(scope="module")
 def result(configuration: Configuration) -> FrameResult:
-    return frame_experiment.run(configuration, 3)
+    return frame_experiment.run_frame_experiment(configuration, 3)
 
 
 def second_order_supports_mm(geometry: FrameGeometry, changes_mm: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from compd.arrays import rms
-from compd.cli.main import app
+from compd.cli.app import app
 from compd.configuration import Configuration, load
 from compd.paper import drift_experiment, link_experiment, plate_experiment
 from compd.paper.reproduction import Reduction

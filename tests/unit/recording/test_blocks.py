@@ -10,9 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from compd.errors import RecordingError
-from compd.recording.blocks import recording_blocks, row_count
+from compd.recording.blocks import recording_blocks
 from compd.recording.convert import convert_recording
 from compd.recording.reader import read_recording
+from compd.tables import row_count
 from tests.support.recordings import (
     HEADER,
     SIDECAR,

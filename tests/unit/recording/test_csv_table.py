@@ -9,10 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compd.tables import csv_table
+from compd.tables import ProblemList, Table, csv_table
 from compd.tables.csv_table import parse_table
-from compd.tables.problem_list import ProblemList
-from compd.tables.table import Table
 
 NAMES = ("time_s", "scale_1_mm", "humidity_pct")
 NUMBERS = st.one_of(

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from compd.recording.checks import check_frozen_reference
-from compd.tables.problem_list import ProblemList
-from compd.tables.table import FIRST_ROW, Table
+from compd.tables import FIRST_ROW, ProblemList, Table
 
 N = 60
 PLACES_MM = np.repeat(np.random.default_rng(8).uniform(-100.0, 100.0, (N // 3, 3)), 3, axis=0)  # three rows at each

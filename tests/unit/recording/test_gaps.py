@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.comparison.recording_comparison import compare
-from compd.comparison.open import open_recording
+from compd.comparison import compare, open_recording
 from compd.comparison.residual_trends import Trend
 from compd.recording.gaps import MOST_EMPTY, filled
 from tests.support.external import measured_places, write_external

@@ -16,8 +16,8 @@ from compd.errors import RecordingError
 from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
 from compd.recording.sidecar import sidecar_contents
-from compd.tables.parquet_table import ParquetTable
 from compd.recording.writer import write_recording
+from compd.tables.parquet_table import ParquetTable
 from tests.support.recordings import csv_text, write_recording_files
 
 

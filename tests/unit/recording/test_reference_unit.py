@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.comparison.open import open_recording
+from compd.comparison import open_recording
 from compd.errors import RecordingError
 from compd.recording.merge import merge_recordings
 from compd.recording.reader import read_recording

@@ -12,14 +12,10 @@ import pytest
 import yaml
 from plotly.graph_objects import Figure
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
-from compd.comparison.covariate import Covariate
-from compd.diagnosis.findings import CandidateResult, GrossRows, UntestedEffect
-from compd.diagnosis.verdict import Diagnosis
-from compd.diagnosis.words.error_fall import ErrorFall, error_fall
-from compd.diagnosis.words.summary_lines import summary_lines
-from compd.model.effects.effect import FittedEffect
+from compd.comparison import AlignedRecording, Covariate, compare
+from compd.diagnosis import CandidateResult, Diagnosis, ErrorFall, error_fall, summary_lines
+from compd.diagnosis.findings import GrossRows, UntestedEffect
+from compd.model.effects import FittedEffect
 from compd.model.library import find_effect
 from compd.report.diagnosis_page import write_diagnosis_page
 from compd.report.falling_error import NAME_WIDTH, plot_falling_error

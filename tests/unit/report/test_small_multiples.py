@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.comparison.covariate import Covariate
+from compd.comparison import Covariate
 from compd.report.small_multiples import axis_unit
 
 

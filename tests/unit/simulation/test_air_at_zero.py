@@ -12,8 +12,7 @@ import pytest
 
 from compd.cli.simulated.campaign import campaign
 from compd.cli.simulated.simulate import simulate
-from compd.configuration import load
-from compd.configuration.shipped import shipped_configuration
+from compd.configuration import load, shipped_configuration
 from compd.simulation.causes.catalogue import CAUSES, build_cause, possible_causes
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism

@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 from compd.configuration import load
 from compd.errors import CompdError
-from compd.recording.reader import read_recording
-from compd.recording.recording import Recording
+from compd.recording import Recording, read_recording
 from compd.simulation.campaign.campaign import Campaign, steady_speed_mm_per_s
 from compd.simulation.campaign.campaign_plan import GAP_S, SESSIONS, draw_campaign_plan
 from compd.simulation.campaign.row_log import LoggedRows

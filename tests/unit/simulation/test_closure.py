@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from compd.arrays import FloatArray
-from compd.configuration.geometry import Geometry
+from compd.configuration import Geometry
 from compd.errors import KinematicsError
 from compd.simulation.truth.closure import CLOSED_MM, homogeneous
 from compd.simulation.truth.frame import distances_mm

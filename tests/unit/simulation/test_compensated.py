@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
-from compd.compensation.values import GaugeValues, WarmStart
-from compd.configuration.geometry import Geometry
-from compd.configuration.operation import Wiring
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.configuration import Geometry, Wiring
 from compd.machine_builder import build_model
 from compd.simulation.truth.frame import DISTANCES
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison.recording_comparison import compare
-from compd.configuration import load
-from compd.configuration.shipped import shipped_configuration
+from compd.comparison import compare
+from compd.configuration import load, shipped_configuration
 from compd.errors import CompdError
-from compd.recording.reader import read_recording
+from compd.recording import read_recording
 from compd.simulation.truth.fixed_places import BALLBAR_ERROR_MM, BALLBAR_MM, ballbar_places, pin_places
 from compd.simulation.truth.instruments import BALLBAR_SIGMA_UM, POSE_SIGMA_URAD, Kind
 from compd.simulation.truth.mechanism import Mechanism

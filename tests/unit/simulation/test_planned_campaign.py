@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.main import app
+from compd.cli.app import app
 from compd.configuration import load
 from compd.errors import CompdError
 from compd.simulation.campaign.plan_reader import holdable_quantities, read_plan

@@ -19,7 +19,7 @@ from compd.clock import MonotonicClock
 from compd.configuration import Configuration, load
 from compd.errors import PluginError
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines.open import open_line
+from compd.lines import open_line
 from compd.simulation.causes.hidden_cause import draw_hidden
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.world import World

@@ -10,8 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from compd.arrays import FloatArray
-from compd.configuration.geometry import Geometry
-from compd.configuration.operation import Wiring
+from compd.configuration import Geometry, Wiring
 from compd.errors import CompdError
 from compd.simulation.truth.closure import homogeneous
 from compd.simulation.truth.frame import DISTANCES, distances_mm

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import structlog
 
-from compd.configuration.operation import VoteSettings
+from compd.configuration import VoteSettings
 from compd.live.acquisition.cross_checks.following_error import FollowingError
 from compd.live.acquisition.cross_checks.frame_temperature import FrameTemperature
 from compd.live.acquisition.cross_checks.joint_pair import JointPair
@@ -21,8 +21,7 @@ from compd.live.acquisition.cross_checks.signal_periods import SignalPeriods
 from compd.live.acquisition.cross_checks.standing_scale import StandingScale
 from compd.live.acquisition.cross_checks.standing_temperature import StandingTemperature
 from compd.live.acquisition.cross_checks.tip_speed import TipSpeed
-from compd.live.memory.latest import Latest
-from compd.live.memory.trust_memory import Doubt, TrustMemory
+from compd.live.memory import Doubt, Latest, TrustMemory
 
 # From one look to the next, s.
 LOOK_EVERY_S = 0.1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from compd.configuration.operation import FrameVote
+from compd.configuration import FrameVote
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView
 from compd.units import UM_PER_MM
 

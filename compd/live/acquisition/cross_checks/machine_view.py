@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from compd.arrays import FloatArray
-from compd.live.memory.trust_memory import TrustMemory
+from compd.live.memory import TrustMemory
 
 
 class WiredLength(NamedTuple):

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from compd.stated_noise import SCATTER_RATIO
 from compd.live.acquisition.cross_checks.machine_view import MachineView, Remark
+from compd.stated_noise import SCATTER_RATIO
 from compd.units import UM_PER_MM
 
 # The warning of SCATTER_RATIO goes away inside of this one, so that it does not come and go.

@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.live.acquisition.steps import Step
 from compd.live.acquisition.cross_checks.following_error import LASTING_S
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView, Remark
+from compd.live.acquisition.steps import Step
 from compd.units import UM_PER_MM
 
 # Steps that are longer ago, s, do not count: once in a while a link is moved on purpose.

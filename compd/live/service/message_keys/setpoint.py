@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from compd.live.loop.states import Mode, State
 from compd.live.service.message_keys.message import Keys, Links, SentMessage, Vector
+from compd.setpoint_states import Mode, State
 
 
 class FrameKeys(Keys):

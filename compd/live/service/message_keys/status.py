@@ -7,8 +7,8 @@ from typing import Literal
 from pydantic import Field
 
 from compd.gauge import Quality
-from compd.live.loop.states import Mode
 from compd.live.service.message_keys.message import Keys, ModelsKeys, VersionKeys
+from compd.setpoint_states import Mode
 
 
 class ZeroStatusKeys(Keys):

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.jit import helper
 from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.model.kernels.link_forces import axial_force_at_zero, set_axial_forces
-from compd.jit import helper
 from compd.model.kernels.memory import lag_step
 
 PPM = 1e-6

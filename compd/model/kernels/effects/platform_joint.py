@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from compd.arrays import FloatArray
-from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.jit import helper
+from compd.model.kernels.effect_row import EffectMachine, EffectRow
 
 PPM = 1e-6
 UM = 1e-3  # mm

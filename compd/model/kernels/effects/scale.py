@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from compd.arrays import FloatArray
-from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.jit import helper
+from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.model.kernels.memory import friction_step
 from compd.reference_conditions import REFERENCE_TEMPERATURE_degC
 from compd.travel_direction import REVERSAL_MM

@@ -12,10 +12,9 @@ import random
 
 import pytest
 
-from compd.gauge_description.answers import Answers
+from compd.gauge_description import Answers, learn_gauge
 from compd.gauge_description.capture import CapturedReply
 from compd.gauge_description.checksum_search import checksum_end
-from compd.gauge_description.describe import learn_gauge
 
 NUMBERS = [b"+012.300", b"-002.310", b"+000.001", b"-101.750"]
 

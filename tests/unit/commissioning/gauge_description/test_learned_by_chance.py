@@ -14,11 +14,10 @@ from typing import NamedTuple
 
 import pytest
 
-from compd.gauge_description.answers import Answers
-from compd.gauge_description.capture import CapturedReply
-from compd.gauge_description.describe import learn_gauge
 from compd.errors import CompdError
 from compd.gauge import LineFault
+from compd.gauge_description import Answers, learn_gauge
+from compd.gauge_description.capture import CapturedReply
 from compd_drivers.serial_ascii import SerialAscii
 from tests.support.ascii_gauge import line_with
 from tests.support.sampled import sampled

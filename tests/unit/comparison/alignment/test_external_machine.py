@@ -13,8 +13,8 @@ import compd
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.covariate import covariates
 from compd.errors import CompdError, RecordingError
-from compd.model.formula.declaration import formula_effect
-from compd.recording.reader import read_recording
+from compd.model.formula import formula_effect
+from compd.recording import read_recording
 
 Floats = NDArray[np.float64]
 ROWS = 120

@@ -11,14 +11,12 @@ import pytest
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.alignment.aligned_recording import effect_deltas
 from compd.comparison.alignment.fixed_ends import FixedEnds, place_balls, place_pins
-from compd.comparison.recording_comparison import compare
 from compd.comparison.effect_fit import fit, initial_effect
-from compd.planning.measurement_programmes import recorded_limits
-from compd.planning.next_measurement import plan_measurement
+from compd.comparison.recording_comparison import compare
 from compd.errors import CompdError, RecordingError
 from compd.model.library import find_effect
-from compd.recording.reader import read_recording
-from compd.recording.writer import write_recording
+from compd.planning import plan_measurement, recorded_limits
+from compd.recording import read_recording, write_recording
 from tests.support.fixed_end_recordings import DISTANCE, PINS, recorded
 from tests.support.measured import SIGMA_UM, Floats, aligned, hidden
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.recording_comparison import compare
 from compd.comparison.effect_fit import fit, initial_effect
+from compd.comparison.recording_comparison import compare
 from tests.support.measured import SIGMA_UM, aligned, hidden
 from tests.support.pose_recordings import SIGMA_URAD, hexapod, poses
 

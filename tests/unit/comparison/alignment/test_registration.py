@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from compd.comparison.alignment.registration import register, registration_columns
-from compd.comparison.recording_comparison import compare
 from compd.comparison.effect_fit import fit, initial_effect
 from compd.comparison.nuisance import nuisance_beside
+from compd.comparison.recording_comparison import compare
 from compd.units import UM_PER_MM
 from tests.support.external_recordings import SIGMA_UM, along, record_external
 

@@ -10,15 +10,10 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from compd.statistics import cluster_covariance, least_squares, robust
-from compd.statistics.cluster_covariance import cluster_covariance as covariance_of
-from compd.statistics.least_squares import (
-    determined,
-    normal_inverse,
-    ridge_inverse,
-    solve_least_squares,
-    solve_ridge,
-)
+from compd.statistics import cluster_covariance as covariance_of
+from compd.statistics import covariance as cluster_covariance
+from compd.statistics import least_squares, normal_inverse, ridge_inverse, robust, solve_least_squares, solve_ridge
+from compd.statistics.least_squares import determined
 
 RNG = np.random.default_rng(11)
 A = RNG.normal(size=(40, 3))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.statistics.periodogram import PeriodLimits, strongest_periods
+from compd.statistics import PeriodLimits, strongest_periods
 
 RNG = np.random.default_rng(4)
 PLACES_MM = RNG.uniform(-60, 60, (300, 3))

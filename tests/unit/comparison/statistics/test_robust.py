@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 
 from compd.comparison.alignment.registration import register
-from compd.statistics.robust import (
-    HUBER,
-    SCALE_EFFICIENCY,
-    huber_weights,
-    robust_regression,
-    robust_sigma,
-    trimmed_scale,
-)
+from compd.statistics import SCALE_EFFICIENCY, huber_weights, robust_regression, robust_sigma, trimmed_scale
+from compd.statistics.robust import HUBER
 
 RNG = np.random.default_rng(12)
 

@@ -14,9 +14,8 @@ from compd.comparison.recording_comparison import compare
 from compd.comparison.stream.block_comparison import compare_blocks
 from compd.comparison.stream.sample import draw_sample
 from compd.errors import RecordingError
-from compd.model.effects.effect import FittedEffect
-from compd.recording.reader import read_recording
-from compd.recording.recording import Recording
+from compd.model.effects import FittedEffect
+from compd.recording import Recording, read_recording
 from tests.support.external_recordings import record_external
 from tests.support.fixed_end_recordings import DISTANCE, PINS
 from tests.support.fixed_end_recordings import recorded as recorded_from_places

@@ -16,8 +16,7 @@ from compd.comparison.stream.block_fit import fit_blocks
 from compd.comparison.stream.clusters import RowClusters
 from compd.comparison.stream.sample import draw_sample
 from compd.model.library import load_library
-from compd.recording.reader import read_recording
-from compd.recording.recording import Recording
+from compd.recording import Recording, read_recording
 from tests.support.measured import gauges, hidden, record, tripod
 from tests.support.sampled import sampled
 from tests.support.streams import in_blocks

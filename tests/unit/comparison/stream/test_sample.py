@@ -7,8 +7,7 @@ import pytest
 
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.stream.sample import draw_sample
-from compd.recording.reader import read_recording
-from compd.recording.recording import Recording
+from compd.recording import Recording, read_recording
 from tests.support.measured import gauges, record, tripod
 from tests.support.streams import in_blocks
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, library_pool
 from compd.diagnosis.candidates.changes import MOMENTS, MOST_STARTS, change_candidates, moments_s
 from compd.diagnosis.recording_diagnosis import diagnose

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.effect_fit import fit, initial_effect
+from compd.comparison import AlignedRecording, fit, initial_effect
 from compd.diagnosis.candidates.candidates import library_pool
 from compd.diagnosis.candidates.constant import constant_candidate, constant_effect, makes_only, split_constants
 from compd.diagnosis.recording_diagnosis import diagnose

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidates.candidates import library_pool, variant
 from compd.diagnosis.candidates.refined_constants import BETWEEN, refined_variants
 from compd.diagnosis.recording_diagnosis import diagnose

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
+from compd.comparison import AlignedRecording
 from compd.comparison.alignment.align_recording import align_recording
-from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.diagnosis.descriptions.empirical_terms import EmpiricalTerm, empirical_terms
 from compd.diagnosis.descriptions.search_covariates import round_within, untried_quantities
 from compd.diagnosis.descriptions.term_formula import formula_text
 from compd.model.library import find_effect
-from compd.recording.reader import read_recording
+from compd.recording import read_recording
 from tests.support.external_recordings import record_external
 from tests.support.hidden_effects import record_with_effects
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.planning.measurement_settings import MOST_LEVELS, settings_of
 from compd.errors import CompdError
+from compd.planning.measurement_settings import MOST_LEVELS, settings_of
 
 ROWS = 60
 RNG = np.random.default_rng(1)

@@ -14,18 +14,12 @@ from typer.testing import CliRunner
 import compd
 from compd.arrays import FloatArray
 from compd.cli.measurements.plan import plan as plan_command
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.effect_fit import fit, initial_effect
-from compd.planning.next_measurement import (
-    measurement_of_constant,
-    measurement_to_test,
-    next_measurement,
-    plan_measurement,
-)
+from compd.comparison import AlignedRecording, fit, initial_effect
 from compd.errors import CompdError
-from compd.model.effects.effect import Effect, FittedEffect
-from compd.model.formula.declaration import formula_effect
+from compd.model.effects import Effect, FittedEffect
+from compd.model.formula import formula_effect
 from compd.model.library import load_library
+from compd.planning import measurement_of_constant, measurement_to_test, next_measurement, plan_measurement
 from tests.support.external_recordings import SIGMA_UM, along, record_external
 
 ROWS = 60

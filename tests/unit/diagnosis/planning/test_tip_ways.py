@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.planning.tip_ways import LONGEST_MM, STEADY_S, TRAVEL_MM, TipWays, plan_ways
 from compd.machine_builder import build_model
-from compd.simulation.truth.mechanism import Mechanism
+from compd.planning import plan_ways
+from compd.planning.tip_ways import LONGEST_MM, STEADY_S, TRAVEL_MM, TipWays
+from compd.simulation import Mechanism
 from tests.support.simulated import HEXAPOD, hexapod, tripod, wiring
 
 PLACES = ((0.0, 0.0, 190.0), (60.0, -70.0, 150.0), (-80.0, 30.0, 210.0))

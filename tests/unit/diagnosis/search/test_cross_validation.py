@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.open import open_recording
+from compd.comparison import open_recording
 from compd.diagnosis.search.cross_validation import MOST_FOLDS, SECTORS, row_splits
 from compd.errors import RecordingError
 from tests.support.external import Floats, measured_places, write_external

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.effect_fit import fit, initial_effect
+from compd.comparison import AlignedRecording, fit, initial_effect
 from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import error_fall
 from compd.model.library import find_effect
-from compd.report.diagnosis_evidence import findings_table
+from compd.report import findings_table
 from tests.support.hidden_effects import LIBRARY, record_with_effects
 from tests.support.paths import SHARED
 from tests.support.sampled import sampled
@@ -133,8 +132,8 @@ def test_the_real_frame_needs_two_temperatures() -> None:
     path = SHARED / "real" / "voron-frame-expansion.csv"
     if not path.exists():
         pytest.skip("the real recording (../shared/real) is not here")
+    from compd.comparison import read_with_machine
     from compd.comparison.alignment.align_recording import align_recording
-    from compd.comparison.open import read_with_machine
 
     diagnosis = diagnose(align_recording(*read_with_machine(path, None)), (), None, EFFECTS)
     assert diagnosis.verdict == "unexplained"

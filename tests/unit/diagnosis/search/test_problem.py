@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.recording_comparison import compare
-from compd.comparison.effect_fit import fit, initial_effect
+from compd.comparison import AlignedRecording, compare, fit, initial_effect
 from compd.diagnosis.candidates.candidates import CandidatePool, library_pool
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.search.problem import DiagnosisProblem, build_problem

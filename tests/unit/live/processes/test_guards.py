@@ -15,16 +15,16 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.live.loop.ring_entries import SentSetpoint
-from compd.live.loop.states import Mode, State
-from compd.live.memory.shared_ring import SharedRing
-from compd.live.system.child_process import OUT_OF_MEMORY, ChildProcess
+from compd.live.loop_succession import LoopSuccession
 from compd.live.memory.control import Control, Phase
+from compd.live.memory.shared_ring import SharedRing
 from compd.live.processes.heartbeat import Heartbeat, RestartDelay
 from compd.live.processes.loop_process import ModelChange
-from compd.live.loop_succession import LoopSuccession
 from compd.live.processes.service_process import StateLog
-from compd.live.system.realtime import RationedPriority, thread_time_s
 from compd.live.service.loop_watch import LoopWatch
+from compd.live.system.child_process import OUT_OF_MEMORY, ChildProcess
+from compd.live.system.realtime import RationedPriority, thread_time_s
+from compd.setpoint_states import Mode, State
 
 
 @pytest.fixture

@@ -12,11 +12,11 @@ from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.directions import Directions
 from compd.live.loop.model_loader import Models, ModelText
 from compd.live.loop.ring_entries import CyclePacker
-from compd.live.loop.states import State
 from compd.live.loop.timing import LoopTiming
-from compd.live.memory.shared_ring import SharedRing
 from compd.live.memory.control import Control
+from compd.live.memory.shared_ring import SharedRing
 from compd.live.processes.loop_process import LoopProcess, ModelChange
+from compd.setpoint_states import State
 from tests.support.live_machine import STEP_MM, machine
 from tests.support.live_models import file_with
 

@@ -7,9 +7,9 @@ import pytest
 from compd.clock import MonotonicClock
 from compd.errors import StateError
 from compd.live import loop_succession
+from compd.live.loop_succession import LoopSuccession
 from compd.live.memory.control import Control
 from compd.live.processes.loop_process import ModelChange
-from compd.live.loop_succession import LoopSuccession
 from compd.model_file.model_document import read_document
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.compensation.compensation import compensate_cmm
-from compd.compensation.values import GaugeValues, WarmStart
+from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.live.loop.model_loader import Models
 from compd.live.service.budget_message import BudgetMessage
 from compd.rotation import rotation_matrix

@@ -8,7 +8,7 @@ from contextlib import closing
 
 import pytest
 
-from compd.configuration.operation import SocketSettings
+from compd.configuration import SocketSettings
 from compd.errors import DaemonError
 from compd.live.service.listeners import Listeners
 from tests.support.service import TARGET_KEYS, VERSION, Service

@@ -9,7 +9,7 @@ import pytest
 import structlog
 
 from compd.client import connect
-from compd.configuration.operation import TcpSocket
+from compd.configuration import TcpSocket
 from compd.errors import DaemonError
 from compd.live.service import connection_limits as seats
 from compd.live.service.tcp_access import TcpAccess

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from compd.diagnosis.stages import STAGES
+from compd.diagnosis import STAGES
 from compd.errors import StateError
 from compd.page.workbench.diagnoses import MOST_RUNNING, Diagnoses
 from compd.page.workbench.diagnosis_job import DiagnosisJob

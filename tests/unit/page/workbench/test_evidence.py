@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from compd.diagnosis.words.error_fall import error_fall
-from compd.diagnosis.words.summary_lines import MOST_LINES, summary_lines
+from compd.diagnosis import error_fall, summary_lines
+from compd.diagnosis.words.summary_lines import MOST_LINES
 from compd.page.workbench.evidence import evidence
 from compd.report.diagnosis_evidence import formula_list, step_rows
 from tests.support import diagnosis_situations as situations

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from compd.comparison import draw_sample
 from compd.comparison.stream import recording_stream
-from compd.comparison.stream.sample import draw_sample
 from compd.page.workbench.workbench import Workbench
 from tests.support.measured import gauges, hidden, record
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from compd.errors import CompdError, StateError
-from compd.model.library.effects_file import load_effects
+from compd.model.library import load_effects
 from compd.page.workbench.effects_text import entries_of, with_entry
 from compd.page.workbench.own_effects import OwnEffects
 

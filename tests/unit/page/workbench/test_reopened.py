@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from compd.api.models import add_effect
+from compd.api import add_effect
 from compd.page.workbench.workbench import Workbench
 from tests.support.measured import gauges, hidden, record
 

@@ -11,7 +11,7 @@ from compd.errors import RecordingError, StateError
 from compd.page.workbench.handlers import LONGEST_ROWS_BYTES
 from compd.page.workbench.opened_recording import MOST_PICTURED
 from compd.page.workbench.workbench import Workbench
-from compd.recording.reader import read_recording
+from compd.recording import read_recording
 from tests.support.measured import gauges, hidden, record
 
 
@@ -61,7 +61,7 @@ def test_strange_rows_and_old_states_are_refused(workbench):
 
 
 def test_what_a_command_has_changed_is_seen_at_the_next_opening(workbench, path, tmp_path):
-    from compd.api.models import add_effect
+    from compd.api import add_effect
 
     workbench.refresh()
     revision = workbench.revision

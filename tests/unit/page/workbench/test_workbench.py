@@ -7,11 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from compd.api.diagnosis import compare
-from compd.api.models import add_effect
-from compd.comparison.open import open_recording
+from compd.api import add_effect, compare
+from compd.comparison import open_recording
 from compd.errors import CompdError, StateError
-from compd.model_file.model_document import read_stored
+from compd.model_file import read_stored
 from compd.page.workbench.workbench import Workbench
 from tests.support.measured import gauges, hidden, record
 

@@ -10,10 +10,10 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from compd.configuration.operation import QuantityWire
-from compd.stated_noise import SAME_VALUE_SIGMAS
+from compd.configuration import QuantityWire
 from compd.live.acquisition.quantity_trust import QuantityLimits
-from compd.recording.checks import limit_of
+from compd.recording import limit_of
+from compd.stated_noise import SAME_VALUE_SIGMAS
 from compd.units import unit_of
 
 

@@ -9,16 +9,15 @@ from itertools import combinations, permutations
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
+from compd.errors import CompdError, Problem
+from compd.model.effects import ConstantValues, Effect, FittedEffect, needed_quantities, unmet_needs
 from compd.planning.measurement_plan import LEAST_SEPARATION, MeasurementPlan, NextMeasurement, as_factor
 from compd.planning.measurement_planner import MeasurementPlanner
 from compd.planning.measurement_programmes import ProgrammeLimits, machine_programmes, recorded_limits
 from compd.planning.measurement_settings import SettingLimits
 from compd.planning.programme_rows import ProgrammeRows
 from compd.planning.setting_programmes import setting_programmes
-from compd.errors import CompdError, Problem
-from compd.model.effects.effect import ConstantValues, Effect, FittedEffect
-from compd.model.effects.effect_needs import needed_quantities, unmet_needs
 
 # Rows that a diagnosis proposes of itself; `compd plan` gives as many as are wanted.
 NEXT_ROWS = 12

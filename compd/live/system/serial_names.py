@@ -10,9 +10,8 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from compd.configuration import Configuration
-from compd.configuration.lines import SerialPortSettings
-from compd.lines.computer_ports import serial_ports
+from compd.configuration import Configuration, SerialPortSettings
+from compd.lines import serial_ports
 
 
 def port_names(configuration: Configuration) -> dict[str, str]:

@@ -1,0 +1,16 @@
+from .atomic_files import Content as Content
+from .atomic_files import close_descriptor as close_descriptor
+from .atomic_files import file_stamp as file_stamp
+from .atomic_files import open_regular as open_regular
+from .atomic_files import read_descriptor as read_descriptor
+from .atomic_files import read_small_file as read_small_file
+from .atomic_files import sync_directory as sync_directory
+from .atomic_files import write_files as write_files
+from .atomic_files import write_new_file as write_new_file
+from .checksum import CHECKSUM as CHECKSUM
+from .checksum import checksum_of as checksum_of
+from .file_kind import FileKind as FileKind
+from .file_kind import without_values as without_values
+from .file_trust import own_users as own_users
+from .file_trust import trust_problem as trust_problem
+from .output_file import check_replaceable as check_replaceable

@@ -1,0 +1,15 @@
+from .checkpoint import Checkpoint as Checkpoint
+from .cluster import check_installed as check_installed
+from .examine import examine_fleet as examine_fleet
+from .fleet_page import write_fleet_page as write_fleet_page
+from .machine_examination import Examination as Examination
+from .machine_examination import examination as examination
+from .machine_names import MachinesBy as MachinesBy
+from .overview import Overview as Overview
+from .recording_result import RecordingResult as RecordingResult
+from .recordings import find_recordings as find_recordings
+from .table import check_table_path as check_table_path
+from .table import earlier_results as earlier_results
+from .table import is_table as is_table
+from .table import read_table as read_table
+from .table import write_table as write_table

@@ -1,0 +1,9 @@
+from .answers import Answers as Answers
+from .answers import error_reply as error_reply
+from .answers import range_of as range_of
+from .capture import capture_live as capture_live
+from .capture import read_capture as read_capture
+from .capture import saved_capture as saved_capture
+from .describe import learn_gauge as learn_gauge
+from .read_back import rounds as rounds
+from .reply_columns import DescriptionError as DescriptionError

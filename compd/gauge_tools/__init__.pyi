@@ -1,0 +1,17 @@
+from .driver_catalogue import catalogue as catalogue
+from .driver_catalogue import driver_description as driver_description
+from .driver_catalogue import polled_drivers as polled_drivers
+from .gauge_file import LEARNED_GAUGE as LEARNED_GAUGE
+from .gauge_file import gauge_file_text as gauge_file_text
+from .gauge_file import gauge_of_file as gauge_of_file
+from .gauge_statistics import GaugeStatistics as GaugeStatistics
+from .open_gauge import GaugeTarget as GaugeTarget
+from .open_gauge import PortArguments as PortArguments
+from .open_gauge import aged as aged
+from .open_gauge import byte_line_settings as byte_line_settings
+from .open_gauge import gauge_of_driver as gauge_of_driver
+from .open_gauge import open_tapped_stream as open_tapped_stream
+from .open_gauge import poll_gauge as poll_gauge
+from .open_gauge import read_gauge as read_gauge
+from .probe import announcements as announcements
+from .probe import preset_candidates as preset_candidates

@@ -1,0 +1,11 @@
+from .at_rest import RestJoin as RestJoin
+from .by_time import Instrument as Instrument
+from .by_time import JoinResult as JoinResult
+from .clock_offset import ClockOffset as ClockOffset
+from .clock_offset import agreement_curve as agreement_curve
+from .join import JOIN_BY as JOIN_BY
+from .join import JoinOptions as JoinOptions
+from .join import choose_by as choose_by
+from .join import match_export as match_export
+from .join import unfit_option as unfit_option
+from .summary import summary_lines as summary_lines

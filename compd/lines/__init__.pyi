@@ -1,0 +1,14 @@
+from .checksums import CHECKSUMS as CHECKSUMS
+from .checksums import ChecksumField as ChecksumField
+from .checksums import ChecksumKind as ChecksumKind
+from .computer_ports import serial_ports as serial_ports
+from .echo import explained as explained
+from .modbus_rtu import RtuMaster as RtuMaster
+from .modbus_tcp import ModbusTcp as ModbusTcp
+from .open import QUIET_CHARACTERS as QUIET_CHARACTERS
+from .open import Line as Line
+from .open import open_line as open_line
+from .open import open_stream as open_stream
+from .port import Port as Port
+from .stream import StreamLine as StreamLine
+from .stream import shown as shown

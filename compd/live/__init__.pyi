@@ -1,0 +1,1 @@
+from .run_daemon import run as run

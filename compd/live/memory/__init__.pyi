@@ -1,0 +1,15 @@
+from .control import Control as Control
+from .control import Phase as Phase
+from .latest import Latest as Latest
+from .latest import Snapshot as Snapshot
+from .poll_requests import PollRequests as PollRequests
+from .readings import LONGEST_DETAIL as LONGEST_DETAIL
+from .readings import OK_NUMBER as OK_NUMBER
+from .readings import SLOTS as SLOTS
+from .readings import Readings as Readings
+from .shared_array import shared_floats as shared_floats
+from .shared_message import SharedMessage as SharedMessage
+from .shared_ring import RingReader as RingReader
+from .shared_ring import SharedRing as SharedRing
+from .trust_memory import Doubt as Doubt
+from .trust_memory import TrustMemory as TrustMemory

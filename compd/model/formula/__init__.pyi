@@ -1,0 +1,15 @@
+from .basis import AXES as AXES
+from .basis import VECTORS as VECTORS
+from .columns import ANYWHERE as ANYWHERE
+from .columns import OF_LINK as OF_LINK
+from .columns import OF_READING as OF_READING
+from .columns import PER_LINK as PER_LINK
+from .columns import column_needs as column_needs
+from .columns import column_values as column_values
+from .columns import link_column as link_column
+from .declaration import formula_effect as formula_effect
+from .functions import FUNCTIONS as FUNCTIONS
+from .functions import LAG as LAG
+from .functions import NUMBERS as NUMBERS
+from .keys import FormulaDeclaration as FormulaDeclaration
+from .parser import LONGEST as LONGEST

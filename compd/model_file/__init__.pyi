@@ -1,0 +1,11 @@
+from .model_document import Declaration as Declaration
+from .model_document import Kind as Kind
+from .model_document import ModelStep as ModelStep
+from .model_document import StoredModel as StoredModel
+from .model_document import read_stored as read_stored
+from .model_document import write_stored as write_stored
+from .model_file import EffectNumber as EffectNumber
+from .model_file import ModelFile as ModelFile
+from .model_file import Range as Range
+from .model_file import parameter_estimates as parameter_estimates
+from .model_file import read_model_file as read_model_file

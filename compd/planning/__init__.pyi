@@ -1,0 +1,12 @@
+from .measurement_plan import MeasurementPlan as MeasurementPlan
+from .measurement_programmes import ProgrammeLimits as ProgrammeLimits
+from .measurement_programmes import recorded_limits as recorded_limits
+from .plan_formats import DWELL_S as DWELL_S
+from .plan_formats import MARKS as MARKS
+from .plan_formats import PlanFormat as PlanFormat
+from .proposal import measurement_of_constant as measurement_of_constant
+from .proposal import measurement_to_test as measurement_to_test
+from .proposal import next_measurement as next_measurement
+from .proposal import plan_measurement as plan_measurement
+from .setting_programmes import recorded_settings as recorded_settings
+from .tip_ways import plan_ways as plan_ways
