@@ -26,9 +26,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from compd.columns import approach_columns
 from compd.errors import CompdError, Problem, RecordingError
 from compd.files import write_files
-from compd.tables import approach_columns
 
 PURPOSE_COLUMN = "purpose"
 TIP_COLUMNS = ("tip_x_mm", "tip_y_mm", "tip_z_mm")

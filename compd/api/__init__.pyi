@@ -2,11 +2,9 @@ from .diagnosis import compare as compare
 from .diagnosis import diagnose as diagnose
 from .long_recordings import LongRecording as LongRecording
 from .long_recordings import compare_stream as compare_stream
-from .long_recordings import fit_stream as fit_stream
 from .long_recordings import open_long as open_long
 from .long_recordings import open_sample as open_sample
 from .long_recordings import open_whole_or_sample as open_whole_or_sample
 from .measurements import Range as Range
 from .measurements import plan_measurement as plan_measurement
 from .models import add_effect as add_effect
-from .models import open_model as open_model

@@ -10,7 +10,8 @@ import numpy as np
 from compd.arrays import BoolArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.nuisance import fit_along
-from compd.model.effects import Deltas, FittedEffect, sum_deltas
+from compd.model import Deltas, sum_deltas
+from compd.model.effects import FittedEffect
 from compd.units import UM_PER_MM
 
 

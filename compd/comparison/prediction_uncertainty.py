@@ -10,8 +10,17 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.noise_floor import repeat_scatter
-from compd.model import GAUGE_PORTS, GaugeNoise, base_joints_by_distances, gauge_variance, parameter_variance
-from compd.model.effects import Deltas, FittedEffect, evaluate_basis, split_by_port, sum_deltas
+from compd.model import (
+    GAUGE_PORTS,
+    Deltas,
+    GaugeNoise,
+    base_joints_by_distances,
+    gauge_variance,
+    parameter_variance,
+    split_by_port,
+    sum_deltas,
+)
+from compd.model.effects import FittedEffect, evaluate_basis
 from compd.statistics import last_digit_um
 from compd.units import UM_PER_MM
 

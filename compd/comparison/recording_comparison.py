@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from compd.arrays import BoolArray, FloatArray
+from compd.columns import is_sensitivity
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.alignment.measured_attitude import MM_PER_RAD
 from compd.comparison.comparison import NO_QUANTITY, Comparison
@@ -22,7 +23,6 @@ from compd.errors import Problem, RecordingError
 from compd.model import GaugeNoise, link_residuals
 from compd.model.effects import FittedEffect
 from compd.statistics import last_digit_um
-from compd.tables import is_sensitivity
 from compd.units import UM_PER_MM
 
 # Outliers bend nuisance terms a little, and these decide which rows are outliers: two rounds settle it.

@@ -23,8 +23,7 @@ from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import format_error
 from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.noise_floor import NoiseFloor
-from compd.recording import filled
-from compd.statistics import cluster_std
+from compd.statistics import cluster_std, filled
 
 # Trends per coordinate, and collinear covariates per trend: more are noise in a report.
 PER_COORDINATE = 2

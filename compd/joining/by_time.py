@@ -11,11 +11,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
+from compd.columns import ATTITUDE_COLUMNS, DISTANCE_COLUMN, link_reference_column
 from compd.errors import Problem, RecordingError
 from compd.instruments import LENGTH, Track
 from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
 from compd.recording import Frame, Recording, sidecar_contents, write_recording
-from compd.tables import ATTITUDE_COLUMNS, DISTANCE_COLUMN, link_reference_column
 
 # The machine stands still where the instrument shows less motion than this, or less than its own noise can imitate.
 STILL_MM = 0.001

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.columns import ID_COLUMNS, approach_columns
 from compd.errors import Problem, RecordingError
 from compd.recording import Recording
-from compd.tables import ID_COLUMNS, approach_columns
 
 # The scales of a machine at rest stay within this, or within what their own noise can imitate.
 STILL_MM = 0.001

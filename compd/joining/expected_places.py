@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.configuration import Configuration
 from compd.machine_builder import build_model
 from compd.model import observe, predict
 from compd.model.kinematics import Movement
-from compd.tables import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.units import UM_PER_MM
 
 

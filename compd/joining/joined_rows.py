@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
+from compd.columns import ATTITUDE_COLUMNS, POSITION_COLUMNS, link_reference_column
 from compd.instruments import ATTITUDE_AXES, LENGTH_AXES, InstrumentExport
 from compd.joining.assignment import REPEAT_MM
 from compd.joining.by_time import Instrument
 from compd.joining.dwells import Dwell, dwell_columns
 from compd.recording import Recording, sidecar_contents
-from compd.tables import ATTITUDE_COLUMNS, POSITION_COLUMNS, link_reference_column
 
 # Rows of repeats in a dwell of one row are this far apart, or less where the next dwell is near.
 _REPEATS_EVERY_S = 1.0

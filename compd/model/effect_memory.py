@@ -6,7 +6,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from compd.arrays import FloatArray
-from compd.model.effects import EffectProgram, Memories
+from compd.model.deltas import Memories
+from compd.model.effects import EffectProgram
 from compd.model.kinematics import Motion, pack_motion, unpack_motion
 from compd.model.machine import MachineModel
 

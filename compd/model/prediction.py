@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.effects import Deltas, Observations, Port
+from compd.model.deltas import Deltas
+from compd.model.effects import Observations, Port
 from compd.model.kernels import joint_shortening
 from compd.model.kinematics import Mechanism, forward_kinematics, link_length_mm, solve_frame
 from compd.model.machine import MachineModel

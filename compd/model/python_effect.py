@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.model.deltas import effect_deltas
 from compd.model.effect_memory import EffectMemory
-from compd.model.effects import Memory, Observations, effect_deltas, port_size
+from compd.model.effects import Memory, Observations, port_size
 from compd.model.kinematics import Movement, Pose, track_motion
 from compd.model.machine import MachineModel
 from compd.model.observer import observe_at_pose

@@ -17,7 +17,7 @@ from typing import Any
 
 from compd.live.record import CYCLES_SUFFIX, MODEL_MARK
 from compd.recording import ARROW
-from compd.tables import SUFFIXES
+from compd.table_file import SUFFIXES
 
 # Of a recording: letters and digits, so that it is a file's name on every system and never a path.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")

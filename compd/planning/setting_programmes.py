@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
+from compd.columns import approach_columns, scale_columns
 from compd.comparison import AlignedRecording
 from compd.errors import CompdError, Problem
 from compd.model.effects import Effect, Observations, evaluate_basis, needed_quantities
 from compd.plan_file import TIP_COLUMNS, settings_row
 from compd.planning.measurement_settings import MOST_COMBINATIONS, Setting, SettingLimits, settings_of
 from compd.planning.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
-from compd.tables import approach_columns, scale_columns
 
 # A step of a setting is watched for two hours, as long as machines take to warm through, or for 12 minutes.
 WATCHED_S = (7200.0, 720.0)

@@ -6,7 +6,6 @@ from .convert import rows_to_convert as rows_to_convert
 from .exclusions import exclude_rows as exclude_rows
 from .exclusions import include_rows as include_rows
 from .exclusions import rows_of_text as rows_of_text
-from .gaps import filled as filled
 from .merge import ASSUMED_GAP_S as ASSUMED_GAP_S
 from .merge import merge_recordings as merge_recordings
 from .open_part import ARROW as ARROW

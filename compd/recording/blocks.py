@@ -15,7 +15,8 @@ from pathlib import Path
 from compd.configuration import Configuration
 from compd.recording.recording import Recording
 from compd.recording.recording_builder import RecordingBuilder
-from compd.tables import TableBlock, table_blocks, table_path
+from compd.table_file import table_blocks, table_path
+from compd.tables import TableBlock
 
 BLOCK_ROWS = 100_000
 

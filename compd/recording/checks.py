@@ -24,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.tables import DISTANCE_COLUMN, ID_COLUMNS, ProblemList, Table, rows_text, values_text
+from compd.columns import DISTANCE_COLUMN, ID_COLUMNS
+from compd.tables import ProblemList, Table, rows_text, values_text
 
 
 class Limit(NamedTuple):

@@ -13,12 +13,14 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from compd.columns import number_text
 from compd.errors import Problem, RecordingError
 from compd.files import Content
 from compd.recording.open_part import ARROW, OpenPart
 from compd.recording.parquet_writer import ROW_GROUP_ROWS, arrow_batch, arrow_schema, write_parquet
 from compd.recording.writer import write_recording_files
-from compd.tables import CSV, FIRST_ROW, PARQUET, SUFFIXES, Table, number_text, row_count, table_blocks, table_path
+from compd.table_file import CSV, PARQUET, SUFFIXES, row_count, table_blocks, table_path
+from compd.tables import FIRST_ROW, Table
 
 # Columns that may hold text in some recording; a reader knows in which.
 _ID_COLUMNS = ("point", "ball", "pin")

@@ -7,11 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from compd.configuration import Configuration
-from compd.errors import Problem
-from compd.recording.reference import OF_FIXED_PLACES, sigma_key
-from compd.recording.sidecar import EXTERNAL, PLACE, TIME, Sidecar
-from compd.tables import (
+from compd.columns import (
     ATTITUDE_COLUMNS,
     ATTITUDES,
     AXES,
@@ -19,12 +15,16 @@ from compd.tables import (
     FRAME_COLUMNS,
     ID_COLUMNS,
     SKEW_COLUMN,
-    ProblemList,
     approach_columns,
     joint_columns,
     parse_name,
     scale_columns,
 )
+from compd.configuration import Configuration
+from compd.errors import Problem
+from compd.recording.reference import OF_FIXED_PLACES, sigma_key
+from compd.recording.sidecar import EXTERNAL, PLACE, TIME, Sidecar
+from compd.tables import ProblemList
 from compd.units import REFERENCE_UNITS
 
 _IN_REFERENCE_UNIT = re.compile(r"(?:reference|model)_(?:[xyz]|link_[1-9]\d*)")

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.columns import ID_COLUMNS
 from compd.errors import Problem, RecordingError
 from compd.recording.recording import Recording
 from compd.recording.reference import sigma_key
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
-from compd.tables import ID_COLUMNS
 
 # Assumed between two recordings where their sidecars do not say when they began.
 ASSUMED_GAP_S = 3600.0

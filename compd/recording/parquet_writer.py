@@ -8,8 +8,9 @@ from typing import Any, BinaryIO
 
 from numpy.typing import ArrayLike
 
+from compd.columns import parse_name
 from compd.recording.sidecar import FORMAT
-from compd.tables import arrow_modules, parse_name
+from compd.tables import arrow_modules
 from compd.units import unit_of
 
 # Small enough for the memory of whoever reads it in blocks, and large enough to be compressed well.

@@ -9,7 +9,8 @@ from compd.errors import RecordingError
 from compd.recording.layout import machine_problems
 from compd.recording.recording import Recording
 from compd.recording.recording_builder import RecordingBuilder
-from compd.tables import ProblemList, read_table_file, table_path
+from compd.table_file import read_table_file, table_path
+from compd.tables import ProblemList
 
 
 def read_recording(path: Path, configuration: Configuration | None = None, needs_reference: bool = True) -> Recording:

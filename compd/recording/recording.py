@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray, TextArray
+from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
 from compd.recording.reference import Reference
 from compd.recording.sidecar import Sidecar
-from compd.tables import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.units import UM_PER_MM
 
 # Without a `session` column, cross-validation leaves out blocks of time (the recording format).

@@ -12,6 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.columns import (
+    ATTITUDE_COLUMNS,
+    ATTITUDES,
+    AXES,
+    DISTANCE_COLUMN,
+    FRAME_COLUMNS,
+    approach_columns,
+    correct_names,
+    joint_columns,
+    scale_columns,
+)
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.recording.ball_plate import check_balls, read_plate
@@ -26,21 +37,7 @@ from compd.recording.checks import (
 from compd.recording.layout import Layout, machine_problems, read_layout
 from compd.recording.recording import Recording
 from compd.recording.sidecar import Sidecar, read_sidecar
-from compd.tables import (
-    ATTITUDE_COLUMNS,
-    ATTITUDES,
-    AXES,
-    DISTANCE_COLUMN,
-    FIRST_ROW,
-    FRAME_COLUMNS,
-    ProblemList,
-    Table,
-    approach_columns,
-    correct_names,
-    joint_columns,
-    rows_text,
-    scale_columns,
-)
+from compd.tables import FIRST_ROW, ProblemList, Table, rows_text
 from compd.travel_direction import RowDirections
 from compd.units import UM_PER_MM
 

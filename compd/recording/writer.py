@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
+from compd.columns import decimals, is_covariate, number_text, parse_name
 from compd.errors import Problem, RecordingError
 from compd.files import Content, write_files
 from compd.recording.parquet_writer import arrow_batch, arrow_schema, write_parquet
 from compd.recording.sidecar import sidecar_text
-from compd.tables import PARQUET, SUFFIXES, decimals, is_covariate, number_text, parse_name
+from compd.table_file import PARQUET, SUFFIXES
 
 
 def write_recording(

@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError
-from compd.model import MachineModel, machine_constants, observe, predict
+from compd.model import MachineModel, effect_deltas, machine_constants, observe, predict
 from compd.model.effects import (
     Constant,
     Effect,
@@ -18,7 +18,6 @@ from compd.model.effects import (
     MachineDetails,
     Observations,
     Parameter,
-    effect_deltas,
     needed_quantities,
     unmet_needs,
 )

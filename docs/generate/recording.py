@@ -6,11 +6,11 @@ import inspect
 from typing import Any
 
 from compd import plan_file
+from compd.columns import COLUMN_KINDS, DECIMALS
 from compd.live.record import CYCLES_SUFFIX
 from compd.recording import EXTERNAL, SECTIONS, ball_plate, checks, sidecar_contents, sidecar_text
 from compd.recording.reference import Reference
 from compd.recording.sidecar import Exclusion
-from compd.tables.columns import COLUMN_KINDS, DECIMALS
 from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table, term
 from docs.generate.schema import ModelSchema
 

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
+from compd.columns import POSITION_COLUMNS
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM
-from compd.tables import POSITION_COLUMNS
 
 UM = 1e-3
 Columns = Mapping[str, FloatArray]

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model import Sensitivity
-from compd.model.effects import Effect, Observations, Port, split_by_port
+from compd.model import Sensitivity, split_by_port
+from compd.model.effects import Effect, Observations, Port
 
 
 def effect_sensitivity(

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from compd.model import MachineModel, machine_constants, observe
-from compd.model.effects import Effect, MachineDetails, Observations, effect_deltas
+from compd.model import MachineModel, effect_deltas, machine_constants, observe
+from compd.model.effects import Effect, MachineDetails, Observations
 from compd.model.kinematics import Movement, inverse_kinematics
 from compd.model.library import load_library
 from compd.model.library.scale import PERIODS_MM

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
+from compd.columns import FRAME_COLUMNS
 from compd.instruments import InstrumentExport
 from compd.recording import write_recording
-from compd.tables import FRAME_COLUMNS
 
 SIDECAR = {"machine": "tripod-cmm"}
 # What a machine without compensation is wrong by, and the instrument's noise.

@@ -79,7 +79,7 @@ def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison
         return compare_recording(open_recording(path, machine), model)
     from compd.api import compare_stream
     from compd.cli.progress import count_shown
-    from compd.tables import row_count
+    from compd.table_file import row_count
 
     # read twice: for the sample, then row by row
     with count_shown(2 * row_count(path), f"comparing {path.name}") as progress:

@@ -77,7 +77,7 @@ def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, int]:
         return open_recording(path, machine), 0
     from compd.api import open_sample
     from compd.cli.progress import count_shown
-    from compd.tables import row_count
+    from compd.table_file import row_count
 
     rows = row_count(path)
     with count_shown(rows, f"drawing a sample of {path.name}") as progress:

@@ -60,7 +60,7 @@ def merge(
     from compd.comparison import read_with_machine
     from compd.errors import CompdError, Problem
     from compd.recording import ASSUMED_GAP_S, merge_recordings
-    from compd.tables import written_path
+    from compd.table_file import written_path
 
     if len(recordings) < 2:
         raise CompdError(

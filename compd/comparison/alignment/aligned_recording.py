@@ -29,23 +29,21 @@ from compd.comparison.alignment.registration import (
 )
 from compd.comparison.display_unit import in_place_unit
 from compd.errors import CompdError
-from compd.model import MachineModel, Sensitivity, predict, sensitivities
-from compd.model.effects import (
-    ConstantValues,
+from compd.model import (
     Deltas,
-    Effect,
-    FittedEffect,
-    Observations,
-    Port,
+    MachineModel,
+    Sensitivity,
     deltas_by_effect,
-    evaluate_basis,
+    predict,
+    sensitivities,
     split_by_port,
     sum_deltas,
-    unmet_needs,
 )
+from compd.model.effects import ConstantValues, Effect, FittedEffect, Observations, Port, evaluate_basis, unmet_needs
 from compd.model.kernels import MEANING, Reason
-from compd.recording import Recording, UsableRows, filled
+from compd.recording import Recording, UsableRows
 from compd.result_tables import Columns, data_frame, html_table
+from compd.statistics import filled
 from compd.units import REFERENCE_UNITS, UM_PER_MM
 
 if TYPE_CHECKING:

@@ -13,13 +13,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
+from compd.columns import is_sensitivity
 from compd.comparison.alignment.velocity import velocities
 from compd.errors import Problem, RecordingError
-from compd.model import observe_external
-from compd.model.effects import Deltas, Observations
+from compd.model import Deltas, observe_external
+from compd.model.effects import Observations
 from compd.model.kinematics import Movement
 from compd.recording import Recording
-from compd.tables import is_sensitivity
 from compd.travel_direction import row_directions
 from compd.units import REFERENCE_UNITS, UM_PER_MM
 

@@ -20,7 +20,8 @@ from compd.comparison.stream.residual_totals import BlockResiduals, ResidualTota
 from compd.comparison.stream.sample import Sample
 from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.comparison.stream.time_envelope import TimeEnvelope
-from compd.model.effects import Deltas, FittedEffect, sum_deltas
+from compd.model import Deltas, sum_deltas
+from compd.model.effects import FittedEffect
 from compd.units import UM_PER_MM
 
 

@@ -34,7 +34,8 @@ from compd.comparison.stream.fixed_terms import session_places
 from compd.comparison.stream.normal_equations import ClusterNormals
 from compd.comparison.stream.recording_stream import Block, RecordingStream, align_block
 from compd.comparison.stream.sample import Sample
-from compd.model.effects import FittedEffect, sum_deltas
+from compd.model import sum_deltas
+from compd.model.effects import FittedEffect
 from compd.statistics import huber_weights, robust_sigma, solve_least_squares
 from compd.units import UM_PER_MM
 

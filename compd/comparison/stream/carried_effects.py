@@ -13,7 +13,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model.effects import Deltas, FittedEffect, Memories, Memory, Observations, basis_deltas, evaluate_basis
+from compd.model import Deltas, Memories, basis_deltas
+from compd.model.effects import FittedEffect, Memory, Observations, evaluate_basis
 
 # Array of an effect's memory, place in it, and the fitted number by which it acts.
 StateKey: TypeAlias = tuple[int, int, int]

@@ -14,7 +14,7 @@ from compd.comparison.open import recorded_machine
 from compd.configuration import Configuration, Machine
 from compd.errors import Problem, RecordingError
 from compd.recording import Recording, recording_blocks
-from compd.tables import row_count
+from compd.table_file import row_count
 
 # In memory a comparison takes 9 kB a row: more rows than these would take more than 2 GB.
 LONG_ROWS = 200_000

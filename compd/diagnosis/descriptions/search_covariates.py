@@ -3,7 +3,7 @@
 Not every column of a recording is one. A number that only counts or names rows follows everything that changed in time;
 a derivative of the user's own model belongs to an effect; a column that stayed the same explains nothing. What is left
 out is told with its reason (`untried_quantities`). A column with few empty cells is tried all the same: gaps are filled
-from the nearest row in time (`compd.recording.gaps`).
+from the nearest row in time (`compd.statistics.gaps`).
 """
 
 from __future__ import annotations

@@ -18,8 +18,7 @@ from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search.gross_rows import RowWeights, weigh_rows
 from compd.diagnosis.search.regression import RegressionData, Regressors
 from compd.diagnosis.search.subset_losses import SubsetLosses
-from compd.recording import filled
-from compd.statistics import LEAST_SIGMA, trimmed_scale
+from compd.statistics import LEAST_SIGMA, filled, trimmed_scale
 from compd.units import UM_PER_MM
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from compd.live.record.recording_part import CYCLES_SUFFIX
 from compd.live.record.replay import RecordedCycles
 from compd.live.record.table_rows import Message, TableRows
-from compd.tables import CSV
+from compd.table_file import CSV
 
 # The origin of time_s is known to half of its last decimal; so is each time.
 _TIME_S = "time_s"

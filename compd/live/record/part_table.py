@@ -8,11 +8,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
+from compd.columns import number_text
 from compd.errors import CompdError
 from compd.files import sync_directory
 from compd.live.record.appended_file import AppendedFile
 from compd.recording import ARROW, OpenPartFormat, close_part
-from compd.tables import CSV, PARQUET, TableFormat, number_text
+from compd.table_file import CSV, PARQUET
+from compd.tables import TableFormat
 
 # One value of every column; None where nothing was measured.
 Row = Sequence[float | None]

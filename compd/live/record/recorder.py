@@ -35,7 +35,8 @@ from compd.live.record.part_table import close_left_parts
 from compd.live.record.readings_feed import FeedItem
 from compd.live.record.recording_part import ORDER, RecordingPart
 from compd.live.record.table_rows import Message
-from compd.tables import PARQUET, TableFormat, arrow_modules
+from compd.table_file import PARQUET
+from compd.tables import TableFormat, arrow_modules
 
 _WRITE_EVERY_S = 0.5
 # 100 s of a 200 Hz burst, about 80 MB: a disk that stalls for longer is a fault.

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from compd.columns import SKEW_COLUMN
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.live.loop import (
@@ -27,7 +28,7 @@ from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER
 from compd.live.record.table_rows import Message
 from compd.live.service import FORMER_TIP_NOISE, RecordedCycle, parse_readings
 from compd.recording import ARROW, OpenPart
-from compd.tables import CSV, SKEW_COLUMN, SUFFIXES, row_count
+from compd.table_file import CSV, SUFFIXES, row_count
 
 # Of a part's messages the first two say who spoke, and what the columns are.
 _FIRST_CLASSES = ("VERSION", "WATCH")

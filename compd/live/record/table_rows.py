@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from compd.columns import SKEW_COLUMN, approach_columns, decimals
 from compd.live.record.part_table import Row
-from compd.tables import SKEW_COLUMN, approach_columns, decimals
 from compd.units import UM_PER_MM
 
 Message = Mapping[str, Any]

@@ -11,13 +11,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading, ReadingMotion
 from compd.live.loop import CycleInputs, CycleState, MachineWires, MachineZero, SentCycle, Target, setpoint_line
 from compd.live.memory import Readings, Snapshot
 from compd.live.service.messages import line
 from compd.live.service.state_json import from_plain, to_plain
-from compd.tables import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.text import omit_unknown
 
 

@@ -1,10 +1,3 @@
-from .deltas import Deltas as Deltas
-from .deltas import Memories as Memories
-from .deltas import basis_deltas as basis_deltas
-from .deltas import deltas_by_effect as deltas_by_effect
-from .deltas import effect_deltas as effect_deltas
-from .deltas import split_by_port as split_by_port
-from .deltas import sum_deltas as sum_deltas
 from .effect import PORTS as PORTS
 from .effect import Basis as Basis
 from .effect import BasisProgram as BasisProgram

@@ -9,7 +9,7 @@ from typing import Any
 from compd.errors import Problem, RecordingError
 from compd.page.recordings import NAME, recording_tables
 from compd.recording import read_sidecar
-from compd.tables import CSV
+from compd.table_file import CSV
 
 
 def gauges_and_plans(directory: Path) -> tuple[list[str], list[str]]:

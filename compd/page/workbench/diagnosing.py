@@ -12,8 +12,8 @@ from typing import Any
 from compd.api import diagnose, open_whole_or_sample
 from compd.configuration import Machine
 from compd.diagnosis import Diagnosis
-from compd.page.workbench.evidence import evidence
 from compd.page.workbench.opened_recording import model_of
+from compd.report import evidence
 
 # Columns of the text, as on a terminal of usual width.
 _WIDTH = 100

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.columns import approach_columns
 from compd.errors import CompdError, KinematicsError, Problem
 from compd.plan_file import SPEED_COLUMN, TIP_COLUMNS, PlanFile, PlanLine, read_plan_file
 from compd.simulation.truth.mechanism import Mechanism
@@ -16,7 +17,6 @@ from compd.simulation.truth.motion import SPEED_MM_PER_S
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.warm_up import PARTS
 from compd.simulation.truth.workspace import STROKE_SHARE
-from compd.tables import approach_columns
 
 # What can be held by heaters and coolers in a laboratory, by a climate chamber and by a loading device; pressure: the
 # lowest and highest at sea level on record (WMO).

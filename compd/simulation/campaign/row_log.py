@@ -8,12 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Wiring
-from compd.simulation.truth.fixed_places import FixedPlaces
-from compd.simulation.truth.indicated_tip import IndicatedTip
-from compd.simulation.truth.instruments import ReferenceInstrument
-from compd.simulation.truth.world import World
-from compd.tables import (
+from compd.columns import (
     ATTITUDE_COLUMNS,
     DISTANCE_COLUMN,
     POSITION_COLUMNS,
@@ -21,6 +16,11 @@ from compd.tables import (
     link_reference_column,
     scale_columns,
 )
+from compd.configuration import Wiring
+from compd.simulation.truth.fixed_places import FixedPlaces
+from compd.simulation.truth.indicated_tip import IndicatedTip
+from compd.simulation.truth.instruments import ReferenceInstrument
+from compd.simulation.truth.world import World
 
 UM = 1e-3
 

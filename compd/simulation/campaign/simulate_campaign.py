@@ -16,7 +16,7 @@ from compd.simulation.causes.hidden_cause import draw_hidden, parse_hidden, writ
 from compd.simulation.truth.instruments import Kind
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
-from compd.tables import written_path
+from compd.table_file import written_path
 
 
 @dataclass(frozen=True)

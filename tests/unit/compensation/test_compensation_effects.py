@@ -10,8 +10,8 @@ import pytest
 
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import GaugeValues, WarmStart
-from compd.model import MachineModel, machine_constants, observe, predict
-from compd.model.effects import Effect, FittedEffect, Observations, deltas_by_effect, sum_deltas
+from compd.model import MachineModel, deltas_by_effect, machine_constants, observe, predict, sum_deltas
+from compd.model.effects import Effect, FittedEffect, Observations
 from compd.model.kernels import Reason
 from compd.model.kinematics import Movement, ToolOnPlate, update_motion
 from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD, constants_of, random_inputs

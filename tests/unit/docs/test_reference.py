@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from compd.columns import COLUMN_KINDS, parse_name
 from compd.comparison.criteria import ComparisonCriteria
 from compd.configuration import SECTIONS, json_schema
 from compd.diagnosis import Criteria
@@ -31,8 +32,6 @@ from compd.recording.checks import LIMITS
 from compd.recording.reference import Reference
 from compd.recording.sidecar import Exclusion
 from compd.setpoint_states import Mode, State
-from compd.tables import parse_name
-from compd.tables.columns import COLUMN_KINDS
 from docs.generate import __main__ as generate
 from docs.generate.commands import CommandEntry, entries
 from docs.generate.live_examples import Exchange

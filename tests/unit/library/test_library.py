@@ -12,17 +12,9 @@ import pytest
 
 import compd.model.library
 from compd.errors import CompdError, PluginError
-from compd.model.effects import (
-    PORTS,
-    Effect,
-    FittedEffect,
-    can_concern,
-    deltas_by_effect,
-    evaluate_basis,
-    needed_quantities,
-    unmet_needs,
-)
-from compd.model.effects.deltas import port_size
+from compd.model import deltas_by_effect
+from compd.model.deltas import port_size
+from compd.model.effects import PORTS, Effect, FittedEffect, can_concern, evaluate_basis, needed_quantities, unmet_needs
 from compd.model.kinematics import update_motion
 from compd.model.library import BUNDLED, find_effect, load_library
 from tests.support.effect_rows import (

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from compd.model import predict
-from compd.model.effects import Deltas, FittedEffect, effect_deltas
+from compd.model import Deltas, effect_deltas, predict
+from compd.model.effects import FittedEffect
 from compd.model.kinematics import Movement
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, delta_mm, row_at_zero, rows_at_tips, solve_tip
 from tests.support.model_machines import Floats, tips

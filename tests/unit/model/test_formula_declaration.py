@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.errors import ConfigurationError
-from compd.model.effects.deltas import effect_deltas
+from compd.model.deltas import effect_deltas
 from compd.model.effects.effect import Effect, FittedEffect
 from compd.model.effects.effect_basis import evaluate_basis
 from compd.model.effects.effect_needs import unmet_needs

@@ -10,7 +10,7 @@ import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.errors import CompdError
-from compd.model.effects.deltas import effect_deltas
+from compd.model.deltas import effect_deltas
 from compd.model.effects.effect import ConstantValues, Effect, FittedEffect, Memory, memoryless_basis
 from compd.model.effects.effect_basis import evaluate_basis, recounted
 from compd.model.effects.effect_needs import is_measured, unmet_needs

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
-from compd.model.effects.deltas import deltas_by_effect, effect_deltas, sum_deltas
+from compd.model.deltas import deltas_by_effect, effect_deltas, sum_deltas
 from compd.model.effects.effect import PORTS, FittedEffect, Port
 from compd.model.effects.effect_basis import evaluate_basis, port_size
 from compd.model.effects.observations import Observations

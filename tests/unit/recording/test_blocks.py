@@ -13,7 +13,7 @@ from compd.errors import RecordingError
 from compd.recording.blocks import recording_blocks
 from compd.recording.convert import convert_recording
 from compd.recording.reader import read_recording
-from compd.tables import row_count
+from compd.table_file import row_count
 from tests.support.recordings import (
     HEADER,
     SIDECAR,

@@ -8,7 +8,8 @@ import numpy as np
 
 from compd.comparison import compare, open_recording
 from compd.comparison.residual_trends import Trend
-from compd.recording.gaps import MOST_EMPTY, filled
+from compd.statistics import filled
+from compd.statistics.gaps import MOST_EMPTY
 from tests.support.external import measured_places, write_external
 
 NAN = np.nan

@@ -17,7 +17,7 @@ from compd.recording.reader import read_recording
 from compd.recording.recording import Recording
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
-from compd.tables.parquet_table import ParquetTable
+from compd.tables import ParquetTable
 from tests.support.recordings import csv_text, write_recording_files
 
 

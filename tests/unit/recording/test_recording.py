@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from compd.cli.measurements.recording import recording as recording_command
+from compd.columns import is_covariate
 from compd.configuration import load
 from compd.errors import RecordingError
 from compd.recording.reader import check_against, read_recording
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
-from compd.tables import is_covariate
 from compd.travel_direction import row_directions
 from tests.support.paths import ROOT, SHARED
 from tests.support.recordings import (

@@ -8,7 +8,7 @@ import pytest
 
 from compd.diagnosis import error_fall, summary_lines
 from compd.diagnosis.words.summary_lines import MOST_LINES
-from compd.page.workbench.evidence import evidence
+from compd.report import evidence
 from compd.report.diagnosis_evidence import formula_list, step_rows
 from tests.support import diagnosis_situations as situations
 

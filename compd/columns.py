@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from compd.configuration import FRAME_DISTANCES
-from compd.tables.problem_list import ProblemList
-from compd.tables.table import Table
+from compd.tables import ProblemList, Table
 from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")

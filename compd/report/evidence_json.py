@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from compd.diagnosis import Diagnosis, DiagnosisStep, ErrorFall, error_fall, summary_lines
-from compd.report import (
-    PageTable,
+from compd.report.diagnosis_evidence import (
     by_noise_text,
     candidates_table,
     constant_table,
@@ -20,6 +19,7 @@ from compd.report import (
     untested_table,
     without_gain,
 )
+from compd.report.page_table import PageTable
 from compd.text import estimate_text, fall_text, nan_to_null, number_text, percent_text
 
 

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
-from compd.model.effects.effect import Effect, FittedEffect, Memory, Port
-from compd.model.effects.effect_basis import evaluate_basis, port_size
-from compd.model.effects.observations import Observations
+from compd.model.effects import Effect, FittedEffect, Memory, Observations, Port, evaluate_basis, port_size
 
 # (N, size) per port, in mm (rad for directions).
 Deltas: TypeAlias = dict[Port, FloatArray]

@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from compd.columns import ID_COLUMNS, is_header
 from compd.errors import Problem, RecordingError
-from compd.tables.columns import ID_COLUMNS, is_header
-from compd.tables.csv_blocks import csv_blocks, csv_row_count
-from compd.tables.csv_table import read_table
-from compd.tables.parquet_table import ParquetTable
-from compd.tables.problem_list import ProblemList
-from compd.tables.table import Table, TableBlock
+from compd.tables import ParquetTable, ProblemList, Table, TableBlock, csv_blocks, csv_row_count, read_table
 
 CSV, PARQUET = ".csv", ".parquet"
 SUFFIXES = (CSV, PARQUET)
