@@ -1,3 +1,4 @@
+from .csv_in_blocks import csv_blocks as csv_blocks
 from .csv_in_blocks import csv_row_count as csv_row_count
 from .csv_table import read_table as read_table
 from .parquet_table import ParquetTable as ParquetTable
