@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import doctest
 import inspect
 import subprocess
@@ -15,6 +14,7 @@ import compd
 from compd.errors import CompdError
 from tests.support.paths import ROOT
 
+NAMES = [name for name in compd.__all__ if name != "__version__"]
 HEAVY = ("numba", "plotly", "pandas", "numpy", "scipy", "pydantic")
 
 
@@ -30,15 +30,7 @@ def test_one_name_imports_its_own_module_only() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_the_table_of_names_and_what_type_checkers_see_agree() -> None:
-    tree = ast.parse((ROOT / "compd" / "__init__.py").read_text(encoding="utf-8"))
-    (block,) = [node for node in tree.body if isinstance(node, ast.If)]
-    seen = {alias.name: node.module for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names}
-    assert seen.pop("__version__") == "compd.release"
-    assert seen == compd._MODULES
-
-
-@pytest.mark.parametrize("name", compd.__all__)
+@pytest.mark.parametrize("name", NAMES)
 def test_every_public_name_is_there_and_documented(name: str) -> None:
     value = getattr(compd, name)
     assert value.__name__ == name
@@ -55,7 +47,7 @@ def test_every_public_name_is_there_and_documented(name: str) -> None:
 
 
 def test_a_name_that_is_not_there() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'compere'"):
+    with pytest.raises(AttributeError, match="attribute compere"):
         compd.compere  # noqa: B018
 
 
@@ -70,7 +62,7 @@ def test_the_examples_of_the_docstrings_are_true(tmp_path: Path, monkeypatch: py
     monkeypatch.chdir(tmp_path)
     parser, runner = doctest.DocTestParser(), doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
     tried, said = 0, ""
-    for name in compd.__all__:
+    for name in NAMES:
         test = parser.get_doctest(getattr(compd, name).__doc__ or "", {}, name, None, None)
         said += "".join(_run(runner, test))
         tried += len(test.examples)
