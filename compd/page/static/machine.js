@@ -1,6 +1,6 @@
 // The machine in three dimensions on a plain canvas, with the errors drawn many times larger than they are.
 import { ink, prepared, signed } from "./format.js";
-import { Turn } from "./turn.js";
+import { Turn } from "./orbit_control.js";
 
 const RODS = { t1: ["supports", 0, "supports", 1], t2: ["supports", 1, "supports", 2], t3: ["supports", 2, "supports", 0], u1: ["supports", 0, "plate", 0], u2: ["supports", 0, "plate", 2], u3: ["supports", 1, "plate", 0], u4: ["supports", 1, "plate", 1], u5: ["supports", 2, "plate", 1], u6: ["supports", 2, "plate", 2] };
 const TRAIL_S = 10;

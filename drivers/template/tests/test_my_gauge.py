@@ -6,7 +6,7 @@ import pytest
 from my_gauge.driver import MyGauge
 from my_gauge.simulated import SimulatedMyGauge
 
-from compd.conformance.report import DriverUnderTest, run_conformance
+from compd.conformance import DriverUnderTest, run_conformance
 from compd.gauge import LineFault, Quality, Reading
 
 

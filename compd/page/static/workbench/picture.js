@@ -1,6 +1,6 @@
 // The residual of every row that is drawn, before and with what is tried, on the same axes and scale.
 import { element, ink, prepared } from "../format.js";
-import { Turn } from "../turn.js";
+import { Turn } from "../orbit_control.js";
 import { AgainstView } from "./against_view.js";
 import { Lasso } from "./lasso.js";
 import { SpaceView, mapped } from "./space_view.js";

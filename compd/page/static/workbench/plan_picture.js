@@ -1,6 +1,6 @@
 // The rows of a plan in space: numbered in their order, coloured by what is set, with the difference of the rivals.
 import { element, ink, prepared } from "../format.js";
-import { Turn } from "../turn.js";
+import { Turn } from "../orbit_control.js";
 
 const NO_COLOUR = "purpose";
 const SETTLED = ["row", "purpose", "tip_x_mm", "tip_y_mm", "tip_z_mm"];
