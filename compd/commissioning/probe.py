@@ -22,7 +22,7 @@ from compd.lines.stream import StreamLine, shown
 from compd.plugins import GAUGES, load, names
 
 PROBE_TIMEOUT_S = 0.5
-# So long a port is listened to first: a device that speaks unasked, once a second or more often, is not probed.
+# Time (s) to listen to a port before probing; a device that sends unsolicited data at 1 Hz or faster is not probed.
 LISTEN_S = 1.2
 # After this silence, s, a device has said all that it says to an empty or unknown command.
 QUIET_S = 0.1
@@ -91,12 +91,12 @@ def preset_candidates() -> list[PresetCandidate]:
 
 
 def announcements(path: str, candidates: Sequence[PresetCandidate]) -> Iterator[str]:
-    """What answers on the port `path`, a line of text each. SENDS BYTES, unless a device speaks there unasked.
+    """What answers on the port `path`, a line of text each. SENDS BYTES, unless a device there sends unsolicited data.
 
     The presets that speak text come first: what is no text may leave an instrument in a state of its own.
     """
-    if heard := _heard(path):
-        yield f"a device speaks unasked, {shown(heard)}: nothing was sent; `compd gauge learn` with its baud rate"
+    if received := _received(path):
+        yield f"unsolicited data, {shown(received)}: nothing was sent; `compd gauge learn` with its baud rate"
         return
     outcomes = [probe_port(path, candidate) for candidate in sorted(candidates, key=lambda c: c.on_registers)]
     text = [outcome for outcome in outcomes if outcome.fits and not outcome.candidate.on_registers]
@@ -190,7 +190,7 @@ def _end(request: bytes) -> bytes:
     return match[0] if match else b""
 
 
-def _heard(path: str) -> bytes:
+def _received(path: str) -> bytes:
     """What comes on a port without a request; b"" also where it cannot be opened."""
     settings = byte_line_settings(PortArguments(path, 9600, "8N1", LISTEN_S))
     try:

@@ -63,7 +63,7 @@ class LimitedProtocol(H11Protocol):
     ) -> None:
         super().__init__(config, server_state, {**app_state, _STATE_KEY: self}, _loop)
         self._all = all_connections
-        self._known = self._heard = False
+        self._known = self._received = False
         self._watched: tuple[object, ...] = ()
         self._deadline: asyncio.TimerHandle | None = None
 
@@ -110,7 +110,7 @@ class LimitedProtocol(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """As of asyncio.Protocol."""
-        self._heard = True
+        self._received = True
         super().data_received(data)
         self._watch()
 
@@ -156,7 +156,7 @@ class LimitedProtocol(H11Protocol):
         if self._known and self._stage() is Stage.HEAD:
             self.transport.close()  # the end of an answer may still be on its way
             self._watch()
-        elif self._heard:
+        elif self._received:
             self._all.closed(self, "too_slow")
         else:
             self.drop()  # browsers connect in advance, and may need it never

@@ -63,7 +63,7 @@ class Echo(Exchange):
 class SerialAsciiOptions(ExchangeOptions):
     """Options of a described ASCII gauge."""
 
-    out: str = Field(default="", description="the request; left out: the device speaks unasked")
+    out: str = Field(default="", description="the request; left out: the device sends unsolicited readings")
     dtr_pulse_s: Seconds | None = Field(
         default=None, description="in place of `out`: the request is DTR, LOW for so long, s"
     )
@@ -114,9 +114,9 @@ class SerialAsciiOptions(ExchangeOptions):
         if self.asked and self.dtr_pulse_s is not None:
             yield "the request is `out` or `dtr_pulse_s`, not both"
         if not self.asked and (self.init or self.echo or self.silent_in_menu):
-            yield "a device that speaks unasked, or by DTR, has no init, echo or silent_in_menu"
+            yield "a device that sends unsolicited readings, or by DTR, has no init, echo or silent_in_menu"
         if not self.asked and self.dtr_pulse_s is None and not self.in_terminator:
-            yield "a device that speaks unasked needs an `in_terminator`"
+            yield "a device that sends unsolicited readings needs an `in_terminator`"
 
     def _number_problems(self, description: Description) -> Iterator[str]:
         names = [channel.name for channel in self.channels]

@@ -39,15 +39,13 @@ Wagner Force Ten, page 25: blank or minus, 5 digits and point, blank, unit, Peak
       errors: [{in: "%*?[ ]HELP%*?[ LB]", quality: over_range}]
 
 A device that is asked by a pulse of DTR has `dtr_pulse_s` in place of `out`; `line_needs` powers its cable.
-A device that speaks unasked, as the last, has no `out`: each of its lines counts, never a half one, and its time is
-that at which the line before it began; `reply_timeout_s` must be longer than its period.
-A device with a request for each of its values (M1, M2 ...) has `requests: [{out: M1, in: ...}, ...]` in place of `out`
-and `in`; each channel has the time of its own request.
-`echo` is a second request whose reply looks different: asked before every `every`-th poll, it finds a device whose
-replies are one behind.
-Devices that fall silent by design (in their menu) get `silent_in_menu: true`: after a whole reply on a connection,
-the second poll without any byte is `silent` instead of `timeout`. A cable that comes off afterwards looks the same,
-and the detail says so; both are without a value.
+A device that sends unsolicited readings, as the last, has no `out`: each of its lines counts, never a half one, and its
+time is that at which the line before it began; `reply_timeout_s` must be longer than its period. A device with a
+request for each of its values (M1, M2 ...) has `requests: [{out: M1, in: ...}, ...]` in place of `out` and `in`; each
+channel has the time of its own request. `echo` is a second request whose reply looks different: asked before every
+`every`-th poll, it finds a device whose replies are one behind. Devices that fall silent by design (in their menu) get
+`silent_in_menu: true`: after a whole reply on a connection, the second poll without any byte is `silent` instead of
+`timeout`. A cable that comes off afterwards looks the same, and the detail says so; both are without a value.
 
 Without a checksum in `in` a damaged digit is still a digit: a length that is not where the last ones lead is asked for
 a second time, as those of all gauges are. Other quantities are not: set a parity on the line.
@@ -187,13 +185,13 @@ class SerialAscii(Gauge[ByteLine]):
         if self._protocol.dtr_pulse_s is not None:
             time_s = line.pulse_dtr(self._protocol.dtr_pulse_s)
         elif not self._protocol.asked:
-            return self._unasked(line, poll.reply)
+            return self._unsolicited(line, poll.reply)
         else:
             time_s = ask(line, self._protocol, poll.request)
         return self._whole(line, poll.reply), time_s
 
-    def _unasked(self, line: ByteLine, form: ReplyFormat) -> tuple[bytes, float]:
-        """The next reply of a device that speaks unasked, and its time (s)."""
+    def _unsolicited(self, line: ByteLine, form: ReplyFormat) -> tuple[bytes, float]:
+        """The next reply of a device that sends unsolicited readings, and its time (s)."""
         terminator, protocol = self._description.terminator, self._protocol
         waits_s = protocol.reply_timeout_s, protocol.gap_timeout_s
         try:
@@ -205,7 +203,7 @@ class SerialAscii(Gauge[ByteLine]):
         except LineFault as fault:
             if fault.quality is not Quality.TIMEOUT:
                 raise
-            text = f"{fault.detail}; `reply_timeout_s` must be longer than the period of a device that speaks unasked"
+            text = f"{fault.detail}; `reply_timeout_s` must be longer than the period of unsolicited readings"
             raise LineFault(fault.quality, text) from fault
         return reply, time_s
 

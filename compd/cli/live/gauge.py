@@ -191,7 +191,9 @@ def learn(
     format_: Format = None,
     timeout_s: Timeout = 1.0,
     line_keys: LineKeys = None,
-    out: Annotated[str, typer.Option(help=r"Request to send, with escapes: '?\r'; empty: it speaks unasked.")] = "",
+    out: Annotated[
+        str, typer.Option(help=r"Request to send, with escapes: '?\r'; empty: it sends unsolicited data.")
+    ] = "",
     replies: Annotated[int, typer.Option(min=3, help="How many replies to capture live.")] = 6,
     unit: Annotated[
         str,

@@ -46,7 +46,7 @@ class Subject:
     checksum : the protocol has one of its own.
     exact : in virtual time; cases that need thousands of polls run there alone.
     error_replies : whole replies by which the device reports an error, and the quality that must come.
-    unasked : the device speaks by itself.
+    unsolicited : the device speaks by itself.
     options : those that the driver is tried with.
     another : the driver once more, with other options and a simulated device of its own, on a virtual wire.
     """
@@ -56,7 +56,7 @@ class Subject:
     checksum: bool
     exact: bool
     error_replies: Mapping[bytes, Quality]
-    unasked: bool = False
+    unsolicited: bool = False
     options: Any = None
     another: Callable[[Any], ConformanceSession] | None = field(default=None, repr=False)
 
@@ -67,7 +67,7 @@ class Subject:
 
     def possible(self, kinds: Iterable[Fault]) -> Sequence[Fault]:
         """Those of the faults that this device's replies can have."""
-        return [fault for fault in kinds if not (self.unasked and fault.only_of_answers)]
+        return [fault for fault in kinds if not (self.unsolicited and fault.only_of_answers)]
 
 
 Case = Callable[[ConformanceSession, Subject], CaseResult]
@@ -77,21 +77,21 @@ def result_of(
     case: str,
     allowed: frozenset[Quality],
     observed: str,
-    complaints: Sequence[str],
+    violations: Sequence[str],
     undetectable: Sequence[str] = (),
 ) -> CaseResult:
-    """FAIL with the first complaint; "-" where there is none, but something that no driver could detect."""
+    """FAIL with the first violation; "-" where there is none, but something that no driver could detect."""
     required = " | ".join(str(quality) for quality in Quality if quality in allowed)
-    if complaints:
-        more = f" (and {len(complaints) - 1} more)" if len(complaints) > 1 else ""
-        return CaseResult(case, required, complaints[0] + more, "FAIL")
+    if violations:
+        more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
+        return CaseResult(case, required, violations[0] + more, "FAIL")
     if undetectable:
         more = f" (and {len(undetectable) - 1} more)" if len(undetectable) > 1 else ""
         return CaseResult(case, required, f"not detectable on this wire: {undetectable[0]}{more}", "-")
     return CaseResult(case, required, observed, "pass")
 
 
-def complaints_of(poll: Poll, allowed: frozenset[Quality]) -> list[str]:
+def violations_of(poll: Poll, allowed: frozenset[Quality]) -> list[str]:
     """What is wrong with a poll: numbers, or a quality that is not allowed."""
     unwanted = poll.qualities - allowed
     return [*poll.wrong, *([str(poll)] if unwanted and not poll.wrong else [])]
@@ -115,7 +115,7 @@ def faulty_polls(
 ) -> CaseResult:
     """One poll under each of `tries` (the faults of its replies), each followed by polls until all is good again."""
     qualities: set[str] = set()
-    complaints: list[str] = []
+    violations: list[str] = []
     undetectable: list[str] = []
     slowest = 0
     for reply_faults in tries:
@@ -123,10 +123,10 @@ def faulty_polls(
         poll = session.poll(reply_faults)
         delivered = ", ".join(repr(exchange.delivered) for exchange in session.exchanges)
         qualities |= {str(quality) for quality in poll.qualities}
-        complaints += [f"{name}: {text}: {delivered}" for text in complaints_of(poll, allowed)]
+        violations += [f"{name}: {text}: {delivered}" for text in violations_of(poll, allowed)]
         undetectable += [f"{name}: {text}: {delivered}" for text in poll.undetectable]
         recovering, good = session.recover()
         slowest = max(slowest, recovering)
-        complaints += [f"after {name}: {text}" for text in complaints_of(good, GOOD)]
+        violations += [f"after {name}: {text}" for text in violations_of(good, GOOD)]
     text = ", ".join(sorted(qualities)) + f"; right again after {slowest} poll{'s' * (slowest != 1)}"
-    return result_of(case, allowed, text, complaints, undetectable)
+    return result_of(case, allowed, text, violations, undetectable)

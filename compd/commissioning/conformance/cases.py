@@ -15,7 +15,7 @@ from compd.commissioning.conformance.waiting_cases import waits, waits_after_fau
 from compd.commissioning.conformance.wire_cases import CASES_ON_RTU, WIRE_CASES
 
 CASES: tuple[Case, ...] = (*VALUE_CASES, *WIRE_CASES, *DAMAGE_CASES, *REPLY_CASES)
-# A device that speaks unasked has no answers that could be late, or asked for twice.
+# A device that sends unsolicited readings has no answers that could be late, or asked for twice.
 CASES_OF_ANSWERS: tuple[Case, ...] = (*waiting_cases.CASES_OF_ANSWERS, *wire_cases.CASES_OF_ANSWERS)
 # A driver that fails in one of these is tried no further: each poll would take its time, or be wrong.
 FIRST_CASES = ("waits", "units and scale", "waits after faults")
@@ -28,7 +28,7 @@ def run_cases(session: ConformanceSession, subject: Subject) -> Iterator[CaseRes
         yield result
         if result.verdict == "FAIL":
             return
-    cases = [*(() if subject.unasked else CASES_OF_ANSWERS), *CASES]
+    cases = [*(() if subject.unsolicited else CASES_OF_ANSWERS), *CASES]
     cases += CASES_ON_RTU if subject.registers and not subject.over_tcp else ()
     for case in cases:
         yield run_case(case, session, subject)

@@ -15,8 +15,8 @@ from compd.commissioning.conformance.case_result import (
     Case,
     CaseResult,
     Subject,
-    complaints_of,
     result_of,
+    violations_of,
 )
 from compd.commissioning.conformance.faults import Fault
 from compd.commissioning.conformance.harness import ConformanceSession
@@ -56,26 +56,26 @@ def _damaged(
     session: ConformanceSession, subject: Subject, case: str, tries: Sequence[Sequence[Fault]], advice: str
 ) -> CaseResult:
     """Replies with small damage: no number that the device would not itself have sent in these very bytes."""
-    complaints, after, undetectable = [], [], []
+    violations, after, undetectable = [], [], []
     for reply_faults, sign in itertools.product(tries, (1.0, -1.0)):
         name = reply_faults[-1].name
         _advance_on_one_side(session, sign)
         poll = session.poll(reply_faults, new_values=False)
         delivered = ", ".join(repr(exchange.delivered) for exchange in session.exchanges)
-        complaints += [f"{name}: {text}: {delivered} is no reply of the device" for text in poll.wrong]
+        violations += [f"{name}: {text}: {delivered} is no reply of the device" for text in poll.wrong]
         undetectable += [f"{name}: {text}: {delivered}" for text in poll.undetectable]
         if Quality.DRIVER_ERROR in poll.qualities:
-            complaints.append(f"{name}: {poll}: {delivered}")
-        after += [f"after {name}: {text}" for text in complaints_of(session.recover()[1], GOOD)]
+            violations.append(f"{name}: {poll}: {delivered}")
+        after += [f"after {name}: {text}" for text in violations_of(session.recover()[1], GOOD)]
     if subject.checksum:
-        complaints += undetectable
-    if undetectable and not (after or complaints):
+        violations += undetectable
+    if undetectable and not (after or violations):
         text = f"{len(undetectable)} of {2 * len(tries)} give another number that the device could have sent"
         return CaseResult(
             case, "no wrong number, with a checksum", f"{text}: not detectable on this wire, {advice}", "-"
         )
     return result_of(
-        case, DAMAGED | NO_ANSWER | GOOD, f"{2 * len(tries)} of them, no wrong number", after or complaints
+        case, DAMAGED | NO_ANSWER | GOOD, f"{2 * len(tries)} of them, no wrong number", after or violations
     )
 
 

@@ -25,7 +25,7 @@ class Piece(NamedTuple):
 class Fault:
     """`act(reply, timeout_s)`: the pieces that come in place of `reply`; `timeout_s` is the line's.
 
-    only_of_answers : nothing is wrong with it where a device speaks unasked: it is another line, as good as any.
+    only_of_answers : harmless where a device sends unsolicited readings: it is another line, as good as any.
     """
 
     name: str

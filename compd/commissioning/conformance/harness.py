@@ -12,7 +12,7 @@ from compd.commissioning.conformance.device_replies import DeviceReplies
 from compd.commissioning.conformance.faults import Fault
 from compd.commissioning.conformance.peer import Exchange, Peer, SensorValues
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, bad
-from compd.live.acquisition.polled_round import NOTHING_UNDER_WAY
+from compd.live.acquisition.polled_round import NO_REPLY_PENDING
 
 LOOKS = 24  # fault-free polls before all else
 DIGITS_FROM = 2  # of them, those from which the device's digit is taken
@@ -26,7 +26,7 @@ ASKED_AGAIN_TIMEOUTS = 2.0
 class ConformanceWire(Protocol):
     """A wire with a device at its far end: virtual, pty or TCP.
 
-    exact : in virtual time. pause_s : between two lines of a device that speaks unasked, s; 0 where it is asked.
+    exact : in virtual time. pause_s : time between two unsolicited lines, s; 0 for a device that is polled.
     """
 
     peer: Peer
@@ -179,7 +179,7 @@ class ConformanceSession:
             return
         try:
             if fault.quality is not Quality.LINE_LOST:
-                if fault.quality not in NOTHING_UNDER_WAY:
+                if fault.quality not in NO_REPLY_PENDING:
                     self._line.drain()
                 return
         except LineFault:
@@ -226,10 +226,10 @@ class ConformanceSession:
         return text
 
     def _stamp(self, channel: Channel, reading: Reading, started_s: float) -> Iterable[str]:
-        """What is wrong with a reading's time stamp: that of its request, or, unasked, since the line before began."""
+        """Faults of a time stamp: it must follow its request, or the start of the previous unsolicited line."""
         earliest_s, event = started_s, "the request of this poll had left"
         if self.wire.exact and self.exchanges:
-            earliest_s = self.exchanges[0].heard_s - STAMP_ROUNDING_S
+            earliest_s = self.exchanges[0].received_s - STAMP_ROUNDING_S
         if self.wire.pause_s:
             earliest_s -= self.wire.pause_s + self.wire.peer.longest * self.wire.character_s
             event = "the line before had begun"

@@ -49,22 +49,22 @@ class SensorValues:
         self._looked_at.add(channel)
         return self.values[channel]
 
-    def stamp(self, heard_s: float) -> None:
-        """What was sensed since the last call was sensed at `heard_s`."""
-        self.sensed_s.update(dict.fromkeys(self._looked_at, heard_s))
+    def stamp(self, received_s: float) -> None:
+        """What was sensed since the last call was sensed at `received_s`."""
+        self.sensed_s.update(dict.fromkeys(self._looked_at, received_s))
         self._looked_at.clear()
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """One request of a poll, at what time it was heard (s), the device's reply, and what of it was delivered.
+    """One request of a poll, at what time it was received (s), the device's reply, and what of it was delivered.
 
-    request : b"" where the device was asked by DTR, or has spoken unasked: it was heard as DTR fell, or as it began.
+    request : b"" for a pulse of DTR or an unsolicited reading; it was received as DTR fell, or as the reading began.
     pause_s : before the reply, of no driver's making, s: DTR was LOW, or the device silent between two lines.
     """
 
     request: bytes
-    heard_s: float
+    received_s: float
     reply: bytes
     delivered: bytes
     pause_s: float = 0.0
@@ -105,10 +105,10 @@ class Peer:
         """Blocks of registers that were asked for since `end_map`."""
         return len(self._counts)
 
-    def answer(self, request: bytes, heard_s: float, timeout_s: float, pause_s: float = 0.0) -> Sequence[Piece]:
-        """The pieces that come back when `request` has arrived at `heard_s`; see `Exchange`."""
+    def answer(self, request: bytes, received_s: float, timeout_s: float, pause_s: float = 0.0) -> Sequence[Piece]:
+        """The pieces that come back when `request` has arrived at `received_s`; see `Exchange`."""
         reply = self._reply(request)
-        self._sensors.stamp(heard_s)
+        self._sensors.stamp(received_s)
         pieces: Sequence[Piece] = []
         if reply:
             self.longest = max(self.longest, len(reply))
@@ -117,7 +117,7 @@ class Peer:
             pieces = fault.act(reply, timeout_s)
         if request or reply:
             delivered = b"".join(piece.data for piece in pieces)
-            self.exchanges.append(Exchange(request, heard_s, reply, delivered, pause_s))
+            self.exchanges.append(Exchange(request, received_s, reply, delivered, pause_s))
         return pieces
 
     def would_answer(self, requests: Iterable[bytes], values: Mapping[str, float]) -> tuple[bytes, ...]:
@@ -133,7 +133,7 @@ class Peer:
 
     def _reply(self, request: bytes) -> bytes:
         if request or isinstance(self._device, ModbusSlaves):
-            return self._device.hear(request)
+            return self._device.receive(request)
         return self._device.speak()
 
     def _is_beyond(self, request: bytes) -> bool:

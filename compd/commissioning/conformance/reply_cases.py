@@ -15,10 +15,10 @@ from compd.commissioning.conformance.case_result import (
     Case,
     CaseResult,
     Subject,
-    complaints_of,
     faulty_polls,
     one_poll_each,
     result_of,
+    violations_of,
 )
 from compd.commissioning.conformance.damage_cases import fault_at, good_poll
 from compd.commissioning.conformance.harness import ConformanceSession
@@ -135,15 +135,15 @@ def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
     case = "another unit, or other settings"
     if why_not := _why_not(subject):
         return CaseResult(case, "", why_not, "-")
-    complaints: list[str] = []
+    violations: list[str] = []
     undetectable: list[str] = []
     tried = 0
     identity = (session.gauge.reply_identity or "").encode("latin-1")
     for reply in _replies(session):
         if reply.channels and (other := reply.text.without(identity)):
-            complaints.append(f"`reply_identity` is {identity!r}, and a reply is {other!r}")
+            violations.append(f"`reply_identity` is {identity!r}, and a reply is {other!r}")
         for forgery in [*reply.text.addresses(), *reply.text.identities(identity)]:
-            complaints += _taken(session, reply, forgery, reply.channels)
+            violations += _taken(session, reply, forgery, reply.channels)
             tried += 1
     requests = [exchange.request for exchange in good_poll(session)]
     another = subject.another
@@ -158,12 +158,12 @@ def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
         tried += 1
         poll = session.poll([faults.replaced(reply) for reply in replies])
         text = f"the reply of {who} with {setting}, {b', '.join(replies)!r}"
-        complaints += [f"{text}: {wrong}" for wrong in poll.wrong]
+        violations += [f"{text}: {wrong}" for wrong in poll.wrong]
         undetectable += [f"{text}: {wrong}" for wrong in poll.undetectable]
         session.recover()
     if not tried:
         return CaseResult(case, "", "the driver has no options that another unit would have otherwise", "-")
-    return result_of(case, NO_NUMBER, f"{tried} of them, no wrong number", complaints, undetectable)
+    return result_of(case, NO_NUMBER, f"{tried} of them, no wrong number", violations, undetectable)
 
 
 def _forged_replies(
@@ -181,16 +181,16 @@ def _forged_replies(
     """
     if why_not := _why_not(subject):
         return CaseResult(case, "", why_not, "-")
-    complaints: list[str] = []
+    violations: list[str] = []
     tried = 0
     for reply in _replies(session):
         for forged_set, channels in forgeries(reply):
             taken = [_taken(session, reply, forgery, channels) for forgery in forged_set]
-            complaints += taken[0] if all(taken) else []
+            violations += taken[0] if all(taken) else []
             tried += len(taken)
     if not tried:
         return CaseResult(case, "", none, "-")
-    return result_of(case, allowed, f"{tried} of them, {passed}", complaints)
+    return result_of(case, allowed, f"{tried} of them, {passed}", violations)
 
 
 def _why_not(subject: Subject) -> str:
@@ -202,9 +202,9 @@ def _why_not(subject: Subject) -> str:
 
 def _replies(session: ConformanceSession) -> Iterator[_Reply]:
     """Each reply of a poll without faults, with what is constant in it."""
-    heard = good_poll(session)
+    received = good_poll(session)
     sampled = [_values_at(session, sample) for sample in range(SAMPLES)]
-    for number, exchange in enumerate(heard):
+    for number, exchange in enumerate(received):
         replies = [session.replies.at([exchange], **values) for values in sampled]
         texts = [reply[0] if reply else b"" for reply in replies]
         length = most_frequent_length([text for text in texts if text])
@@ -235,9 +235,9 @@ def _taken(session: ConformanceSession, reply: _Reply, forgery: Forgery, channel
     A number that the device would itself have sent so is not wrong, nor one that is converted from another unit.
     """
     poll = session.poll(fault_at(reply.number, faults.replaced(forgery.reply)))
-    complaints = []
+    violations = []
     if Quality.DRIVER_ERROR in poll.qualities:
-        complaints.append(f"{forgery.what}: {poll}: {forgery.reply!r}")
+        violations.append(f"{forgery.what}: {poll}: {forgery.reply!r}")
     for channel, reading in zip(session.gauge.channels, poll.readings, strict=False):
         if channel.name not in channels or not reading.ok or poll.undetectable:
             continue
@@ -246,11 +246,11 @@ def _taken(session: ConformanceSession, reply: _Reply, forgery: Forgery, channel
             digit = forgery.factor * session.replies.digit[channel.name]
             if abs(reading.value - converted) <= digit:
                 continue
-        complaints.append(
+        violations.append(
             f"{forgery.what}: {channel.name} is {reading.value:.9g} {channel.unit}, ok, out of {forgery.reply!r}"
         )
-    complaints += [f"after {forgery.what}: {text}" for text in complaints_of(session.recover()[1], GOOD)]
-    return complaints[:1]
+    violations += [f"after {forgery.what}: {text}" for text in violations_of(session.recover()[1], GOOD)]
+    return violations[:1]
 
 
 def _other_digits(reply: bytes) -> Iterator[bytes]:

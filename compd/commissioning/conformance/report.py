@@ -54,14 +54,14 @@ class DriverUnderTest:
         return "DTR" in self.gauge(self.options).serial_signals
 
     @property
-    def unasked(self) -> bool:
+    def unsolicited(self) -> bool:
         """Whether its device speaks without being asked."""
         device = self.simulator(self.options, lambda channel: 0.0)
         return not self.registers and not self.by_dtr and bool(device.speak())
 
     def kinds(self) -> tuple[Kind, ...]:
         """The kinds of line of this computer on which it can be tried."""
-        if self.by_dtr or self.unasked:
+        if self.by_dtr or self.unsolicited:
             return ()
         return ("modbus_rtu", "modbus_tcp") if self.registers else ("serial", "tcp")
 
@@ -69,7 +69,7 @@ class DriverUnderTest:
         checksum = self.registers or self.gauge.integrity == "checksum"
         errors = self.error_replies
         return Subject(
-            self.registers, over_tcp, checksum, exact, errors, self.unasked, self.options, self._with_options
+            self.registers, over_tcp, checksum, exact, errors, self.unsolicited, self.options, self._with_options
         )
 
     def peer(self, over_tcp: bool = False) -> tuple[Peer, SensorValues]:
@@ -84,7 +84,7 @@ class DriverUnderTest:
     def virtual_with_wire(self, character_s: float = 0.0) -> tuple[ConformanceSession, VirtualWire]:
         """The same, and the wire, whose time can pass between polls."""
         peer, sensors = self.peer()
-        wire = VirtualWire(peer, self.registers, character_s=character_s, unasked=self.unasked)
+        wire = VirtualWire(peer, self.registers, character_s=character_s, unsolicited=self.unsolicited)
         return self._session(wire, sensors), wire
 
     def real(self, kind: Kind, directory: Path, **settings: Any) -> ConformanceSession:
@@ -148,13 +148,13 @@ def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iter
                 return
         slow = driver.virtual(CHARACTER_BITS / SLOWEST_BAUD)
         yield "virtual time", slowest_line(slow, SLOWEST_BAUD)
-        if driver.unasked:
+        if driver.unsolicited:
             yield "virtual time", opened_within_a_line(*driver.virtual_with_wire(CHARACTER_S))
             yield "virtual time", seldom_read(*driver.virtual_with_wire())
         if not on_real_wires:
             return
         if not driver.kinds():
-            why = "a pty and TCP have no DTR" if driver.by_dtr else "a device that speaks unasked: in virtual time"
+            why = "a pty and TCP have no DTR" if driver.by_dtr else "unsolicited readings are tried in virtual time"
             yield "ptys, ports", CaseResult("on ptys and TCP ports", "", why, "-")
             return
         for kind in driver.kinds():

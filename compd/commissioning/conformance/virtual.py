@@ -16,7 +16,7 @@ from compd.lines.stream import StreamLine
 TURNAROUND_S = 1e-3  # from the last bit of a request to the first of the reply
 GAP_S = 2e-3  # silence before a request, as `open_line` keeps it at 19200 baud and below
 
-# Between two lines of a device that speaks unasked, in line timeouts: the line's own timeout must be longer.
+# Time between two unsolicited lines, in line timeouts; the line's own timeout must be longer.
 PAUSE_TIMEOUTS = 0.8
 
 
@@ -40,15 +40,15 @@ class VirtualWire:
     exact = True
 
     def __init__(
-        self, peer: Peer, registers: bool, timeout_s: float = 0.1, character_s: float = 0.0, unasked: bool = False
+        self, peer: Peer, registers: bool, timeout_s: float = 0.1, character_s: float = 0.0, unsolicited: bool = False
     ) -> None:
-        """unasked : the device speaks by itself, with `pause_s` between two lines."""
+        """unsolicited : the device speaks by itself, with `pause_s` between two lines."""
         self.peer = peer
         self.clock = VirtualClock()
         self.timeout_s = timeout_s
         self.character_s = character_s
         self.plugged = True
-        self.pause_s = PAUSE_TIMEOUTS * timeout_s if unasked else 0.0
+        self.pause_s = PAUSE_TIMEOUTS * timeout_s if unsolicited else 0.0
         self._speaks_s = self.clock.now_s + self.pause_s  # next
         self._dtr_fell_s: float | None = None
         self._registers = registers
@@ -78,8 +78,8 @@ class VirtualWire:
 
     def carry(self, request: bytes) -> None:
         """To the device; its reply gets under way."""
-        heard_s = self.clock.now_s + len(request) * self.character_s
-        self._send(self.peer.answer(request, heard_s, self.timeout_s), heard_s + TURNAROUND_S)
+        received_s = self.clock.now_s + len(request) * self.character_s
+        self._send(self.peer.answer(request, received_s, self.timeout_s), received_s + TURNAROUND_S)
 
     def set_dtr(self, high: bool) -> None:
         """A device that is asked by DTR answers when it is HIGH again, and may have sampled as soon as it fell."""
@@ -97,7 +97,7 @@ class VirtualWire:
             self._speak()
 
     def _speak(self) -> None:
-        """The next line of a device that speaks unasked."""
+        """The next line of a device that sends unsolicited readings."""
         begins_s = self._speaks_s
         pieces = self.peer.answer(b"", begins_s, self.timeout_s, self.pause_s)
         self._send(pieces, begins_s)

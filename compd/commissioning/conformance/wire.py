@@ -101,7 +101,7 @@ class RealWire:
             ready, _, _ = select.select([self._wake_read, *fds], [], [], self._deliver())
             for fd in ready:
                 if fd != self._wake_read and self._end is not None:
-                    self._hear(self._end, fd)
+                    self._receive(self._end, fd)
             if self._wake_read in ready:
                 os.read(self._wake_read, 1)
                 self._set_plug(self._plugged)
@@ -120,16 +120,16 @@ class RealWire:
             self._end = None
             self._arriving.clear()
 
-    def _hear(self, end: End, fd: int) -> None:
+    def _receive(self, end: End, fd: int) -> None:
         data = end.read(fd)
         if not data:  # a client that comes or goes: nothing is under way to it
             self._arriving = [item for item in self._arriving if item[2] != fd]
             heapq.heapify(self._arriving)
             return
         # A pty passes a request on at once; on a wire it takes its time.
-        heard_s = self.clock.monotonic() + len(data) * self.character_s
-        for piece in self.peer.answer(data, heard_s, self.timeout_s):
-            due_s = heard_s + TURNAROUND_S + piece.delay_s
+        received_s = self.clock.monotonic() + len(data) * self.character_s
+        for piece in self.peer.answer(data, received_s, self.timeout_s):
+            due_s = received_s + TURNAROUND_S + piece.delay_s
             for byte in piece.data if self._baud < FAST_BAUD else ():
                 due_s += self.character_s
                 heapq.heappush(self._arriving, (due_s, next(self._order), fd, bytes([byte])))

@@ -20,7 +20,7 @@ LINE_ENDS = b"\r\n\x03\x04"
 
 
 class CapturedReply(NamedTuple):
-    """A request, b"" where the device spoke unasked, and what came after it."""
+    """A request, b"" for unsolicited data, and what came after it."""
 
     request: bytes
     reply: bytes
@@ -93,7 +93,7 @@ def capture_live(
 ) -> list[CapturedReply]:
     """`wanted` replies, captured on the wire.
 
-    out : the request with escapes: everything until silence is its reply. "" for a device that speaks unasked, whose
+    out : the request with escapes: everything until silence is its reply. "" for unsolicited data, whose
         whole lines are replies, each the first that begins after `between`.
     between : called between two captures with (captured so far, wanted): the person moves the gauge meanwhile.
     show : called with a line of text for all bytes that pass.
@@ -109,19 +109,19 @@ def capture_live(
         line = open_tapped_stream(settings, MonotonicClock(), show_bytes)
         try:
             while len(captured) < wanted:
-                reply = _reply_until_silence(line, request) if request else _line_unasked(line)
+                reply = _reply_until_silence(line, request) if request else _line_unsolicited(line)
                 captured.append(CapturedReply(request, reply))
                 if len(captured) < wanted:
                     between(len(captured), wanted)
         finally:
             line.close()
     except LineFault as fault:
-        unasked = "--timeout longer than the period of a device that speaks unasked, or --out with the request it wants"
+        hint = "--timeout longer than the period of unsolicited readings, or --out with the device's request"
         raise CompdError(
             Problem(
                 where=str(getattr(settings, "port", settings)),
                 what=f"reply {len(captured) + 1}: {fault}",
-                next_step="check port, baud, format" + (", request and its terminator" if request else f"; {unasked}"),
+                next_step="check port, baud, format" + (", request and its terminator" if request else f"; {hint}"),
             )
         ) from fault
     return captured
@@ -138,11 +138,13 @@ def _reply_until_silence(line: StreamLine, request: bytes) -> bytes:
             if fault.quality is not Quality.TIMEOUT or not reply:
                 raise
             return reply
-    raise LineFault(Quality.MISMATCH, f"no silence within {LONGEST_REPLY} bytes: if it speaks unasked, leave out --out")
+    raise LineFault(
+        Quality.MISMATCH, f"no silence within {LONGEST_REPLY} bytes: leave out --out for unsolicited readings"
+    )
 
 
-def _line_unasked(line: StreamLine) -> bytes:
-    """The first whole line of a device that speaks unasked: up to its terminator, or between two silences.
+def _line_unsolicited(line: StreamLine) -> bytes:
+    """The first whole line of a device that sends unsolicited readings: up to its terminator, or between two silences.
 
     Raises LineFault: TIMEOUT when nothing comes, MISMATCH for bytes without an end.
     """

@@ -17,7 +17,7 @@ FEWEST_REPLIES = 3
 class ObservedExchange:
     """A request, and the columns of its replies.
 
-    request : as bytes; b"" for a device that speaks unasked. columns : text and numbers in turn. numbers : the columns
+    request : as bytes; b"" for unsolicited data. columns : text and numbers in turn. numbers : the columns
     that may be channels. mark : the decimal mark. end : the converter of what ends every reply, a checksum, or "".
     problems : what is to be asked of the replies as a whole. notes : on what was taken for granted.
     """

@@ -74,7 +74,7 @@ class _RepeatedReplies:
     def next_line(
         self, terminator: bytes, limit: int, timeout_s: float | None = None, gap_timeout_s: float | None = None
     ) -> tuple[bytes, float]:
-        """A device that speaks unasked says it again and again."""
+        """A device that sends unsolicited readings says it again and again."""
         if not self._waiting:
             self._waiting = self._replies[b""]
         return self.receive_until(terminator, limit)[: -len(terminator)], 0.0

@@ -26,7 +26,7 @@ class GaugeTrust:
         self._first: Sequence[Reading | None] = ()
         self._shortest_s = math.inf
         self._window_s = 0.0
-        self._surprising: dict[int, Reading] = {}  # by place: came unasked, and waits for the next
+        self._surprising: dict[int, Reading] = {}  # by place: came unsolicited, and waits for the next
 
     def read(self, ask: Callable[[], Sequence[Reading]]) -> Sequence[Reading]:
         """The readings of one poll by `ask`, or of a second one where a value is not where its last readings lead.
@@ -65,8 +65,8 @@ class GaugeTrust:
             judged.append(reading)
         return judged
 
-    def hear(self, place: int, reading: Reading, window_s: float, now_s: float) -> Reading:
-        """A reading of the channel number `place` that came unasked, as it may be published.
+    def receive(self, place: int, reading: Reading, window_s: float, now_s: float) -> Reading:
+        """A reading of the channel number `place` that came unsolicited, as it may be published.
 
         Nobody can ask again: where a value is not where its last readings lead, the next reading is the second answer.
         window_s : by how much later than its time it may have been measured, s.

@@ -20,7 +20,7 @@ log = structlog.get_logger()
 
 _NO_TRUST: Mapping[str, Judge] = {}
 # Faults of the wire: the next poll may well be answered, and the last good reading says what it said.
-MAY_PASS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
+TRANSIENT_FAULTS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
 # Faults of a reply that came. The line is silent again soon; so many in a row are no interference.
 MOST_DAMAGED = 10
 DAMAGED = (Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
@@ -28,7 +28,7 @@ DAMAGED = (Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
 LONGEST_REST_S = 0.9
 # How far ahead of now, s, the time of a reading may be: `send` returns when the last bit will have left. One further
 # ahead is of another clock.
-AHEAD_S = 0.05
+MAX_CLOCK_AHEAD_S = 0.05
 
 
 class BackOff:
@@ -96,7 +96,7 @@ class PolledGauge:
         self._slots = [latest.index[channel] for channel in channels]
         self._trust = GaugeTrust([trust.get(channel) for channel in channels], clock)
         self._published = [bad(-math.inf, Quality.NEVER_READ)] * len(self._slots)
-        self._heard = list(self._published)  # the newest of each channel, where they come unasked
+        self._received = list(self._published)  # the newest of each channel, where they come unsolicited
         self._logged = Quality.NEVER_READ
 
     def read(self, line: Any, latched_s: float | None = None) -> Sequence[Reading]:
@@ -120,22 +120,22 @@ class PolledGauge:
             self._publish_unless_kept(place, reading, now_s)
         self._count(readings, readings, now_s)
 
-    def hear(self, heard: Sequence[Heard], now_s: float) -> None:
-        """Publish what its device has sent unasked, for some of its channels, and count it as a poll.
+    def receive(self, received: Sequence[Heard], now_s: float) -> None:
+        """Publish what its device has sent unsolicited, for some of its channels, and count it as a poll.
 
         A value that is too old to be used when it comes is stale. Raises ValueError as `put` does.
         """
-        if not heard:
+        if not received:
             return
-        for each in heard:
+        for each in received:
             _check(each.reading, now_s)
         judged = []
-        for each in heard:
-            reading = self._trust.hear(each.place, self._if_young(each.reading, now_s), each.window_s, now_s)
-            self._heard[each.place] = reading
+        for each in received:
+            reading = self._trust.receive(each.place, self._if_young(each.reading, now_s), each.window_s, now_s)
+            self._received[each.place] = reading
             self._publish_unless_kept(each.place, reading, now_s)
             judged.append(reading)
-        self._count(judged, self._heard, now_s)
+        self._count(judged, self._received, now_s)
 
     def _if_young(self, reading: Reading, now_s: float) -> Reading:
         age_s = now_s - reading.time_s
@@ -160,7 +160,7 @@ class PolledGauge:
     def fail(self, quality: Quality, detail: str, now_s: float) -> None:
         """Count a poll that failed as a whole, at the monotonic time `now_s` (s).
 
-        A reading that is still good stays after a fault that may pass (`MAY_PASS`); every other channel takes
+        A reading that is still good stays after a fault that may pass (`TRANSIENT_FAULTS`); every other channel takes
         `quality`. After a missing reply, more than MOST_DAMAGED damaged ones in a row, or the second other fault, the
         gauge rests for one timeout of the line, then for twice as long each time: a late reply has time to come and go,
         and the others are not slowed.
@@ -189,8 +189,8 @@ class PolledGauge:
         self._trust.fail(quality, now_s)
         self.faults[quality] += 1
         for place in range(len(self._slots)):
-            self._heard[place] = bad(now_s, quality, detail)
-            self._publish(place, self._heard[place])
+            self._received[place] = bad(now_s, quality, detail)
+            self._publish(place, self._received[place])
         self._note(quality, detail)
         self._log_change()
 
@@ -205,7 +205,7 @@ class PolledGauge:
     def _publish_unless_kept(self, place: int, reading: Reading, now_s: float) -> bool:
         """Publish a reading, but no fault that may pass while the last reading is good; whether that was kept."""
         last = self._published[place]
-        if reading.quality in MAY_PASS and self._is_fresh(last, now_s):
+        if reading.quality in TRANSIENT_FAULTS and self._is_fresh(last, now_s):
             return True
         self._publish(place, reading)
         return False
@@ -245,7 +245,7 @@ class PolledGauge:
 
 def _check(reading: Reading, now_s: float) -> None:
     """Raises ValueError for a reading that cannot be: a defect of the driver."""
-    if not reading.time_s <= now_s + AHEAD_S:
+    if not reading.time_s <= now_s + MAX_CLOCK_AHEAD_S:
         raise ValueError(f"reading of time {reading.time_s}, it is {now_s}")
     if reading.ok and not math.isfinite(reading.value):
         raise ValueError(f"{reading.value} given as ok")

@@ -32,7 +32,7 @@ FASTEST_ROUND_S = 2e-3
 NOT_LATCHED_S = -math.inf
 # Faults after which no byte of a reply can follow. After all others the line is drained, or the rest of a reply would
 # be taken for the answer to the next request.
-NOTHING_UNDER_WAY = (Quality.LINE_LOST, Quality.DEVICE_ERROR, Quality.SILENT)
+NO_REPLY_PENDING = (Quality.LINE_LOST, Quality.DEVICE_ERROR, Quality.SILENT)
 
 
 class OpenLine(Protocol):
@@ -164,7 +164,7 @@ class PolledRound:
             now_s = self._clock.monotonic()
             self._back_off.succeeded()
             self._absent.answered(gauge, now_s)
-            # a device that speaks unasked has no late replies
+            # a device that sends unsolicited readings has no late replies
             asked_s = line.last_request_s
             if asked_s > before_s and self._order.in_doubt(now_s):
                 self._waiting.append((gauge, readings, now_s - asked_s))
@@ -244,7 +244,7 @@ class PolledRound:
     def _fail(self, gauge: PolledGauge, line: OpenLine, quality: Quality, detail: str) -> None:
         """Raises LineFault (LINE_LOST)."""
         failed_s = self._clock.monotonic()
-        if quality in NOTHING_UNDER_WAY:
+        if quality in NO_REPLY_PENDING:
             gauge.fail(quality, detail, failed_s)
             return
         # A silence as long as the timeout has been kept already. It is kept once more where nothing else would tell a

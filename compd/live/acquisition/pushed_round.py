@@ -25,7 +25,7 @@ LONGEST_WAIT_S = 0.1
 class _Listener:
     """One channel that wants an address.
 
-    heard_s : when it was heard last, or its silence counted, monotonic, s. quality : of what it read last.
+    received_s : when it was received last, or its silence counted, monotonic, s. quality : of what it read last.
     """
 
     gauge: PolledGauge
@@ -33,7 +33,7 @@ class _Listener:
     place: int
     address: str
     stale_after_s: float
-    heard_s: float = math.nan
+    received_s: float = math.nan
     quality: Quality = Quality.NEVER_READ
 
 
@@ -67,11 +67,11 @@ class PushedRound:
         self._noted: dict[str, bool] = {}  # by gauge: whether its clock was wrong
 
     def opened(self) -> None:
-        """The line has been opened: nothing is subscribed to, and nothing was heard on it."""
+        """The line has been opened: nothing is subscribed to, and nothing was received on it."""
         self._subscribe_s = -math.inf
         now_s = self._clock.monotonic()
         for listener in self._listeners:
-            listener.heard_s, listener.quality = now_s, Quality.NEVER_READ
+            listener.received_s, listener.quality = now_s, Quality.NEVER_READ
 
     def lost(self) -> None:
         """The line is lost; nothing waits to be published."""
@@ -94,24 +94,24 @@ class PushedRound:
         for gauge, driver in {id(each.gauge): (each.gauge, each.driver) for each in listeners}.values():
             now_s = self._clock.monotonic()
             try:
-                heard = driver.hear(message)
-                gauge.hear(heard, now_s)
+                received = driver.receive(message)
+                gauge.receive(received, now_s)
             except MemoryError:  # it is the whole process that has none left
                 raise
             except Exception as error:  # noqa: BLE001  of a driver; it must not end the line's thread
                 gauge.fail(Quality.DRIVER_ERROR, gauge.driver_error(error), now_s)
                 continue
-            self._note_clock(gauge, heard)
+            self._note_clock(gauge, received)
             for listener in listeners:
-                for each in heard:
+                for each in received:
                     if listener.gauge is gauge and listener.place == each.place:
-                        listener.heard_s, listener.quality = now_s, each.reading.quality
+                        listener.received_s, listener.quality = now_s, each.reading.quality
 
-    def _note_clock(self, gauge: PolledGauge, heard: Sequence[Heard]) -> None:
+    def _note_clock(self, gauge: PolledGauge, received: Sequence[Heard]) -> None:
         """Log once that the clock of a source is wrong, and once that it is right again."""
-        if not heard or not heard[-1].reading.ok:
+        if not received or not received[-1].reading.ok:
             return
-        note = heard[-1].note
+        note = received[-1].note
         if bool(note) != self._noted.get(gauge.name, False):
             self._noted[gauge.name] = bool(note)
             log_change = log.warning if note else log.info
@@ -120,11 +120,11 @@ class PushedRound:
     def _note_silence(self) -> None:
         now_s = self._clock.monotonic()
         for listener in self._listeners:
-            if now_s - listener.heard_s <= listener.stale_after_s:
+            if now_s - listener.received_s <= listener.stale_after_s:
                 continue
-            listener.heard_s = now_s
+            listener.received_s = now_s
             if listener.quality in (Quality.OK, Quality.NEVER_READ, Quality.TIMEOUT):
                 hint = listener.driver.silence_hint
                 text = f"nothing new on {listener.address} for {listener.stale_after_s:g} s{'; ' if hint else ''}{hint}"
-                listener.gauge.hear([Heard(listener.place, bad(now_s, Quality.TIMEOUT, text))], now_s)
+                listener.gauge.receive([Heard(listener.place, bad(now_s, Quality.TIMEOUT, text))], now_s)
                 listener.quality = Quality.TIMEOUT

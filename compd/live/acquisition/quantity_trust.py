@@ -92,8 +92,8 @@ class QuantityTrust:
         memory.show(i, reading.value, reading.time_s)
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
             return self._accepted(reading, first)
-        if memory.voted[i] != memory.heard[i]:
-            memory.heard[i] = memory.voted[i]
+        if memory.voted[i] != memory.handled[i]:
+            memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
         if Doubt(int(memory.doubt[i])).until_accepted:
             return bad(reading.time_s, Quality.DISTRUSTED, memory.explanation(i))
@@ -132,7 +132,7 @@ class QuantityTrust:
         if fault is None and (unconfirmed := self._unconfirmed((reading, first))):
             return unconfirmed
         memory.end_order(i)
-        memory.heard[i] = memory.voted[i]
+        memory.handled[i] = memory.voted[i]
         return self._distrusted(reading, fault) if fault else self._from(reading.value, reading)
 
     def _begin(self, reading: Reading, answers: tuple[Reading, ...]) -> Reading:

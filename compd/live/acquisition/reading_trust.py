@@ -137,10 +137,10 @@ class ReadingTrust:
             begun = self._begin(reading, sample, first)
             if begun.ok or memory.suspected[i]:
                 memory.end_order(i)
-                memory.heard[i] = memory.voted[i]
+                memory.handled[i] = memory.voted[i]
             return begun
-        if memory.voted[i] != memory.heard[i]:
-            memory.heard[i] = memory.voted[i]
+        if memory.voted[i] != memory.handled[i]:
+            memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
         back_s = self._after[0].time_s if self._after else sample.time_s
         if memory.doubt[i] == Doubt.NONE and back_s - memory.time_s[i] > self._settings.stale_after_s:

@@ -206,9 +206,9 @@ class Workbench:
         """
         self._check(revision)
         known = set(self.opened.aligned.recording.row.tolist())
-        if strangers := [row for row in rows if row not in known]:
+        if unknown_rows := [row for row in rows if row not in known]:
             raise RecordingError(
-                Problem(where=f"row {strangers[0]}", what="is not in the recording", allowed="rows of the recording")
+                Problem(where=f"row {unknown_rows[0]}", what="is not in the recording", allowed="rows of the recording")
             )
         return self._with_other_rows(lambda: exclude_rows(self._path, rows, reason))
 

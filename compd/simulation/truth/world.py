@@ -163,9 +163,9 @@ class World:
         Quantities that are not named are not held; a load component that is not named is 0.
         """
         parts_degC = {name: degC for name, degC in quantities.items() if name.startswith("temperature_")}
-        parts_degC.pop("temperature_room_degC", None)  # held by the weather
+        parts_degC.pop("temperature_room_degC", None)  # controlled: the weather has it
         self._warm.hold({name[len("temperature_") : -len("_degC")]: degC for name, degC in parts_degC.items()})
-        self._weather.held = quantities
+        self._weather.controlled = quantities
         self.force_M_N = np.array([quantities.get(f"force_{axis}_N", 0.0) for axis in "xyz"])
 
     def command(self, scale_mm: Sequence[float]) -> None:
@@ -329,7 +329,7 @@ class World:
         """Release what the plan holds, except for a load."""
         if self.plan_motion:
             self._warm.hold({})
-            self._weather.held = {}
+            self._weather.controlled = {}
 
     def _solve(self, scale_mm: FloatArray, guess: Posture) -> EquilibriumState:
         return self._equilibrium.solve(scale_mm, guess, self.force_M_N)

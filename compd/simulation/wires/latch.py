@@ -44,7 +44,7 @@ class _LatchedSense:
 
 
 class _Listener(Protocol):
-    def hear(self, data: bytes) -> bytes: ...
+    def receive(self, data: bytes) -> bytes: ...
 
 
 class TriggeredDevices:
@@ -55,18 +55,18 @@ class TriggeredDevices:
         self._devices = devices
         self._trigger = trigger
         self._latch = latch
-        self._heard = b""
+        self._received = b""
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         """Receive bytes, in pieces of any size; the replies to complete requests."""
-        *before, rest = (self._heard + data).split(self._trigger)
+        *before, rest = (self._received + data).split(self._trigger)
         replies = b""
         for requests in before:
-            replies += self._devices.hear(requests)
+            replies += self._devices.receive(requests)
             self._latch.close()
         begun = next(
             n for n in range(min(len(rest), len(self._trigger) - 1), -1, -1) if rest.endswith(self._trigger[:n])
         )
         end = len(rest) - begun
-        self._heard = rest[end:]
-        return replies + (self._devices.hear(rest[:end]) if end else b"")
+        self._received = rest[end:]
+        return replies + (self._devices.receive(rest[:end]) if end else b"")

@@ -56,7 +56,7 @@ class ModbusSlaves:
         self._framer = (FramerAscii if as_text else FramerSocket if over_tcp else FramerRTU)(DecodePDU(True))
         self._received = b""
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         """Receive bytes, in pieces of any size; returns the replies to complete requests."""
         self._received += data
         replies = b""

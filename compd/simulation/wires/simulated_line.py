@@ -82,7 +82,7 @@ DAMAGES: Mapping[str, Mapping[str, Damage]] = {
 class Listener(Protocol):
     """Receives a line's bytes and returns replies."""
 
-    def hear(self, data: bytes) -> bytes: ...
+    def receive(self, data: bytes) -> bytes: ...
 
 
 class ByteDevices:
@@ -91,8 +91,8 @@ class ByteDevices:
     def __init__(self, devices: Sequence[SimulatedByteDevice]) -> None:
         self._devices = devices
 
-    def hear(self, data: bytes) -> bytes:
-        return b"".join(device.hear(data) for device in self._devices)
+    def receive(self, data: bytes) -> bytes:
+        return b"".join(device.receive(data) for device in self._devices)
 
 
 @dataclass
@@ -216,7 +216,7 @@ class SimulatedLine:
                     os.read(fd, 4096)
                     self._apply_fault()
                 elif self._end is not None:
-                    self._hear(self._end, fd)
+                    self._receive(self._end, fd)
         self._pull_out()
 
     def _apply_fault(self) -> None:
@@ -227,9 +227,9 @@ class SimulatedLine:
             self._plug_in()
         self._applied.set()
 
-    def _hear(self, end: End, fd: int) -> None:
+    def _receive(self, end: End, fd: int) -> None:
         data = end.read(fd)
-        reply = self._listener.hear(data)
+        reply = self._listener.receive(data)
         if not reply:
             return
         self.replies += 1

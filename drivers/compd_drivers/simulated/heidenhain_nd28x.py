@@ -14,7 +14,7 @@ MM_IN_AN_INCH = 25.4
 class SimulatedNd28x(SimulatedByteDevice):
     """Shows its channel `position`; a sensor that is off gives the unit `?`."""
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         """One reply for every STX among the bytes; anything else is not for this display."""
         return b"".join(self._shown() for byte in data if byte == 0x02)
 

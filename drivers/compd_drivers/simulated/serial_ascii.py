@@ -40,7 +40,7 @@ class SimulatedAscii(SimulatedByteDevice):
         for out, form in [(options.out, options.in_), *((request.out, request.in_) for request in options.requests)]:
             if out:
                 self._replies[(plain(out) + end).encode("latin-1")] = form
-        self._heard = b""
+        self._received = b""
 
     @property
     def error_replies(self) -> dict[bytes, str]:
@@ -48,8 +48,8 @@ class SimulatedAscii(SimulatedByteDevice):
         end = plain(self.options.in_terminator)
         return {(self._printed(error.in_, {}) + end).encode("latin-1"): error.quality for error in self.options.errors}
 
-    def hear(self, data: bytes) -> bytes:
-        self._heard += data
+    def receive(self, data: bytes) -> bytes:
+        self._received += data
         replies = ""
         while asked := self._next():
             replies += self._answer(self._replies[asked])
@@ -61,13 +61,13 @@ class SimulatedAscii(SimulatedByteDevice):
 
     def _next(self) -> bytes:
         """The first whole request in what was heard, taken out of it."""
-        places = {request: self._heard.find(request) for request in self._replies}
+        places = {request: self._received.find(request) for request in self._replies}
         requests = {request: place for request, place in places.items() if place >= 0}
         if not requests:
-            self._heard = self._heard[-max(map(len, self._replies), default=0) :]
+            self._received = self._received[-max(map(len, self._replies), default=0) :]
             return b""
         first = min(requests, key=lambda request: (requests[request], -len(request)))
-        self._heard = self._heard[requests[first] + len(first) :]
+        self._received = self._received[requests[first] + len(first) :]
         return first
 
     def _answer(self, form: str) -> str:

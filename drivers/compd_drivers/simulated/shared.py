@@ -23,10 +23,10 @@ class CommandDevice(SimulatedByteDevice):
 
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
-        self._heard = b""
+        self._received = b""
 
-    def hear(self, data: bytes) -> bytes:
-        *commands, self._heard = (self._heard + data).split(self.terminator)
+    def receive(self, data: bytes) -> bytes:
+        *commands, self._received = (self._received + data).split(self.terminator)
         return b"".join(self.answer(command.decode("ascii", "ignore")).encode("ascii") for command in commands)
 
     @abstractmethod

@@ -25,11 +25,11 @@ class SimulatedMyGauge(SimulatedByteDevice):
 
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
-        self._heard = b""
+        self._received = b""
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         """One reply for every request that is complete; bytes may come in any pieces."""
-        *requests, self._heard = (self._heard + data).split(b"\r")
+        *requests, self._received = (self._received + data).split(b"\r")
         return b"".join(self._shown() for request in requests if request.endswith(b"?"))
 
     def _shown(self) -> bytes:
