@@ -1,8 +1,8 @@
-"""The interface between compd and a driver whose device speaks by itself: it sends values, and nobody asks for them.
+"""The interface between compd and a driver whose device pushes its values without a request.
 
-The line's thread hands every message to `receive`, which says what the driver's channels read by it. A driver implements
-`channels` and `addresses`, and `decode`; `stamp` where the time of measurement stands in the message itself. When a
-value was measured is worked out here, from that time or from the message's arrival (`compd.source_time`).
+The line's thread hands every message to `receive`, which returns the readings of the driver's channels. A driver
+implements `channels`, `addresses` and `decode`; also `stamp` if the message contains the time of measurement. The time
+of a value is derived here, from that time or from the message's arrival (`compd.source_time`).
 """
 
 from __future__ import annotations

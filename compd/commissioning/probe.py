@@ -96,7 +96,10 @@ def announcements(path: str, candidates: Sequence[PresetCandidate]) -> Iterator[
     The presets that speak text come first: what is no text may leave an instrument in a state of its own.
     """
     if received := _received(path):
-        yield f"unsolicited data, {shown(received)}: nothing was sent; `compd gauge learn` with its baud rate"
+        yield (
+            f"a device sends unsolicited data, {shown(received)}: nothing was sent; "
+            "`compd gauge learn` with its baud rate"
+        )
         return
     outcomes = [probe_port(path, candidate) for candidate in sorted(candidates, key=lambda c: c.on_registers)]
     text = [outcome for outcome in outcomes if outcome.fits and not outcome.candidate.on_registers]

@@ -1,4 +1,4 @@
-"""A diagnosis in a worker: the state that its questions are asked of."""
+"""A diagnosis in a worker: the state behind its questions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from compd.diagnosis.verdict import Diagnosis
 from compd.page.workbench.evidence import evidence
 from compd.page.workbench.opened_recording import model_of
 
-# Columns of the text, as on a terminal of usual width.
+# Width of the text in columns, as on a usual terminal.
 _WIDTH = 100
 
 
@@ -33,13 +33,13 @@ class Diagnosing:
         effects: Sequence[str] = (),
         kept: None = None,
     ) -> None:
-        """Arguments as of `DiagnosisJob`. Raises CompdError where the recording or the model cannot be opened."""
+        """Arguments as for `DiagnosisJob`. Raises CompdError if the recording or the model cannot be opened."""
         self._aligned, self._recorded_rows = open_whole_or_sample(path, machine)
         self._model, self._effects = model_of(model_path, self._aligned), effects
         self._diagnosis: Diagnosis | None = None
 
     def outcome(self, progress: Callable[[str], None]) -> dict[str, Any]:
-        """What it finds: `text`, `result` and `evidence`. progress : called with each step as it begins."""
+        """The findings: `text`, `result` and `evidence`. progress : called with each step as it begins."""
         self._diagnosis = diagnose(self._aligned, self._model, effects=self._effects, progress=progress)
         return {
             "text": _text(self._diagnosis),
@@ -48,7 +48,7 @@ class Diagnosing:
         }
 
     def page(self) -> bytes:
-        """The page of what was found, compressed: the script for its figures is some megabytes."""
+        """The page of the findings, compressed: the script for its figures is some megabytes."""
         from compd.report.diagnosis_page import write_diagnosis_page
 
         assert self._diagnosis is not None

@@ -1,4 +1,4 @@
-"""A simulated measuring campaign as files: the recording with its sidecar, and what was hidden, under seal."""
+"""A simulated measuring campaign as files: recording, sidecar, and the sealed answer of the hidden causes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
 
 @dataclass(frozen=True)
 class CampaignFiles:
-    """What a simulated campaign wrote.
+    """Files and figures of a simulated campaign.
 
     Attributes
     ----------

@@ -40,7 +40,7 @@ class Weather:
     """An air-conditioned laboratory: sums of slow waves with seeded phases.
 
     at_zero : at time 0.
-    controlled : quantities that a climate chamber holds, by name with unit; they replace the waves.
+    controlled : values held by a climate chamber, by name with unit; they replace the waves.
     """
 
     def __init__(self, swing_K: float, rng: np.random.Generator, at_zero: AirAtZero = STANDARD_AIR) -> None:

@@ -61,7 +61,7 @@ class SimulatedRegisterDevice(ABC):
 
 
 class SimulatedPushedDevice(ABC):
-    """A device that speaks by itself; its line sends what it says.
+    """A device that pushes its values; its line sends them.
 
     period_s : how often it has something to say, s; None: as the line does.
     """

@@ -233,13 +233,13 @@ class SimulatedLine:
         if not reply:
             return
         self.replies += 1
-        # transmission of the request takes time as well
+        # transmission of the request takes time, too
         start_s = self._clock.monotonic() + len(data) * self._character_s
         if self._fault is not None:
             reply = self._damages[self._fault](reply)
         if self._fault == "late":
             start_s += LATE_TIMEOUTS * self._settings.timeout_s
-        if self._replies:  # in order, also behind a late one
+        if self._replies:  # in order, even behind a late one
             start_s = max(start_s, self._end_s(self._replies[-1]))
         self._replies.append(_Reply(start_s, fd, reply))
 
