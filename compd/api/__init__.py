@@ -1,1 +1,1 @@
-"""The public functions that put several rooms together: what `import compd` and the commands offer."""
+"""The public functions that combine several packages, for `import compd` and the commands."""

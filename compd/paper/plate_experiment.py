@@ -18,7 +18,7 @@ from compd.simulation.truth.probing import probe_ball
 from compd.simulation.truth.world import World
 from compd.units import UM_PER_MM
 
-# Time that a person takes per ball; rounds over the whole plate, there and back.
+# Time (s) that a person takes per ball, and rounds over the whole plate, there and back.
 PER_BALL_S = 30.0
 ROUNDS = 2
 

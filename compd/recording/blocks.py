@@ -53,7 +53,7 @@ def recording_blocks(
 
 
 def row_count(path: Path) -> int:
-    """Rows of a recording's table, empty ones with the others: Parquet says how many, lines of CSV are counted.
+    """Number of rows of a recording's table, including empty ones: from Parquet's metadata, or counted in CSV.
 
     path : NAME.csv, NAME.parquet, or NAME.yaml. Raises RecordingError for a file that cannot be read.
     """

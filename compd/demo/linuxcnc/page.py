@@ -1,4 +1,4 @@
-"""What the demonstration in LinuxCNC gained: a table for the terminal, a sentence, and a page with a picture."""
+"""Result of the demonstration in LinuxCNC: a table for the terminal, a sentence, and a page with a picture."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def summarise(demo: LinuxCncDemo) -> TerminalTable:
 
 
 def verdict(demo: LinuxCncDemo) -> str:
-    """The result in one sentence. The whole program counts where it has no rests."""
+    """The result in one sentence, for the rests or, without rests, for the whole program."""
     errors = demo.errors.values()
     resting = all(len(run.at_rest_um) for run in errors)
     parts = [
