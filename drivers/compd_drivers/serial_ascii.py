@@ -99,7 +99,7 @@ class SerialAscii(Gauge[ByteLine]):
         self._fixed_length = all(form.length is not None for form in forms)
         forms += [form for form, _ in self._description.errors]
         self._limit = max(form.longest for form in forms) + len(self._description.terminator)
-        self._ready_on: ByteLine | None = None  # the connection on which `init` was said
+        self._ready_on: ByteLine | None = None  # the connection on which `init` was sent
         self._until_echo = 0
         self._silence = MenuSilence()
 
@@ -151,7 +151,7 @@ class SerialAscii(Gauge[ByteLine]):
             self._until_echo = 0
         self._check_echo(line)
         replies = [self._values(line, poll) for poll in self._description.polls]
-        # one that says it is in trouble is spoken to from the beginning
+        # a device that reports trouble is initialised again
         in_trouble = any(
             isinstance(answer, Reading) and answer.quality is Quality.DEVICE_ERROR for answer, _ in replies
         )
@@ -163,7 +163,7 @@ class SerialAscii(Gauge[ByteLine]):
         return readings
 
     def _place(self, channel: str) -> tuple[int, int]:
-        """Which request's reply has the channel's number, and which number of it; the only one where it has no name."""
+        """The request and the index of the channel's number in its reply; the only number if unnamed."""
         for k, poll in enumerate(self._description.polls):
             if channel in poll.reply.channels:
                 return k, poll.reply.channels.index(channel)

@@ -1,1 +1,1 @@
-"""Every driver against every fault that a wire can have: `compd driver test`."""
+"""Tests of drivers against every fault of a wire: `compd driver test`."""

@@ -1,4 +1,4 @@
-"""What a case says: the qualities that were required, what was observed, and whether the driver passes."""
+"""Result of a case: required and observed qualities, and whether the driver passes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from compd.commissioning.conformance.faults import Fault
 from compd.commissioning.conformance.harness import ConformanceSession, Poll
 from compd.gauge import Quality
 
-# What a damaged reply may give. OK is allowed where the driver finds the whole reply in the damage: it must be right.
+# Allowed qualities of a damaged reply. OK is allowed, with the right value, if the driver finds the whole reply in the
+# damage.
 DAMAGED = frozenset({Quality.MISMATCH, Quality.CRC, Quality.INCOMPLETE})
 NO_ANSWER = frozenset({Quality.TIMEOUT, Quality.SILENT})
 NO_VALUE = frozenset(
@@ -21,7 +22,7 @@ NO_NUMBER = DAMAGED | NO_ANSWER | NO_VALUE
 
 BY_TCP = "TCP's own checksum keeps it from the driver"
 IN_VIRTUAL_TIME = "in virtual time"
-MOST_EXCHANGES = 64  # no driver makes more in one poll
+MOST_EXCHANGES = 64  # most exchanges of a driver in one poll
 REAL_TIME_TRIES = 3
 
 Verdict = Literal["pass", "FAIL", "-"]
@@ -39,7 +40,7 @@ class CaseResult:
 
 @dataclass(frozen=True)
 class Subject:
-    """The driver and the wire that it is tried on, as far as the cases depend on them.
+    """The properties of driver and wire on which the cases depend.
 
     registers : a Modbus driver, else one on a line of bytes.
     over_tcp : TCP's own checksum keeps damage from the driver.
@@ -62,11 +63,11 @@ class Subject:
 
     @property
     def tries(self) -> int:
-        """How often a case is tried until it counts as failed; in virtual time nothing is late by chance."""
+        """Tries of a case before it counts as failed; one in virtual time, which has no random delays."""
         return 1 if self.exact else REAL_TIME_TRIES
 
     def possible(self, kinds: Iterable[Fault]) -> Sequence[Fault]:
-        """Those of the faults that this device's replies can have."""
+        """The faults that this device's replies can have."""
         return [fault for fault in kinds if not (self.unsolicited and fault.only_of_answers)]
 
 
@@ -80,7 +81,7 @@ def result_of(
     violations: Sequence[str],
     undetectable: Sequence[str] = (),
 ) -> CaseResult:
-    """FAIL with the first violation; "-" where there is none, but something that no driver could detect."""
+    """FAIL with the first violation; "-" for a fault that no driver could detect."""
     required = " | ".join(str(quality) for quality in Quality if quality in allowed)
     if violations:
         more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
@@ -92,7 +93,7 @@ def result_of(
 
 
 def violations_of(poll: Poll, allowed: frozenset[Quality]) -> list[str]:
-    """What is wrong with a poll: numbers, or a quality that is not allowed."""
+    """Violations of a poll: numbers, or a quality that is not allowed."""
     unwanted = poll.qualities - allowed
     return [*poll.wrong, *([str(poll)] if unwanted and not poll.wrong else [])]
 

@@ -1,4 +1,4 @@
-"""Replies that are not what they should be: damaged, of other units, with other units of length, errors."""
+"""Wrong replies: damaged, of other devices, with other units of length, errors."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from compd.commissioning.conformance.reply_text import Forgery, ReplyText, most_
 from compd.commissioning.conformance.value_cases import share_of
 from compd.gauge import Quality
 
-# Of Modbus: all that a slave or gateway answers a read with, and one that no table has.
+# Modbus exceptions: all of a slave or gateway for a read, and one outside every table.
 EXCEPTIONS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 0x5A)
-SAMPLES = 48  # replies of which what is constant is learned
+SAMPLES = 48  # replies for learning the constant parts
 TRIES_FOR_A_BASE = 24
 FOREIGN = b"\x01\x84\x02\xc2\xc1\r\n"
 BY_REGISTERS = "a line of registers checks its frames itself"
@@ -51,7 +51,7 @@ class _Reply:
     others: Mapping[str, Sequence[bytes]]
 
 
-# Forgeries of a reply, and the channels that a driver must not take out of all of them.
+# Forgeries of a reply, and the channels that a driver must refuse in at least one of them.
 ForgedSet = tuple[Sequence[Forgery], Iterable[str]]
 
 
@@ -111,7 +111,7 @@ def _exchanged_characters(session: ConformanceSession, subject: Subject) -> Case
         if not reply.text.is_text:
             return
         for letters in reply.text.letters():
-            yield letters, reply.channels  # one of a set of letters may be a judgement
+            yield letters, reply.channels  # a letter of a set may be a judgement
         for forgery in [*reply.text.units(), *reply.text.signs()]:
             yield [forgery], reply.channels
 
@@ -120,7 +120,7 @@ def _exchanged_characters(session: ConformanceSession, subject: Subject) -> Case
 
 
 def _wrong_checksums(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """Whole replies whose checksum, wherever one is known in them, is wrong in a single byte."""
+    """Whole replies with a single wrong byte in a known checksum."""
 
     def forgeries(reply: _Reply) -> Iterator[ForgedSet]:
         for forgery in reply.text.checksums():
@@ -131,7 +131,7 @@ def _wrong_checksums(session: ConformanceSession, subject: Subject) -> CaseResul
 
 
 def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """A second device of the same kind, or one that is set otherwise, answers in place of this one."""
+    """A second device of the same kind, or one with other settings, answers in place of this one."""
     case = "another unit, or other settings"
     if why_not := _why_not(subject):
         return CaseResult(case, "", why_not, "-")
@@ -148,12 +148,12 @@ def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
     requests = [exchange.request for exchange in good_poll(session)]
     another = subject.another
     for setting, second in [(text, another(o)) for text, o in other_settings(subject.options)] if another else ():
-        second.sensors.advance()  # other values than the first one has
+        second.sensors.advance()  # values different from those of the first one
         replies = [exchange.reply for exchange in second.exchanges] if second.poll().ok else []
         others = [exchange.request for exchange in second.exchanges]
         who = "a device" if others == requests else "a unit"
         second.close()
-        if not replies or any(others) != any(requests):  # one that is not asked by bytes hears no request
+        if not replies or any(others) != any(requests):  # a device without requests in bytes receives none
             continue
         tried += 1
         poll = session.poll([faults.replaced(reply) for reply in replies])
@@ -175,7 +175,7 @@ def _forged_replies(
     passed: str,
     none: str,
 ) -> CaseResult:
-    """Every set of forgeries in the place of its reply; of at least one of a set the driver must take no number.
+    """Every set of forgeries in place of its reply; the driver must refuse at least one of a set.
 
     allowed : qualities, as of `result_of`. passed : what there was where all is well. none : why there is no forgery.
     """
@@ -194,14 +194,14 @@ def _forged_replies(
 
 
 def _why_not(subject: Subject) -> str:
-    """Why forged replies cannot be tried on this wire; "" where they can."""
+    """Reason why forged replies cannot be tried on this wire; "" if they can."""
     if subject.registers:
         return BY_REGISTERS
     return "" if subject.exact else IN_VIRTUAL_TIME
 
 
 def _replies(session: ConformanceSession) -> Iterator[_Reply]:
-    """Each reply of a poll without faults, with what is constant in it."""
+    """Each reply of a poll without faults, with its constant parts."""
     received = good_poll(session)
     sampled = [_values_at(session, sample) for sample in range(SAMPLES)]
     for number, exchange in enumerate(received):
@@ -230,7 +230,7 @@ def _values_at(session: ConformanceSession, sample: int) -> dict[str, float]:
 
 
 def _taken(session: ConformanceSession, reply: _Reply, forgery: Forgery, channels: Iterable[str]) -> list[str]:
-    """What is wrong if the driver takes a number of `channels` out of a forgery; [] if it does not.
+    """Violations by a driver that takes a number of `channels` from a forgery; [] if it refuses.
 
     A number that the device would itself have sent so is not wrong, nor one that is converted from another unit.
     """

@@ -1,4 +1,4 @@
-"""A device that sends unsolicited readings: half a line is no line, and of several that have come the newest counts."""
+"""A device that sends unsolicited readings: a partial line is discarded, and the newest of several lines counts."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from compd.commissioning.conformance.harness import ConformanceSession
 from compd.commissioning.conformance.peer import GOLDEN
 from compd.commissioning.conformance.virtual import VirtualWire
 
-PLACES = 40  # in a line and the pause behind it, at which the line is opened
-CHARACTER_S = 10 / 9600  # so that a line takes about as long as the pause behind it
-PERIODS_APART = (3, 10, 100)  # from one poll to the next
-RESTS_BEFORE_A_PLACE = 3  # periods: what has been said since then has the sensors' present values
+PLACES = 40  # positions in a line and the pause behind it at which the line is opened
+CHARACTER_S = 10 / 9600  # makes a line about as long as the pause behind it
+PERIODS_APART = (3, 10, 100)  # periods from one poll to the next
+RESTS_BEFORE_A_PLACE = 3  # periods after which lines have the sensors' present values
 
 
 def opened_within_a_line(session: ConformanceSession, wire: VirtualWire) -> CaseResult:
-    """The line is opened at any place of what the device says."""
+    """The line is opened at any position of the device's output."""
     violations = []
     session.recover()
     for place in range(PLACES):
@@ -27,7 +27,7 @@ def opened_within_a_line(session: ConformanceSession, wire: VirtualWire) -> Case
 
 
 def seldom_read(session: ConformanceSession, wire: VirtualWire) -> CaseResult:
-    """Polled seldom: what waits is old."""
+    """Polled seldom: waiting lines are old."""
     violations = []
     session.recover()
     for periods in PERIODS_APART:

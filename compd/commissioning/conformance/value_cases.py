@@ -21,14 +21,14 @@ from compd.commissioning.conformance.clock_calls import clock_calls
 from compd.commissioning.conformance.harness import ConformanceSession, Poll
 from compd.commissioning.conformance.peer import GOLDEN
 
-LARGEST = 1e7  # in the channel's unit: no gauge shows more
+LARGEST = 1e7  # in the channel's unit; above the range of every gauge
 STEPS_PER_DECADE = (1.0, 2.0, 5.0)
-BISECTIONS = 60  # from one step of a decade to the next, down to the last digit
+BISECTIONS = 60  # between two steps of a decade, down to the last digit
 MOST_POWERS = 32  # of 2 digits, where counters and signs roll over
 MANY_EXCHANGES = 10_000
-FEWEST_POLLS = 3000  # a driver that is wrong every thousandth time is wrong three times
-WATCHED_POLLS = 300  # of them, in which no clock must be called
-MOST_WITHOUT_VALUE = 0.02  # of them: single numbers that mean something else, such as 85.0 degC of a DS18B20
+FEWEST_POLLS = 3000  # a driver that fails every thousandth time fails three times
+WATCHED_POLLS = 300  # number of them in which no clock may be called
+MOST_WITHOUT_VALUE = 0.02  # share of them: single numbers with another meaning, such as 85.0 degC of a DS18B20
 SMALL_STEPS = 20
 
 
@@ -41,7 +41,7 @@ def _ends_of_range(session: ConformanceSession, _: Subject) -> CaseResult:
 
 
 def _sensor_off(session: ConformanceSession, _: Subject) -> CaseResult:
-    """Each sensor off in turn: it must have no number, the others none that is wrong."""
+    """Each sensor off in turn: it must have no number, the others only right ones."""
     observed: set[str] = set()
     violations = []
     for place, channel in enumerate(session.gauge.channels):
@@ -60,7 +60,7 @@ def _sensor_off(session: ConformanceSession, _: Subject) -> CaseResult:
 
 
 def _whole_range(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """Each channel by itself, from one digit to the largest number that the device shows, both signs.
+    """Each channel alone, from one digit to the device's largest number, both signs.
 
     It leaves the range in which every channel is right with the sensors.
     """
@@ -88,7 +88,7 @@ def _whole_range(session: ConformanceSession, subject: Subject) -> CaseResult:
 
 
 def _end_of(session: ConformanceSession, channel: str, sign: float) -> tuple[float, list[str]]:
-    """The largest value of this sign that has a right number, and what was wrong on the way there and beyond."""
+    """The largest value of this sign with a right number, and the violations up to it and beyond."""
     violations = []
     end, beyond = 0.0, math.inf
     decade = math.floor(math.log10(session.replies.digit[channel]))
@@ -111,7 +111,7 @@ def _end_of(session: ConformanceSession, channel: str, sign: float) -> tuple[flo
 
 
 def _violations_at(session: ConformanceSession, channel: str, value: float) -> tuple[bool, list[str]]:
-    """Whether the channel has a right number for this value, the others being as ever, and what is wrong."""
+    """Whether the channel has a right number for this value, with the others unchanged; and the violations."""
     session.sensors.advance()
     session.sensors.values[channel] = value
     if session.exchanges and session.replies.at(session.exchanges) is None:
@@ -131,13 +131,13 @@ def _violations_at(session: ConformanceSession, channel: str, value: float) -> t
         return True, []
     end = lowest if math.isinf(highest) else highest
     if abs(reading.value - end) <= 2 * session.replies.digit[channel]:
-        return False, []  # it shows its end for all beyond it, and nobody can tell that from its end
+        return False, []  # it shows its end for all values beyond, which cannot be told from the end itself
     text = f"{channel}: {reading.value:.9g} as ok, the sensor had {value:.9g}: the device shows the same for all"
     return False, [f"{text} beyond {end:.9g}, so that it is no measurement"]
 
 
 def _special_values(digit: float, lowest: float, highest: float) -> Iterator[float]:
-    """0, and numbers of digits where a carry, a counter or a sign rolls over, inside the range."""
+    """0, and numbers of digits at which a carry, a counter or a sign rolls over, inside the range."""
     numbers = {0.0, 1.0, 2.0}
     for power in range(MOST_POWERS):
         numbers |= {2.0**power - 1, 2.0**power, 10.0**power - 1, 10.0**power, 5 * 10.0**power}

@@ -21,7 +21,7 @@ PAUSE_TIMEOUTS = 0.8
 
 
 class VirtualClock:
-    """Time that passes only while somebody waits."""
+    """Clock that advances only during waits."""
 
     def __init__(self) -> None:
         self.now_s = 1000.0
@@ -70,14 +70,14 @@ class VirtualWire:
         self._speaks_s = self.clock.now_s + self.pause_s
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """No resources to release."""
 
     def check(self) -> None:
         if not self.plugged:
             raise LineFault(Quality.LINE_LOST, "unplugged")
 
     def carry(self, request: bytes) -> None:
-        """To the device; its reply gets under way."""
+        """Send to the device, which starts its reply."""
         received_s = self.clock.now_s + len(request) * self.character_s
         self._send(self.peer.answer(request, received_s, self.timeout_s), received_s + TURNAROUND_S)
 
@@ -91,7 +91,7 @@ class VirtualWire:
             self._send(self.peer.answer(b"", fell_s, self.timeout_s, low_s), self.clock.now_s + TURNAROUND_S)
 
     def rest(self, duration_s: float) -> None:
-        """Time passes without anybody reading, s."""
+        """Let time (s) pass without reading."""
         self.clock.now_s += duration_s
         while self.pause_s and self._speaks_s <= self.clock.now_s:
             self._speak()
@@ -105,7 +105,7 @@ class VirtualWire:
         self._speaks_s = begins_s + length * self.character_s + self.pause_s
 
     def _send(self, pieces: Sequence[Piece], first_s: float) -> None:
-        """On their way to the product, from `first_s` on; character by character where the line has a pace."""
+        """Send pieces to the product from `first_s` on; character by character if the line has a pace."""
         for piece in pieces:
             start_s = first_s + piece.delay_s
             if not self.character_s:
@@ -116,7 +116,7 @@ class VirtualWire:
                 heapq.heappush(self._arriving, (due_s, next(self._order), bytes([byte])))
 
     def arrive(self, timeout_s: float) -> bytes:
-        """What comes within `timeout_s`; time moves on to there."""
+        """Data within `timeout_s`; advances the time to its arrival."""
         until_s = self.clock.now_s + max(0.0, timeout_s)
         while self.pause_s and self._speaks_s <= min([until_s, *(item[0] for item in self._arriving[:1])]):
             self._speak()
@@ -153,4 +153,4 @@ class VirtualPort:
         """Simulated devices do not see it."""
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """No resources to release."""

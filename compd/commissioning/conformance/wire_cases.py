@@ -1,4 +1,4 @@
-"""Faults of the wire: late, cut, doubled, garbled, silent, unplugged. Whatever comes, no number may be wrong."""
+"""Faults of the wire: late, cut, doubled, garbled, silent, unplugged. No number may ever be wrong."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from compd.commissioning.conformance.case_result import (
 from compd.commissioning.conformance.harness import ASKED_AGAIN_TIMEOUTS, ConformanceSession
 from compd.gauge import Quality
 
-ENDS_OF_MAPS = (2, 3, 4)  # of them, those with which slaves answer where their registers end
+ENDS_OF_MAPS = (2, 3, 4)  # those of them that slaves send beyond their last register
 
-IN_A_ROW = 5  # more than any driver counts before it does something else
+IN_A_ROW = 5  # more than any driver counts before it acts
 IN_ANY_ORDER = 300
 
 
@@ -61,7 +61,7 @@ def _late(session: ConformanceSession, _: Subject) -> CaseResult:
 
 
 def _later(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """So late that it comes while the next request waits for its own reply, which takes its time, too.
+    """Late enough to arrive while the next request waits for its own, slow reply.
 
     A timeout, the drain after it and the rest are over by then: a device can hardly be later.
     """
@@ -99,7 +99,7 @@ def _cut(session: ConformanceSession, _: Subject) -> CaseResult:
 
 
 def _end_of_map(session: ConformanceSession, _: Subject) -> CaseResult:
-    """A slave whose registers end behind the last one that is read, which the line asks beyond: it must learn that."""
+    """A slave whose registers end at the last one read: the line asks beyond it, and must learn that."""
     violations = []
     for beyond in (faults.SILENT, *(faults.refused(code, over_tcp=False) for code in ENDS_OF_MAPS)):
         session.reopen()

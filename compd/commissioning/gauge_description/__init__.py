@@ -1,1 +1,1 @@
-"""A gauge that no driver knows: its replies captured, what they mean asked, its description written and read back."""
+"""Description of a gauge without a driver: capture replies, ask for their meaning, write and read back."""

@@ -1,4 +1,4 @@
-"""Replies of an unknown gauge: out of a file, or from the wire."""
+"""Replies of an unknown gauge, from a file or from the wire."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from compd.gauge import LineFault, Quality
 from compd.lines.stream import StreamLine
 
 LONGEST_REPLY = 1024
-# What ends the lines of devices: CR, LF, ETX, EOT.
+# Line ends of devices: CR, LF, ETX, EOT.
 LINE_ENDS = b"\r\n\x03\x04"
 
 
 class CapturedReply(NamedTuple):
-    """A request, b"" for unsolicited data, and what came after it."""
+    """A request (b"" for unsolicited data) and the reply."""
 
     request: bytes
     reply: bytes
@@ -128,7 +128,7 @@ def capture_live(
 
 
 def _reply_until_silence(line: StreamLine, request: bytes) -> bytes:
-    """What comes after a request, until the line is quiet. Raises LineFault: TIMEOUT when nothing does."""
+    """The reply to a request, until the line is quiet. Raises LineFault: TIMEOUT without a reply."""
     line.send(request)
     reply = b""
     while len(reply) < LONGEST_REPLY:
@@ -160,7 +160,7 @@ def _line_unsolicited(line: StreamLine) -> bytes:
         if byte and (not text or byte in LINE_ENDS or text[-1:] not in LINE_ENDS):
             text += byte
             continue
-        # a byte behind a terminator, or a silence: what came before is a line
+        # a byte behind a terminator, or a silence, ends a line
         if from_its_beginning:
             return text
         text, from_its_beginning = byte, True

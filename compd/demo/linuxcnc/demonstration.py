@@ -73,7 +73,7 @@ def run_linuxcnc_demo(
     program: Path = SHIPPED_PROGRAM,
     speedup: float = SPEEDUP,
 ) -> LinuxCncDemo:
-    """Probe while the machine warms up; run the program without and with corrections; adopt the diagnosis; run it again.
+    """Probe during the warm-up; run the program without and with corrections; adopt the diagnosis; run it again.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ class SimulatedNd28x(SimulatedByteDevice):
     """Shows its channel `position`; a sensor that is off gives the unit `?`."""
 
     def receive(self, data: bytes) -> bytes:
-        """One reply for every STX among the bytes; anything else is not for this display."""
+        """One reply for every STX among the bytes; other bytes are ignored."""
         return b"".join(self._shown() for byte in data if byte == 0x02)
 
     def _shown(self) -> bytes:

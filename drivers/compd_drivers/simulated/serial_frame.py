@@ -23,7 +23,7 @@ class SimulatedFrame(SimulatedByteDevice):
 
     @property
     def error_replies(self) -> dict[bytes, str]:
-        """Each described error as it goes over the wire, and the quality that it means."""
+        """Each described error in the form on the wire, with its quality."""
         tokens = {error: error.frame.split() for error in self.options.errors}
         return {
             bytes(0 if token in {"..", "CS"} else int(token, 16) for token in frame): error.quality

@@ -15,7 +15,7 @@ MM_IN_AN_INCH = 25.4
 class SimulatedMyGauge(SimulatedByteDevice):
     """Shows its channel `value`; a sensor that is off gives `ER01`."""
 
-    # whole replies by which the device says that something is wrong, and the quality that must come
+    # whole error replies of the device, and their qualities
     error_replies: ClassVar[Mapping[bytes, str]] = {
         b"ER01\r\n": "sensor_fault",
         b"ER02\r\n": "over_range",
@@ -28,7 +28,7 @@ class SimulatedMyGauge(SimulatedByteDevice):
         self._received = b""
 
     def receive(self, data: bytes) -> bytes:
-        """One reply for every request that is complete; bytes may come in any pieces."""
+        """One reply for every complete request; bytes may come in any pieces."""
         *requests, self._received = (self._received + data).split(b"\r")
         return b"".join(self._shown() for request in requests if request.endswith(b"?"))
 
