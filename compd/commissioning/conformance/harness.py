@@ -73,7 +73,7 @@ class Poll:
 
 @dataclass
 class ConformanceSession:
-    """A driver polled over `wire` as by a line's thread: drains after faults, reopens when lost, rests after silence."""
+    """A driver polled over `wire` as by a line's thread: drains after faults, reopens if lost, rests after silence."""
 
     gauge: Gauge[Any]
     wire: ConformanceWire
