@@ -1,4 +1,4 @@
-"""The columns of a recording: their names, units and decimals, and what was meant by a name that is none of them."""
+"""The columns of a recording: names, units and decimals, and suggestions for unknown names."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class ColumnKind(NamedTuple):
 
     @property
     def units(self) -> tuple[str, ...]:
-        """The unit, and for lengths of the reference and for derivatives those that `reference.unit` may put there."""
+        """The unit; for lengths of the reference and for derivatives also those that `reference.unit` allows."""
         of_reference = self.unit == "mm" and self.names.startswith(("reference_", "d_"))
         of_reference &= self.names != DISTANCE_COLUMN
         return tuple(REFERENCE_UNITS.values()) if of_reference else (self.unit,)
@@ -166,17 +166,17 @@ class ColumnName(NamedTuple):
 
 
 def scale_columns(links: int) -> tuple[str, ...]:
-    """scale_1_mm ... of a machine with so many links."""
+    """scale_1_mm ... for this many links."""
     return tuple(f"scale_{i}_mm" for i in range(1, links + 1))
 
 
 def joint_columns(comparators: int) -> tuple[str, ...]:
-    """joint_1_um ... for so many joint comparators."""
+    """joint_1_um ... for this many joint comparators."""
     return tuple(f"joint_{k}_um" for k in range(1, comparators + 1))
 
 
 def approach_columns(links: int) -> tuple[str, ...]:
-    """approach_1 ... of a machine with so many links."""
+    """approach_1 ... for this many links."""
     return tuple(f"approach_{i}" for i in range(1, links + 1))
 
 
@@ -194,7 +194,7 @@ def is_sensitivity(name: str) -> bool:
 
 
 def decimals(name: str) -> int | None:
-    """How many decimals the column `name` is rounded to when it is written; None: written in full."""
+    """Decimals of the column `name` in a written file; None: written in full."""
     if is_sensitivity(name):  # mm per any unit may be small
         return None
     column = parse_name(name)
@@ -207,7 +207,7 @@ def number_text(value: float) -> str:
 
 
 def parse_name(name: str) -> ColumnName | None:
-    """The parts of a name that is exactly a column of the format; None for every other name."""
+    """The parts of a column name of the format; None for every other name."""
     for kind in COLUMN_KINDS:
         for unit in kind.units:
             stem = name.removesuffix(f"_{unit}") if unit else name
@@ -217,13 +217,12 @@ def parse_name(name: str) -> ColumnName | None:
 
 
 def is_covariate(name: str) -> bool:
-    """Whether `name` may stand for anything else that was measured: <name>_<unit>, unlike any column of the format."""
+    """Whether `name` may be another measured quantity: <name>_<unit>, unlike any column of the format."""
     return not _RESERVED.match(name) and bool(_COVARIATE.fullmatch(name)) and intended_column(name) in (None, name)
 
 
 def is_header(cells: Sequence[str]) -> bool:
-    """Whether these cells are a recording's header: they name the time, a reference or, rightly or wrongly spelt,
-    mostly columns."""
+    """Whether these cells are a recording's header: the time, a reference, or mostly column names (even misspelt)."""
     filled = [cell for cell in cells if cell]
     intended = [intended_column(cell) for cell in filled]
     if any(name is not None and name.startswith("reference_") for name in intended):
@@ -232,7 +231,7 @@ def is_header(cells: Sequence[str]) -> bool:
 
 
 def intended_column(name: str) -> str | None:
-    """The column of the format that a person most probably meant by `name`; None where there is none.
+    """The column of the format that `name` most probably means; None if there is none.
 
     Example: "Scale 01 [um]" -> "scale_1_mm", "Temp room °C" -> "temperature_room_degC".
     """
@@ -262,7 +261,7 @@ def _convertible(unit: str, right: str) -> bool:
 
 
 def correct_names(table: Table, problems: ProblemList) -> Table:
-    """The table with the names that were meant; every name that is not the format's own is reported.
+    """The table with the intended names; every name outside the format is reported.
 
     A corrected name is a problem all the same: its values may be in another unit. It is corrected so that the same
     mistake is not reported again as a missing column.
@@ -303,7 +302,7 @@ def correct_names(table: Table, problems: ProblemList) -> Table:
 
 
 def _wrong_name(name: str, meant: str) -> tuple[str, str, str, str]:
-    """(what, value, allowed, next step) of a name that is nearly a column of the format."""
+    """(what, value, allowed, next step) for a name similar to a column of the format."""
     right = parse_name(meant)
     wanted = right.unit if right else ""
     unit = unit_of(name)

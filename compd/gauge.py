@@ -100,7 +100,7 @@ class ByteLine(Protocol):
     """
 
     def send(self, request: bytes) -> float:
-        """Discard what has arrived unasked, and write `request`.
+        """Discard what has arrived unsolicited, and write `request`.
 
         Returns the monotonic time (s) at which its last bit had left: the `time_s` of the readings in the reply.
         """
@@ -119,7 +119,7 @@ class ByteLine(Protocol):
         ...
 
     def listen(self) -> float:
-        """Discard what has arrived so far, of a device that sends unasked.
+        """Discard what has arrived so far, of a device that sends unsolicited readings.
 
         Returns the monotonic time (s): the `time_s` of the readings that are received next.
         """
@@ -128,7 +128,7 @@ class ByteLine(Protocol):
     def next_line(
         self, terminator: bytes, limit: int, timeout_s: float | None = None, gap_timeout_s: float | None = None
     ) -> tuple[bytes, float]:
-        """The next whole line of a device that sends unasked, at its full rate, without `terminator`.
+        """The next whole line of a device that sends unsolicited readings, at its full rate, without `terminator`.
 
         Also returns its `time_s`: when the line before it began, which is read too where nothing is known of it. More
         than `limit` bytes raise MISMATCH. `timeout_s` is for the first byte, and must be longer than the device's

@@ -34,7 +34,7 @@ PURPOSE_COLUMN = "purpose"
 TIP_COLUMNS = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
 SPEED_COLUMN = "speed_mm_per_s"
 NEEDED_COLUMNS = ("time_s", *TIP_COLUMNS)
-# Columns that say nothing to set: when, and for the reader.
+# Columns without a setting: time, and text for the reader.
 NOT_SET = ("row", PURPOSE_COLUMN, "time_s")
 WRITTEN_BY = "`compd plan` writes such a file"
 
@@ -47,7 +47,7 @@ def plan_row(
     approach: Sequence[float],
     speed_mm_per_s: float,
 ) -> dict[str, Any]:
-    """One row by column, rounded to what a person can set.
+    """One row by column, rounded to settable values.
 
     tip_M_mm : (3,). quantities : name with unit -> value to hold. approach : (n,) +1, -1 or 0.
     """
@@ -81,7 +81,7 @@ def plan_text(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def write_text_file(path: Path, text: str) -> None:
-    """Write a plan's text. Raises RecordingError where it cannot be written."""
+    """Write a plan's text. Raises RecordingError if it cannot be written."""
     try:
         write_files({path: text})
     except OSError as error:
@@ -113,7 +113,7 @@ class PlanFile:
 def read_plan_file(
     path: Path, links: int, limits: Mapping[str, tuple[float, float]], problems: list[Problem]
 ) -> PlanFile:
-    """Read a plan for a machine with so many links; what is wrong goes to `problems`.
+    """Read a plan for a machine with this many links; faults go to `problems`.
 
     limits : column -> (lowest, highest) of each quantity that the machine can hold, and of SPEED_COLUMN; other
         columns are refused. Raises CompdError where there is no header that could be read.
@@ -160,7 +160,7 @@ class _PlanFileReader:
                 Problem(where=str(self._path), what="is empty", allowed="a header and rows", next_step=WRITTEN_BY)
             )
         if not set(NEEDED_COLUMNS) & set(rows[0][1]):
-            # nothing of a file is quoted that is no plan
+            # a file that is no plan is not quoted
             raise CompdError(
                 Problem(
                     where=f"{self._path}:1",

@@ -1,8 +1,8 @@
-"""The interface between compd and a driver whose device speaks by itself: it sends values, and nobody asks for them.
+"""The interface between compd and a driver whose device pushes its values without a request.
 
-The line's thread hands every message to `hear`, which says what the driver's channels read by it. A driver implements
-`channels` and `addresses`, and `decode`; `stamp` where the time of measurement stands in the message itself. When a
-value was measured is worked out here, from that time or from the message's arrival (`compd.source_time`).
+The line's thread hands every message to `receive`, which returns the readings of the driver's channels. A driver
+implements `channels`, `addresses` and `decode`; also `stamp` if the message contains the time of measurement. The time
+of a value is derived here, from that time or from the message's arrival (`compd.source_time`).
 """
 
 from __future__ import annotations
@@ -124,12 +124,12 @@ class PushedGauge(Gauge[PushedLine]):
         """The longest time between two values of an address, s, where the configuration says it."""
         return None
 
-    def hear(self, message: Message) -> Sequence[Heard]:
+    def receive(self, message: Message) -> Sequence[Heard]:
         """What the channels of the message's address read by it; none for a message that came before."""
         return [
-            heard
+            received
             for place, address in enumerate(self.addresses)
-            if address == message.address and (heard := self._heard(place, message)) is not None
+            if address == message.address and (received := self._received(place, message)) is not None
         ]
 
     def read(self, line: PushedLine) -> Sequence[Reading]:
@@ -139,23 +139,23 @@ class PushedGauge(Gauge[PushedLine]):
         Raises LineFault: TIMEOUT where nothing comes within the line's timeout, LINE_LOST.
         """
         line.subscribe(self.addresses)
-        heard_any = False
-        while not heard_any or len(self._newest) < len(self.addresses):
+        received_any = False
+        while not received_any or len(self._newest) < len(self.addresses):
             messages = line.messages()
             if not messages:
                 break
             for message in messages:
-                heard = self.hear(message)
-                self._newest.update({each.place: each.reading for each in heard})
-                heard_any = heard_any or bool(heard)
-        if not heard_any:
+                received = self.receive(message)
+                self._newest.update({each.place: each.reading for each in received})
+                received_any = received_any or bool(received)
+        if not received_any:
             raise LineFault(Quality.TIMEOUT, f"nothing came on {', '.join(sorted(set(self.addresses)))}")
         return [
             self._newest.get(place, bad(-math.inf, Quality.TIMEOUT, f"nothing came on {address}"))
             for place, address in enumerate(self.addresses)
         ]
 
-    def _heard(self, place: int, message: Message) -> Heard | None:
+    def _received(self, place: int, message: Message) -> Heard | None:
         arrived_s = message.arrival.arrived_s
         if message.quality is not Quality.OK:
             self._sent.pop(place, None)  # the value before it counts again when the source says so

@@ -1,4 +1,4 @@
-"""When a value was measured that a device has sent unasked: by the time that came with it, or by its arrival.
+"""When a value was measured that a device has sent unsolicited: by the time that came with it, or by its arrival.
 
     source    t = arrived - (calendar time of arrival - calendar time of the source), at most `arrived`
     arrival   t = the earliest time that the protocol allows, where it allows one; else `arrived`

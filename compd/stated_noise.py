@@ -1,4 +1,4 @@
-"""How much a gauge scatters, and who says so: the configuration, else the driver by its device's data sheet."""
+"""Stated noise of a gauge and its source: the configuration, else the driver by its device's data sheet."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from compd.gauge import Gauge, GaugeOptions
 
 
 class StatedNoise(NamedTuple):
-    """um : standard deviation of one reading of a length, um; nan where nobody says. source : who says so."""
+    """um : standard deviation of one reading of a length, um; nan if not stated. source : of the statement."""
 
     um: float
     source: str
 
 
-# Last digit of a display that stands still, mm, where no noise is stated.
+# Fluctuation (mm) of a display at rest without stated noise: its last digit.
 UNREST_MM = 0.001
-# Two readings of the same value differ by less than this many standard deviations of their difference, and of one.
+# Largest difference of two readings of the same value, in standard deviations of their difference, and of one reading.
 DIFFERENCE_SIGMAS = 6.0
 SAME_VALUE_SIGMAS = DIFFERENCE_SIGMAS * math.sqrt(2)
-# A scatter that differs from the stated noise by this factor either way is another one. A last digit that goes to and
-# fro makes 1.7 times what it makes on average.
+# Ratio of scatter and stated noise, either way, that contradicts the statement. A flickering last digit makes up to 1.7
+# times its average.
 SCATTER_RATIO = 2.0
 
 
 def tolerance_mm(noise_um: float | None) -> float:
-    """By how much two readings of the same value may differ, mm. noise_um : standard deviation of one, um."""
+    """Largest difference (mm) of two readings of the same value. noise_um : standard deviation of one, um."""
     return (
         UNREST_MM if noise_um is None or math.isnan(noise_um) else max(UNREST_MM, SAME_VALUE_SIGMAS * noise_um * 1e-3)
     )
@@ -36,7 +36,7 @@ NOT_STATED = StatedNoise(math.nan, "")
 
 
 def stated_noise(options: GaugeOptions, driver: type[Gauge[Any]]) -> StatedNoise:
-    """Of the lengths of a gauge; what the configuration says overrides the data sheet."""
+    """Stated noise of a gauge's lengths; the configuration overrides the data sheet."""
     if options.noise_um is not None:
         return StatedNoise(options.noise_um, "configuration")
     sheet = driver(options).noise

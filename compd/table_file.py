@@ -14,7 +14,7 @@ SUFFIXES = (CSV, PARQUET)
 
 
 def table_path(path: Path) -> Path:
-    """The table's file of a recording that is given by it or by its sidecar, NAME.yaml.
+    """The table's file of a recording, given by itself or by its sidecar NAME.yaml.
 
     Raises RecordingError where two tables have this sidecar: a copy may have been changed since.
     """
@@ -30,12 +30,12 @@ def table_path(path: Path) -> Path:
 
 
 def written_path(path: Path) -> Path:
-    """Where a recording is written that is to be `path`: NAME.csv where that has no suffix of a table."""
+    """The path for writing a recording: NAME.csv if `path` has no suffix of a table."""
     return path if path.suffix in SUFFIXES else path.with_name(f"{path.name}{CSV}")
 
 
 def read_table_file(path: Path, problems: ProblemList, id_columns: Collection[str]) -> Table | None:
-    """All rows; what is wrong goes to `problems`. None where there is no table at all.
+    """All rows; faults go to `problems`. None without any table.
 
     id_columns : columns that may hold text.
     """
@@ -49,7 +49,7 @@ def read_table_file(path: Path, problems: ProblemList, id_columns: Collection[st
 
 
 def table_blocks(path: Path, id_columns: Collection[str], rows: int) -> Iterator[TableBlock]:
-    """The rows, so many at a time at most, in the order of the file and in constant memory; one block at least.
+    """The rows in blocks up to a size, in the order of the file and in constant memory; at least one block.
 
     Raises RecordingError for a file that cannot be read.
     """
@@ -59,7 +59,7 @@ def table_blocks(path: Path, id_columns: Collection[str], rows: int) -> Iterator
 
 
 def row_count(path: Path) -> int:
-    """Rows of values in the table, empty ones with the others: of Parquet as it says, of CSV lines under the header.
+    """Number of rows of the table, including empty ones: from Parquet's metadata, or lines under the CSV header.
 
     Raises RecordingError for a file that cannot be read.
     """

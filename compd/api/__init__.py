@@ -1,5 +1,1 @@
-"""The public functions that put several rooms together: what `import compd` and the commands offer."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+"""The public functions that combine several packages, for `import compd` and the commands."""

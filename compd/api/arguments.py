@@ -1,4 +1,4 @@
-"""What the public functions take: a recording, a model and effects, each opened already or named by its path."""
+"""Arguments of the public functions: a recording, a model and effects, each opened or given by its path."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Effects: TypeAlias = str | Path | Effect | Sequence[Effect | str | Path]
 
 
 def opened_recording(recording: Recorded) -> AlignedRecording:
-    """A recording, opened with its machine where it is named by its path."""
+    """A recording; one given by its path is opened with its machine."""
     return recording if isinstance(recording, AlignedRecording) else open_recording(recording)
 
 
 def opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:
-    """The model of the recording's machine. Raises StateError where it is of another one."""
+    """The model of the recording's machine. Raises StateError for the model of another one."""
     machine, links = aligned.recording.machine, aligned.rows.links
     if model is None:
         return ModelFile(machine, links)
@@ -52,5 +52,5 @@ def opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:
                 next_step="give the model of these links, or begin a new one",
             )
         )
-    # of an external model, whose effects had no number of a single link
+    # an external model, whose effects lack numbers of single links
     return replace(model, links=links)

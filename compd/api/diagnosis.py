@@ -1,4 +1,4 @@
-"""What a recording says of the model: by how much they differ, and which effect is missing."""
+"""Comparison of a recording with the model, and diagnosis of the missing effect."""
 
 from __future__ import annotations
 

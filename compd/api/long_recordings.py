@@ -1,4 +1,4 @@
-"""Recordings that are too long for the memory: compared block by block, and a sample of them for everything else."""
+"""Recordings too long for the memory: compared block by block, and sampled for everything else."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from compd.configuration import Machine
 from compd.diagnosis import refit_model
 from compd.model_file import ModelFile
 
-# Called with the number of rows that are done, block after block.
+# Called with the number of finished rows, block after block.
 Progress = Callable[[int], None]
 
 
 def _silent(done: int) -> None:
-    """Nobody watches."""
+    """Default progress function: ignores it."""
 
 
 class LongRecording(NamedTuple):
@@ -50,13 +50,13 @@ class LongRecording(NamedTuple):
 
 
 def open_long(path: Path, machine: Machine | None = None, progress: Progress = _silent) -> LongRecording:
-    """Draw the sample of a recording; arguments and errors as of `open_sample`."""
+    """Draw the sample of a recording; arguments and errors as for `open_sample`."""
     stream = open_stream(path, machine)
     return LongRecording(stream, draw_sample(stream, progress=progress))
 
 
 def open_whole_or_sample(path: Path, machine: Machine | None = None) -> tuple[AlignedRecording, int]:
-    """The recording, and how many rows its file has; of one that is too long for the memory a sample of the rows.
+    """The recording (a sample of its rows if too long for the memory), and the number of rows in its file.
 
     Arguments and errors as of `open_recording`.
     """

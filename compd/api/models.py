@@ -1,4 +1,4 @@
-"""The model of a machine: opened from its file, and with one effect more."""
+"""The model of a machine: opening its file, and adding an effect."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def add_effect(
 
 
 def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapping[str, Effect]) -> Effect:
-    """The effect that is to be added, such that a model file can name it. Raises CompdError with every problem."""
+    """The effect to add, in a form that a model file can name. Raises CompdError with every problem."""
     if isinstance(effect, Mapping):
         return find_effect(effect, "effect")
     if not isinstance(effect, Effect):

@@ -3,14 +3,14 @@
 import os
 import sys
 
-# Matrices are small here: more threads of the linear algebra wait for each other, and beside other programs that costs
-# ten times what the work takes. Read when numpy is first imported; a person's own setting holds.
+# One thread of linear algebra: matrices are small, and more threads wait for each other, at up to ten times the cost
+# beside other programs. numpy reads it at its import; a person's own setting takes precedence.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def main() -> None:
-    """Entry point of `compd`: a person's mistakes are printed, all of them, with exit code 2."""
+    """Entry point of `compd`: prints all of a person's mistakes, with exit code 2."""
     from compd.cli.loading import loading
 
     with loading():

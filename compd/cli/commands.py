@@ -1,4 +1,4 @@
-"""`compd`: one command for each thing that a person wants to do.
+"""`compd`: one command for each task.
 
 Each package here is a panel of `compd --help`, and each module in it a command: module `check` has a function `check`,
 or a `typer.Typer` of that name where the command has commands of its own. A new module is a new command; nothing else
@@ -15,7 +15,7 @@ import typer
 from compd.cli import live, measurements, simulated, start
 from compd.release import __version__
 
-# In the order in which `compd --help` shows them.
+# Panels and commands in the order of `compd --help`.
 PANELS = {
     "Begin": start,
     "The live machine": live,

@@ -1,4 +1,4 @@
-"""Options that say what an instrument's export is, and what a person is told about how it was read."""
+"""Options about an instrument's export, and the report on its reading."""
 
 from __future__ import annotations
 
@@ -33,25 +33,25 @@ class DateOrder(StrEnum):
 
 ShapeOption = Annotated[
     Shape | None,
-    typer.Option("--as", help="The export's shape, where it is not found: SpatialAnalyzer, a delimiter, blanks ..."),
+    typer.Option("--as", help="The export's shape, if it is not detected: SpatialAnalyzer, a delimiter, blanks ..."),
 ]
 ColumnsOption = Annotated[
     str | None,
     typer.Option(
         "--columns",
-        help="What the columns are, in their order: time, date, x, y, z, rx, ry, rz, length, name, group, collection, "
+        help="Roles of the columns, in order: time, date, x, y, z, rx, ry, rz, length, name, group, collection, "
         "or - for one that is not used: name,x,y,z,-. With a unit: time[ms],x[inch].",
     ),
 ]
-UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the lengths, where the file has none.")]
-AngleUnitOption = Annotated[str | None, typer.Option("--angle-unit", help="Unit of rx, ry, rz, where it has none.")]
+UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the lengths, if the file has none.")]
+AngleUnitOption = Annotated[str | None, typer.Option("--angle-unit", help="Unit of rx, ry, rz, if the file has none.")]
 DecimalOption = Annotated[
-    str | None, typer.Option("--decimal", help="The decimal mark, '.' or ',', where the file leaves both open.")
+    str | None, typer.Option("--decimal", help="The decimal mark, '.' or ',', if the file is ambiguous.")
 ]
 DatesOption = Annotated[
-    DateOrder | None, typer.Option("--dates", help="Order of day, month and year, where the file leaves it open.")
+    DateOrder | None, typer.Option("--dates", help="Order of day, month and year, if the file is ambiguous.")
 ]
-RateOption = Annotated[float | None, typer.Option("--rate-hz", help="Rows in a second, where rows have no time.")]
+RateOption = Annotated[float | None, typer.Option("--rate-hz", help="Rows per second, if rows have no time.")]
 ClockSetBackOption = Annotated[
     bool,
     typer.Option(
@@ -59,9 +59,9 @@ ClockSetBackOption = Annotated[
     ),
 ]
 GroupOption = Annotated[
-    str | None, typer.Option("--group", help="The group of points to take, where there are several; all for all.")
+    str | None, typer.Option("--group", help="The group of points to take, if there are several; all for all.")
 ]
-SheetOption = Annotated[str | None, typer.Option("--sheet", help="The sheet of a workbook, where there are several.")]
+SheetOption = Annotated[str | None, typer.Option("--sheet", help="The sheet of a workbook, if there are several.")]
 
 
 def read_options(
@@ -77,7 +77,7 @@ def read_options(
     sheet: str | None,
     clock_set_back: bool = False,
 ) -> ReadOptions:
-    """The options as the reader takes them. Raises typer.BadParameter where the decimal mark is none.
+    """The options of the reader. Raises typer.BadParameter for an invalid decimal mark.
 
     names : role -> a column's name.
     """
@@ -101,7 +101,7 @@ def read_options(
 
 
 def echo_taken(path: Path, shape: str, taken: Mapping[str, str], left_out: Mapping[str, int]) -> None:
-    """Print what was found in an export, column by column, and which of its rows are not used."""
+    """Print the contents of an export, column by column, and its unused rows."""
     typer.echo(f"{path}: read as {shape}")
     width = max(map(len, taken), default=0)
     for role, text in taken.items():

@@ -1,4 +1,4 @@
-"""The time in which modules are loaded."""
+"""Garbage collection during the loading of modules."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# All modules of the daemon make 240,000 objects; to compile the kernels makes a million, most of them garbage.
+# Objects above those of all modules: the daemon's make 240,000, compiling the kernels makes a million, mostly garbage.
 _MORE_THAN_MODULES_MAKE = 400_000
 
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """A block whose objects stay, so that the garbage collector need not look through them, in the block or later.
+    """A block with permanent objects, which the garbage collector skips in the block and later.
 
     That takes a fifth of a second of the start of `compd run`.
     """
@@ -28,5 +28,5 @@ def loading() -> Iterator[None]:
 
 
 def _collections() -> int:
-    """How often the collector has run."""
+    """Number of runs of the collector."""
     return sum(generation["collections"] for generation in gc.get_stats())

@@ -24,7 +24,7 @@ EffectsOption = Annotated[
         "that comes with compd. May be repeated.",
     ),
 ]
-OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Write over a file that is something else.")]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Overwrite a file of another kind.")]
 
 
 def unix_address(address: str) -> str:

@@ -1,4 +1,4 @@
-"""Problems and warnings on a terminal: wrapped between words, with what belongs together indented."""
+"""Problems and warnings on a terminal: wrapped between words, with indented parts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def print_problems(problems: Iterable[Problem], mark: str = "", stream: TextIO |
 
 
 def wrapped(text: str, width: int) -> str:
-    """Each line of `text` within `width` columns, what follows indented once more; 0 columns: as it is."""
+    """Each line of `text` within `width` columns, with a hanging indent; 0 columns: unchanged."""
     if not width:
         return text
     lines: list[str] = []

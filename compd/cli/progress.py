@@ -1,4 +1,4 @@
-"""Long work, step by step on a terminal; silent where nobody watches."""
+"""Progress of long work on a terminal; silent elsewhere."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ if TYPE_CHECKING:
     from compd.clock import Clock
 
 Item = TypeVar("Item")
-# A terminal that shows a number more often is not read better.
+# Interval (s) of updates of a number on the terminal.
 _SHOWN_EVERY_S = 0.2
 
 
 @contextmanager
 def steps_shown(quiet: bool = False) -> Iterator[Callable[[str], None]]:
-    """A function that is told what begins; the bar goes to standard error and is gone at the end."""
+    """A function to call at the beginning of each step; the bar is on standard error until the end."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -28,7 +28,7 @@ def steps_shown(quiet: bool = False) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def count_shown(total: int, what: str) -> Iterator[Callable[[int], None]]:
-    """A function that is told how many of `total` things are done; the bar goes to standard error, gone at the end."""
+    """A function to call with the number done out of `total`; the bar is on standard error until the end."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -40,7 +40,7 @@ def count_shown(total: int, what: str) -> Iterator[Callable[[int], None]]:
 
 
 class ElapsedShown:
-    """How far a measurement is that takes a given time, or goes on until Ctrl-C; a context manager."""
+    """Progress of a measurement of a given time, or until Ctrl-C; a context manager."""
 
     def __init__(self, for_s: float | None, clock: Clock) -> None:
         from rich.console import Console

@@ -1,15 +1,15 @@
-"""Text of the source code, which is broken into lines there, for a terminal of any width."""
+"""Text from source code with its line breaks, reflowed for a terminal of any width."""
 
 from __future__ import annotations
 
 import re
 
-# What begins a line of its own: a list, a step, a key.
+# Beginnings of separate lines: a list, a step, a key.
 _OWN_LINE = re.compile(r"([-*]|\d+\.) |\S+:$")
 
 
 def reflowed(text: str) -> str:
-    """Paragraphs as one line each, which the terminal breaks; indented lines, lists and blank lines stay."""
+    """Paragraphs as one line each, for wrapping by the terminal; indented lines, lists and blank lines stay."""
     lines: list[str] = []
     for line in text.splitlines():
         continues = bool(lines and lines[-1].strip() and line.strip())

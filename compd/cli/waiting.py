@@ -1,4 +1,4 @@
-"""Waiting some seconds for what another terminal has just started: a configuration, a daemon, its gauges."""
+"""Waits some seconds for a start in another terminal: a configuration, a daemon, its gauges."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ from compd.errors import DaemonError
 if TYPE_CHECKING:
     from compd.client import Client
 
-# A simulated machine takes some seconds to start; a daemon that compiles its kernels half a minute on a slow computer.
+# Longest wait (s): a simulated machine starts within seconds, a daemon that compiles its kernels takes half a minute on
+# a slow computer.
 PATIENCE_S = 30.0
 _LOOK_EVERY_S = 0.2
-# Good, or waiting for a person and not for time.
+# Qualities that end the wait: good, or waiting for a person.
 _SETTLED_QUALITIES = ("ok", "distrusted")
-# No socket yet, or one on which nobody listens.
+# Errors before a start: no socket yet, or no listener on it.
 _NOT_YET = (FileNotFoundError, ConnectionRefusedError)
 
 
 def wait_until(is_there: Callable[[], bool], missing: str, clock: Clock | None = None) -> bool:
-    """Whether it is there within `PATIENCE_S`; where it is not at once, `missing` is said on standard error."""
+    """Whether it appears within `PATIENCE_S`; prints `missing` on standard error if it is not there at once."""
     if is_there():
         return True
     clock, never = clock or MonotonicClock(), threading.Event()
@@ -39,12 +40,12 @@ def wait_until(is_there: Callable[[], bool], missing: str, clock: Clock | None =
 
 
 def wait_for_file(path: Path, clock: Clock | None = None) -> None:
-    """Return when the file is there, or patience is over: whoever reads it says what is wrong."""
+    """Return when the file exists, or patience is over; its reader then reports the fault."""
     wait_until(path.exists, f"{path} is not there yet", clock)
 
 
 def connect_patiently(address: str, connect: Callable[[str], Client], clock: Clock | None = None) -> Client:
-    """A connection to the daemon, which may be about to start.
+    """A connection to a daemon that may be starting.
 
     address : host:port, Unix socket, or the configuration that names one.  connect : as `compd.client.connect`.
     Raises DaemonError, ConfigurationError.
@@ -70,7 +71,7 @@ def connect_patiently(address: str, connect: Callable[[str], Client], clock: Clo
 
 
 def wait_for_gauges(client: Client, clock: Clock | None = None) -> None:
-    """Return when no gauge is about to come, or patience is over: the daemon says what is wrong with it."""
+    """Return when no gauge is expected any more, or patience is over; the daemon then reports the fault."""
 
     def not_good() -> list[str]:
         gauges = client.status()["gauges"]

@@ -1,4 +1,4 @@
-"""What compd cannot see: faults that look like a good machine, what shows some of them, and what each costs.
+"""Undetected faults: faults that look like a good machine, the checks that show some of them, and their cost.
 
 The numbers are those of one machine: its kinematics at machine zero, its lines and its limits. `BLIND_SPOTS` is the one
 list, for `compd check --what-cannot-be-seen` and for the documentation.
@@ -29,17 +29,17 @@ from compd.stated_noise import SCATTER_RATIO, tolerance_mm
 from compd.units import UM_PER_MM
 
 DRIFT_UM = 10.0
-# Handbooks: steel 11 to 12.5.
+# Expansion of steel; handbooks have 11 to 12.5.
 STEEL_PPM_PER_K = 11.5
-# Where no gauge says how fast the machine moves: a measuring machine between two points.
+# Assumed speed of a machine without a declared one: a measuring machine between two points.
 _USUAL_SPEED_MM_PER_S = 50.0
-# Of a link at that speed, in a gap of 0.2 s.
+# Motion (mm) of a link at that speed in a gap of 0.2 s.
 GAP_WAY_MM = 10.0
 _MM_PER_INCH = 25.4
 
 
 class DriftCost(NamedTuple):
-    """What a drift of one length by DRIFT_UM does to the tip, at machine zero, um.
+    """Tip error (um) at machine zero of a drift of one length by DRIFT_UM.
 
     length : as "scale 1". cmm_um : error of the published tip. machine_tool_um : by how much the tip misses its target.
     """
@@ -52,7 +52,7 @@ class DriftCost(NamedTuple):
 
 @dataclass(frozen=True)
 class Figures:
-    """What the numbers of the blind spots are computed from.
+    """Input of the numbers of the blind spots.
 
     exchange_mm : largest error at the tip where two scales that are 1 mm apart are exchanged.
     """
@@ -64,7 +64,7 @@ class Figures:
     budgets: Sequence[LineBudget]
 
     def largest_um(self, kind: str) -> float:
-        """Of the lengths of a kind ("scale", "joint", "frame"): the largest tip error of a drift of DRIFT_UM."""
+        """Largest tip error of a drift of DRIFT_UM among lengths of a kind ("scale", "joint", "frame")."""
         return max((d.cmm_um for d in self.drifts if d.length.startswith(kind)), default=math.nan)
 
     def leverage(self, kind: str) -> float:
@@ -95,14 +95,14 @@ class BlindSpot:
 
 
 def figures_of(configuration: Configuration) -> Figures:
-    """Everything that the numbers need. Raises KinematicsError for an impossible machine zero."""
+    """All input of the numbers. Raises KinematicsError for an impossible machine zero."""
     budgets = line_budgets(configuration)
     drifts, exchange_mm = drift_costs(configuration), _exchange_mm(configuration)
     return Figures(configuration, drifts, exchange_mm, feigned_jumps(configuration, budgets), budgets)
 
 
 def drift_costs(configuration: Configuration) -> list[DriftCost]:
-    """For every length gauge, scales first, then joints and frame: from the kinematics, at machine zero."""
+    """Tip error for every length gauge, scales first, then joints and frame: from the kinematics, at machine zero."""
     model = build_model(configuration.geometry, configuration.wiring)
     gauge_of = {length: gauge for gauge, lengths in measured_lengths(configuration).items() for length in lengths}
     lengths = [f"scale {link}" for link in range(1, model.links + 1)]
@@ -118,7 +118,7 @@ def drift_costs(configuration: Configuration) -> list[DriftCost]:
 
 
 def _exchange_mm(configuration: Configuration) -> float:
-    """Largest error at the tip where two scales that are 1 mm apart are exchanged."""
+    """Largest error at the tip for two exchanged scales 1 mm apart."""
     model = build_model(configuration.geometry, configuration.wiring)
     drift_mm = DRIFT_UM / UM_PER_MM
     errors_um = []
@@ -130,11 +130,11 @@ def _exchange_mm(configuration: Configuration) -> float:
 
 
 def _tip_errors_um(model: MachineModel, change_mm: FloatArray) -> tuple[float, float]:
-    """Error at the tip of readings that are wrong by `change_mm`, in CMM and in machine-tool mode."""
+    """Error at the tip of readings with an error of `change_mm`, in CMM and in machine-tool mode."""
     start = WarmStart.at_zero(model)
     shown, _ = compensate_cmm(model, _values(model, change_mm), start)
     cmm_um = _away_um(model, shown)
-    # in machine-tool mode the drive goes where the scale setpoint says, by a scale that is wrong itself
+    # in machine-tool mode the drive follows the scale setpoint by the wrong scale
     on_plate = isinstance(model.arrangement, ToolOnPlate)
     contact = model.zero.contact
     target_mm = contact.tip_P_mm if on_plate else _in_B0(model, contact.tip_M_mm)
@@ -150,7 +150,7 @@ def _tip_errors_um(model: MachineModel, change_mm: FloatArray) -> tuple[float, f
 
 
 def _away_um(model: MachineModel, computed: Compensation) -> float:
-    """How far the tip is from machine zero's; with the tool on the plate, on the work."""
+    """Distance of the tip from that at machine zero; on the work with the tool on the plate."""
     contact = model.zero.contact
     if isinstance(model.arrangement, ToolOnPlate):
         return float(np.linalg.norm(computed.tip_P_mm - contact.tip_P_mm) * UM_PER_MM)
@@ -205,7 +205,7 @@ def _late(figures: Figures) -> str:
 
 
 def _departure(figures: Figures) -> str:
-    """Until the next reading has come, which is asked for one poll after the last one, all links may have left."""
+    """All links may have left before the next reading, which is requested one poll after the last one."""
     gauges = figures.configuration.gauges
     rounds_s = {budget.name: budget.usual_s for budget in figures.budgets if budget.known}
     scales = [
@@ -291,7 +291,7 @@ def _wrong_thermometer(figures: Figures) -> str:
 
 
 def shown_by(spot: BlindSpot, configuration: Configuration | None = None) -> str:
-    """What shows a fault, in words: with the vote for it, and whether that is on in this configuration."""
+    """Checks that show a fault, in words: with the vote for it, and whether that is on in this configuration."""
     if not spot.vote:
         return spot.shown_by or "nothing"
     state = ""
@@ -318,7 +318,7 @@ def _gap(figures: Figures) -> str:
 
 
 def _at_rest(figures: Figures) -> str:
-    """What a gauge may lose in a gap at rest, by the kind of the gauge."""
+    """Largest loss of a gauge in a gap at rest, by the kind of the gauge."""
     parts = []
     for kind in ("scale", "joint", "frame"):
         names = {j.gauge.partition(".")[0] for j in figures.jumps if any(x.startswith(kind) for x in j.measures)}

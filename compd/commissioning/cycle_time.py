@@ -1,4 +1,4 @@
-"""How long a cycle of the loop takes on this computer: the daemon's own loop, run for a moment without gauges."""
+"""Duration of the loop's cycle on this computer: the daemon's own loop, run for a moment without gauges."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from compd.live.loop import (
 from compd.model import MachineModel
 
 _CYCLES = 200
-# Half a second in all, also for a loop that is slower; between two cycles the processor does something else.
+# Period (s) of the measured cycles: half a second in all, with other work of the processor in between.
 _PERIOD_S = 2.5e-3
-# A loop that takes more leaves too little time for drivers, clients and whatever else the computer does.
+# Largest share of the period for a cycle; more leaves too little time for drivers, clients and other programs.
 LARGEST_SHARE = 0.5
 _RAW_MM = 10.0
 _NOISE_MM = 1e-4
@@ -42,7 +42,7 @@ _QUANTITY = 20.0
 
 
 class CycleTime(NamedTuple):
-    """Of a cycle, from the snapshot of the readings to the bytes of the setpoint, s."""
+    """Durations (s) of a cycle, from the snapshot of the readings to the bytes of the setpoint."""
 
     median_s: float
     longest_s: float
@@ -69,7 +69,7 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
     timing = LoopTiming(min(settings.period_s, _PERIOD_S))
 
     def keep_on() -> bool:
-        """Readings for the next cycle, while there is one."""
+        """Readings for the next cycle, until the last one."""
         number = next(numbers)
         for channel, slot in latest.index.items():
             value = _value(zero.readings_mm, channel) + _NOISE_MM * (number % 3 - 1)
@@ -86,7 +86,7 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
 
 
 def python_effect_times(configuration: Configuration, clock: Clock | None = None) -> dict[str, float]:
-    """What each effect in plain Python of `state.model_file` takes of a cycle in CMM mode, s, by the effect's id.
+    """Time (s) of each effect in plain Python of `state.model_file` per cycle in CMM mode, by the effect's id.
 
     The effects of the library and formulas are compiled; all of them together take some microseconds. Raises CompdError
     where the model cannot be used.
@@ -126,7 +126,7 @@ def _compensation_time(machine: MachineModel, quantities: Sequence[str], clock: 
 
 
 def cycle_warnings(configuration: Configuration, cycle: CycleTime) -> list[Problem]:
-    """A rate at which the loop would have no time left."""
+    """A warning about a rate that leaves the loop no time."""
     rate_hz = configuration.loop.rate_hz
     if cycle.median_s * rate_hz <= LARGEST_SHARE:
         return []

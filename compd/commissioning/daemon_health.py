@@ -11,13 +11,16 @@ from compd.client import Message, connect
 from compd.errors import DaemonError
 from compd.setpoint_states import State, state_named
 
-# A setpoint that is good enough to look at; the daemon makes hundreds a second.
+# Rate (Hz) of setpoints for a look; the daemon makes hundreds a second.
 _RATE_HZ = 10.0
 _MOST_GAUGES = 5
 
 
 class Health(IntEnum):
-    """As monitoring plug-ins have it: https://www.monitoring-plugins.org/doc/guidelines.html, "Plugin Return Codes"."""
+    """Exit codes of monitoring plug-ins.
+
+    https://www.monitoring-plugins.org/doc/guidelines.html, "Plugin Return Codes".
+    """
 
     OK = 0
     WARNING = 1
@@ -27,7 +30,7 @@ class Health(IntEnum):
 
 @dataclass(frozen=True)
 class DaemonStatus:
-    """What the daemon says, or that it says nothing.
+    """The daemon's answers, or its silence.
 
     health : OK; WARNING, valid but not ok; CRITICAL, invalid or stopped; UNKNOWN, no answer.
     state, reason : of the last setpoint; "" without one.
@@ -68,7 +71,7 @@ class DaemonStatus:
 
 
 def daemon_status(address: str, timeout_s: float = 5.0) -> DaemonStatus:
-    """Ask the daemon at this address, for its status and a setpoint; what it does is not changed by that."""
+    """Ask the daemon at this address for its status and a setpoint, without changing its operation."""
     try:
         with connect(address, timeout_s) as client:
             machine = str(client.version["machine"])
@@ -108,7 +111,7 @@ def worst_gauges(gauges: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
 
 
 def warnings_of(gauges: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """What is to be looked at, of gauges that are believed all the same."""
+    """Warnings about gauges that are believed nevertheless."""
     words = [f"{gauge['channel']}: warning: {gauge['warning']}" for gauge in gauges if gauge.get("warning")]
     more = [f"and {len(words) - _MOST_GAUGES} more warnings"] if len(words) > _MOST_GAUGES else []
     return (*words[:_MOST_GAUGES], *more)

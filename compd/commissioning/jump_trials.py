@@ -1,4 +1,4 @@
-"""Which jump a length gauge can feign without being distrusted, and lines on which nobody can tell whose a reply is.
+"""Largest undetected jump of each length gauge, and lines with ambiguous replies.
 
 The limits of a gauge, `acceleration_mm_per_s2` and `fastest_mm_per_s`, say where something can have moved since the
 last poll; its noise comes to that (`compd.live.acquisition.possible_motion`). Without limits, any jump is believed that
@@ -20,21 +20,21 @@ from compd.gauge import GaugeOptions
 from compd.live.acquisition import FASTEST_ROUND_S, MotionLimits, unseen_jump_mm
 from compd.stated_noise import tolerance_mm
 
-# By how much later than planned the next reading comes, and was perhaps sampled, s. Measured on the shipped tripod,
+# Delay (s) of the next reading, and perhaps of its sampling, against the plan. Measured on the shipped tripod,
 # simulated, on two processors: quiet, by the jumps that were believed at load 1.2 (25 um of a joint); with other
 # processes on both processors all the time, 99.9 % of the readings.
 LATE_S, LATE_BUSY_S = 0.015, 0.08
 
 
 class BelievedJump(NamedTuple):
-    """poll_s : from one reading to the next, lateness included, s. jump_mm : the largest that is believed then."""
+    """poll_s : interval of readings including delays, s. jump_mm : the largest jump that is accepted then."""
 
     poll_s: float
     jump_mm: float
 
 
 class FeignedJump(NamedTuple):
-    """Of one gauge.
+    """Largest undetected jump of one gauge.
 
     gauge : its name. measures : what its channels measure, as "scale 1". quiet, busy : the largest jumps of a part at
     rest on a computer that does nothing else, and with four busy processes: inf without a limit, nan where the driver
@@ -48,7 +48,7 @@ class FeignedJump(NamedTuple):
 
 
 def feigned_jumps(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[FeignedJump]:
-    """For every gauge that measures a length, in the order of the file."""
+    """Largest undetected jumps of all length gauges, in the order of the file."""
     poll_s = {budget.name: _poll_s(budget) for budget in budgets}
     gauges = configuration.gauge_objects()
     measures = measured_lengths(configuration)
@@ -66,7 +66,7 @@ def feigned_jumps(configuration: Configuration, budgets: Sequence[LineBudget]) -
 
 
 def measured_lengths(configuration: Configuration) -> dict[str, tuple[str, ...]]:
-    """What each length gauge measures, as "scale 1", "joint 3", "frame u1", in the order of its channels."""
+    """Lengths measured by each gauge ("scale 1", "joint 3", "frame u1"), in the order of its channels."""
     wiring = configuration.wiring
     wires = [(f"scale {wire.link}", wire.gauge) for wire in wiring.scale]
     wires += [(f"joint {k}", wire.gauge) for k, wire in enumerate(wiring.joint, start=1)]
@@ -82,7 +82,7 @@ def measured_lengths(configuration: Configuration) -> dict[str, tuple[str, ...]]
 
 
 def jump_warnings(configuration: Configuration, jumps: Sequence[FeignedJump]) -> list[Problem]:
-    """A gauge without a limit, or with one that finds next to nothing."""
+    """Warnings about a gauge without a limit, or with a nearly ineffective one."""
     largest_mm = configuration.limits.correction_mm
     warnings = []
     for jump in jumps:
@@ -91,7 +91,7 @@ def jump_warnings(configuration: Configuration, jumps: Sequence[FeignedJump]) ->
             warnings.append(
                 Problem(
                     where=configuration.where("gauges", jump.gauge),
-                    what=f"any jump of {named_together(jump.measures)} is believed that two answers agree on",
+                    what=f"any jump of {named_together(jump.measures)} is accepted once two polls agree",
                     next_step="write `acceleration_mm_per_s2:`, the largest acceleration of what it measures",
                 )
             )
@@ -109,7 +109,7 @@ def jump_warnings(configuration: Configuration, jumps: Sequence[FeignedJump]) ->
 
 
 def reply_warnings(configuration: Configuration) -> list[Problem]:
-    """Lines with several gauges on which a late reply looks like the answer to the next request."""
+    """Lines of several gauges on which a late reply looks like the answer to the next request."""
     gauges = configuration.gauge_objects()
     return [
         Problem(
@@ -159,7 +159,7 @@ def _limits_text(options: GaugeOptions) -> str:
 
 
 def _without_identity(identities: Mapping[str, str | None]) -> list[str]:
-    """Gauges whose replies could be another one's, of the gauges of one line."""
+    """Gauges of one line whose replies are ambiguous."""
     counts = Counter(identities.values())
     unnamed = [gauge for gauge, identity in identities.items() if identity is None or counts[identity] > 1]
     return unnamed if len(identities) > 1 else []
@@ -175,7 +175,7 @@ def _jump(gauge: str, measures: tuple[str, ...], poll_s: float, options: GaugeOp
 
 
 def believed_jump(options: GaugeOptions, poll_s: float, noise_um: float) -> BelievedJump:
-    """The largest jump that is believed of a gauge with these limits and noise, with `poll_s` between two readings."""
+    """The largest accepted jump of a gauge with these limits and noise, with `poll_s` between two readings."""
     speed, acceleration = options.fastest_mm_per_s or math.inf, options.acceleration_mm_per_s2 or math.inf
     limits = MotionLimits(speed, acceleration)
     unlimited = math.isinf(speed) and math.isinf(acceleration)

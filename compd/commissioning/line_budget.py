@@ -1,4 +1,4 @@
-"""What a line can carry: bytes and milliseconds of a round, and the sampling rate that follows.
+"""Capacity of a line: bytes and milliseconds of a round, and the resulting sampling rate.
 
 This is the limit of the line itself: bits on the wire, the silence before each request, and the time that a device
 takes to answer. What the computer adds is not in it.
@@ -38,12 +38,12 @@ from compd.live.acquisition import LATER_S, SLOWER
 
 SHORTEST_QUIET_RTU_S = 1.75e-3  # the same, above 19200 baud
 SHORTEST_QUIET_ASCII_S = 1e-3
-# A slave must keep the silence too before it answers; many take longer: 10 ms is usual, so plan with both.
+# Usual time (s) of a slave's answer. It must keep the silence, too; many take longer, so both are planned with.
 USUAL_TURNAROUND_S = 10e-3
-# An FTDI adapter hands over a packet that is not full when its latency timer has run out: 16 ms, if nobody shortens it
-# (FTDI AN232B-04, "Data Throughput, Latency and Handshaking").
+# Latency timer (s) of an FTDI adapter, after which it hands over an incomplete packet: 16 ms by default (FTDI
+# AN232B-04, "Data Throughput, Latency and Handshaking").
 LATENCY_TIMER_S = 16e-3
-# Over Ethernet: a packet there and back through a device's firmware. No bits to count.
+# Time (s) of an exchange over Ethernet: a packet there and back through a device's firmware, independent of its length.
 TCP_EXCHANGE_S = 2e-3
 
 Traffic = Sequence[tuple[int, int]]
@@ -114,7 +114,7 @@ class LineBudget:
 
     @property
     def known(self) -> bool:
-        """Whether there are figures at all."""
+        """Whether any figures are known."""
         return self.exchanges > 0 and not self.unknown
 
     @property
@@ -144,7 +144,7 @@ def budget_of_line(
     slowest = pace(line, USUAL_TURNAROUND_S)
     trigger_s = _trigger_s(line, pace(line)) if known else 0.0
     usual_s = [slowest.exchange_s(*exchange) for exchange in known]
-    # The request goes out, and nothing comes for the timeout, or a gateway is busy for longer.
+    # A request without an answer takes the timeout, or longer behind a busy gateway.
     wait_s = max(line.timeout_s, (line.gateway_wait_s or 0.0) if isinstance(line, ModbusTcpLine) else 0.0)
     absent_s = max(
         (wait_s - slowest.exchange_s(0, traffic[0][1]) for traffic in gauges.values() if traffic), default=wait_s
@@ -164,7 +164,7 @@ def budget_of_line(
 
 
 def _trigger_s(line: PolledLine, line_pace: Pace) -> float:
-    """What a round trigger takes with its settling time, s; over TCP, and to one slave alone, with its confirmation."""
+    """Time (s) of a round trigger with its settling time; includes the confirmation over TCP, and of a single slave."""
     trigger = line.round_trigger
     if trigger is None:
         return 0.0
@@ -182,12 +182,12 @@ def _trigger_s(line: PolledLine, line_pace: Pace) -> float:
 
 
 def _as_text(sent: int, received: int) -> tuple[int, int]:
-    """Bytes in Modbus ASCII of what has so many in RTU: two digits each, one byte of LRC for two of CRC, : CR LF."""
+    """Length in Modbus ASCII of an RTU frame: two digits per byte, one byte of LRC for two of CRC, : CR LF."""
     return 2 * (sent - 1) + 3, 2 * (received - 1) + 3 if received else 0
 
 
 def _silence_s(line_pace: Pace, traffic: Traffic) -> float:
-    """How long the line is listened to at the end of a round, s (`compd.live.acquisition.reply_order`)."""
+    """Time (s) of listening to the line at the end of a round (`compd.live.acquisition.reply_order`)."""
     longest_s = max((line_pace.exchange_s(sent, received) for sent, received in traffic), default=0.0)
     return SLOWER * longest_s + LATER_S
 

@@ -1,4 +1,4 @@
-"""What `compd check` warns of where a line cannot carry what is configured, or not while one device is absent."""
+"""Warnings of `compd check` about overloaded lines, also in the absence of one device."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from compd.commissioning.line_budget import LATENCY_TIMER_S, LineBudget, gauges_
 from compd.configuration import Configuration, SerialPortSettings
 from compd.errors import Problem
 
-# Lengths that are further apart, s, and nobody limits it or latches them: at 1 mm/s, which is slow for a machine that
-# moves, 20 um, and a comparator shows a hundredth of that.
+# Largest skew (s) of lengths without a warning, if neither limited nor latched: at 1 mm/s, slow for a moving machine,
+# it makes 20 um, and a comparator shows a hundredth of that.
 LARGEST_SPREAD_S = 0.02
 
 
 def budget_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[Problem]:
-    """What will not work as configured, or will not while one device is absent."""
+    """Warnings about lines that fail as configured, or in the absence of one device."""
     problems = []
     for budget in budgets:
         stale_after_s = min(
@@ -26,7 +26,7 @@ def budget_warnings(configuration: Configuration, budgets: Sequence[LineBudget])
 
 
 def _skew_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[Problem]:
-    """Lines whose lengths are measured far apart: beyond `loop.skew_s`, or unnoticed where that is left out."""
+    """Lines with a large skew of lengths: beyond `loop.skew_s`, or unnoticed without that limit."""
     allowed_s = configuration.loop.skew_s
     measuring = [budget for budget in budgets if budget.known and _measures_lengths(configuration, budget.name)]
     problems = []
@@ -77,7 +77,7 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
         ]
     problems = []
     takes = f"a round of {budget.bytes} bytes takes {budget.usual_s * 1e3:.1f} ms with 10 ms turnaround"
-    # A reading is up to a whole round old when the next one comes, and must outlive that one's own reading.
+    # A reading is up to a whole round old when the next one comes, and must stay fresh during its reading.
     if 2 * budget.usual_s > stale_after_s:
         problems.append(
             Problem(

@@ -1,4 +1,4 @@
-"""How often gauges that speak by themselves are to have a new value, and whether that is often enough."""
+"""Periods of gauges with pushed values, and warnings about too long ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from compd.source_time import LATE
 
 
 def longest_period_s(line: LineSettings, gauge: Gauge[Any]) -> float:
-    """The longest time from one value of a gauge to the next, s; nan where the configuration does not say it.
+    """Longest interval (s) of a gauge's values; nan if the configuration does not state it.
 
     Of OPC UA: a value waits for the next look at its node, and then for the next message.
     """
@@ -24,7 +24,7 @@ def longest_period_s(line: LineSettings, gauge: Gauge[Any]) -> float:
 
 
 def period_warnings(configuration: Configuration) -> list[Problem]:
-    """Gauges whose values are too old before the next one comes."""
+    """Gauges whose values become stale before the next one."""
     problems = []
     for name, gauge in configuration.gauge_objects().items():
         options = configuration.gauges[name]

@@ -1,4 +1,4 @@
-"""What `compd check` warns of where lines reach one device by two names: each would take the other's turn at it."""
+"""Warnings of `compd check` about two names of one device: its lines would wait for each other."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from compd.errors import Problem
 
 
 def shared_address_warnings(configuration: Configuration) -> list[Problem]:
-    """Lines over TCP whose hosts have different names, but an address and the port in common.
+    """Lines over TCP with different host names, but a common address and port.
 
     A name that cannot be resolved on this computer is no warning: it may be one of the machine's network.
     """
@@ -40,7 +40,7 @@ def _shared_addresses(configuration: Configuration) -> Iterator[Problem]:
 
 
 def _addresses(host: str) -> list[str]:
-    """The numeric addresses of a host; none where its name cannot be resolved."""
+    """The numeric addresses of a host; empty if its name cannot be resolved."""
     try:
         resolved = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):

@@ -103,7 +103,7 @@ def _solve(
     program, structure = model.program, model.structure
     count, links = rows.scale_mm.shape
     solved = _Solved(
-        _room(count, RESULT),
+        _uninitialised(count, RESULT),
         np.empty((count, 2 + len(program.effects), links)),
         memory.pack(model, rows.joint_mm.shape[1]),
     )
@@ -132,7 +132,7 @@ def _solve(
         *rows.warm,
         solved.memory.motion,
         solved.memory.memories,
-        _room(1, WORKSPACE),
+        _uninitialised(1, WORKSPACE),
         solved.results,
         solved.shares_mm,
     )
@@ -144,7 +144,7 @@ def _not_given(count: int, links: int) -> FloatArray:
     return np.full((count, links), np.nan)
 
 
-def _room(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:
+def _uninitialised(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:
     """So many structures, not filled; `np.empty` takes 5 us for nested ones."""
     return np.ndarray(count, structure, np.empty(count * structure.itemsize, dtype=np.uint8))
 

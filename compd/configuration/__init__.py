@@ -1,4 +1,4 @@
-"""The machine configuration: written by a person, checked whole, never rewritten by the program."""
+"""The machine configuration: written by a person, checked as a whole, never rewritten by the program."""
 
 import lazy_loader
 

@@ -14,7 +14,7 @@ from compd.configuration.sections import Sections
 from compd.errors import Problem
 from compd.gauge import Gauge, GaugeOptions
 
-# Packages whose drivers are tried with compd's own tests, wire by wire.
+# Packages whose drivers are covered by compd's own tests.
 _OWN_PACKAGES = ("compd", "compd_drivers")
 
 
@@ -29,8 +29,10 @@ def problems(sections: Sections) -> list[Problem]:
 
 
 def warnings(sections: Sections) -> list[Problem]:
-    """What can be used but is probably a mistake or a risk: lines without gauges, gauges without wires, drivers from
-    elsewhere in the process of the other lines."""
+    """Usable but suspicious settings.
+
+    Lines without gauges, gauges without wires, and foreign drivers in the process of other lines.
+    """
     gauges = sections.document.data.get("gauges")
     named = gauges.values() if isinstance(gauges, dict) else ()
     used_lines = {str(options.get("line")) for options in named if isinstance(options, dict)}
@@ -66,7 +68,7 @@ def warnings(sections: Sections) -> list[Problem]:
 def resolve_channel(
     channel: str, gauges: Mapping[str, GaugeOptions], drivers: Mapping[str, type[Gauge[Any]]]
 ) -> str | None:
-    """The full name "gauge.channel" of a channel, which may be written "gauge" where the gauge has only one.
+    """The full name "gauge.channel" of a channel; "gauge" alone is allowed for a gauge with one channel.
 
     None if there is no such channel, or if several fit.
     """
@@ -80,7 +82,7 @@ def resolve_channel(
 
 
 def _option_warnings(sections: Sections) -> Iterator[Problem]:
-    """What a driver finds doubtful about its gauge's options."""
+    """A driver's doubts about its gauge's options."""
     for name, options in sections.gauges.items():
         for location, what, value, next_step in sections.drivers[name](options).doubts():
             where = sections.document.where(("gauges", name, *location))
@@ -88,7 +90,7 @@ def _option_warnings(sections: Sections) -> Iterator[Problem]:
 
 
 def _vote_problems(sections: Sections) -> Iterator[Problem]:
-    """A vote that looks at what is not wired."""
+    """A vote on a quantity that is not wired."""
     temperature = getattr(getattr(sections.votes, "frame", None), "temperature", None)
     names = [wire.name for _, wire in _entries(sections.wiring, "quantities")]
     if temperature is not None and temperature not in names and None not in names:
@@ -102,7 +104,7 @@ def _vote_problems(sections: Sections) -> Iterator[Problem]:
 
 
 def _vote_warnings(sections: Sections) -> Iterator[Problem]:
-    """A vote that nobody can give."""
+    """A vote without any gauge that can give it."""
     roles = {(wire.link, wire.role) for _, wire in _entries(sections.wiring, "joint")}
     pairs = [link for link, role in roles if role == "Ra" and (link, "Rb") in roles]
     if getattr(sections.votes, "joint_pair_um", None) is not None and not pairs:
@@ -129,12 +131,12 @@ def _shared_process_warnings(sections: Sections) -> Iterator[Problem]:
 
 
 def _from_elsewhere(driver: str, kind: type[Gauge[Any]]) -> bool:
-    """Whether a driver is a person's own file, or of another package than compd's. driver : as the file names it."""
+    """Whether a driver is a person's own file or from a foreign package. driver : its name in the file."""
     return driver.startswith("/") or kind.__module__.partition(".")[0] not in _OWN_PACKAGES
 
 
 def _entries(wiring: Any, kind: str) -> list[tuple[int, Any]]:
-    """The wires of a kind that could be read, each with its place in the list."""
+    """The readable wires of a kind, each with its index in the list."""
     return [(i, wire) for i, wire in enumerate(getattr(wiring, kind, None) or ()) if wire is not None]
 
 
@@ -157,7 +159,7 @@ def _channel_problems(sections: Sections) -> Iterator[Problem]:
         name = channel.split(".")[0]
         where = sections.document.where(location)
         if name not in sections.gauges:
-            if name not in gauges_in_file:  # a gauge with a problem of its own is reported already
+            if name not in gauges_in_file:  # a faulty gauge is already reported
                 yield Problem(
                     where=where,
                     what="no such gauge",
@@ -200,7 +202,7 @@ def _completeness_problems(sections: Sections) -> Iterator[Problem]:
 
 
 def _is_whole(wiring: Any, kind: str, key: str) -> bool:
-    """Whether this key of all wires of a kind could be read: only then is one that is not there missing."""
+    """Whether this key of all wires of a kind could be read; only then is an absent one missing."""
     wires = getattr(wiring, kind, None)
     return wires is not None and all(getattr(wire, key, None) is not None for wire in wires)
 

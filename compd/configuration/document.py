@@ -1,4 +1,4 @@
-"""A YAML document with the line of every key, so that a problem can name it."""
+"""A YAML document with the line of every key, for the messages of problems."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from compd.files import FileKind
 
 __all__ = ["CONFIGURATION", "Document", "Location", "dotted", "read_document", "read_entries"]
 
-# Two sections, as a person's first lines have them: a recording's sidecar has the machine's name, too.
+# Sections that mark a configuration: two, since a recording's sidecar has the machine's name, too.
 CONFIGURATION = FileKind(
     "a machine's configuration",
     frozenset({"machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state"}),
@@ -32,7 +32,7 @@ class Document:
     lines: dict[Location, int]
 
     def where(self, location: Location) -> str:
-        """`file:line key.path` of the deepest part of `location` that the file has."""
+        """`file:line key.path` of the deepest existing part of `location`."""
         for length in range(len(location), -1, -1):
             if location[:length] in self.lines:
                 return f"{self.path}:{self.lines[location[:length]]} {self._dotted(location)}".rstrip()
@@ -45,7 +45,7 @@ class Document:
         )
 
     def value(self, location: Location) -> Any:
-        """The value at `location`; None where the file has none."""
+        """The value at `location`; None if the file has none."""
         value: Any = self.data
         for part in location:
             try:

@@ -34,12 +34,12 @@ EffectFiles = Annotated[
 
 
 def listed_code(effects: Sequence[EffectFile]) -> ListedCode:
-    """The files of the section, as what loads effects takes them."""
+    """The files of the section as arguments of the effect loader."""
     return ListedCode({entry.file: entry.sha256 for entry in effects})
 
 
 def effect_file_problems(document: Document, effects: Sequence[Any]) -> Iterator[Problem]:
-    """A file that is listed twice, is not there, has another hash, or cannot be loaded: each is executed.
+    """Problems of files: listed twice, missing, another hash, loading fails. Each file is executed.
 
     effects : of the document, as `section.readable` gives it; an entry that has a problem of its own is left out.
     """

@@ -1,4 +1,4 @@
-"""The machine's geometry as a person writes it: mm, radians, and the frame in every key."""
+"""The machine's geometry in the configuration: mm, radians, and the frame in every key."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from compd.configuration.section import Finite, Positive, Section
 
 LINKS: Mapping[str, int] = {"tripod_3spr": 3, "hexapod_6ups": 6}
 
-# A drawing gives coordinates to 1 nm at best: a frame that misses its convention by more was measured or typed wrongly.
+# Largest deviation (mm) of a frame from its convention: a drawing gives coordinates to 1 nm at best.
 CONVENTION_TOLERANCE_MM = 1e-6
 
 
@@ -22,7 +22,7 @@ Vector = tuple[Finite, Finite, Finite]
 
 
 def _unit_vector(vector: Vector) -> Vector:
-    """The vector itself; ValueError where its length is not 1."""
+    """The vector itself; ValueError unless its length is 1."""
     length = math.hypot(*vector)
     if not math.isclose(length, 1.0, abs_tol=1e-6):
         raise ValueError(f"must have length 1, has {length:.9g}")
@@ -108,7 +108,7 @@ class Geometry(Section):
 
 
 class GeometryProblem(NamedTuple):
-    """What does not fit together in a geometry. location : below `geometry`."""
+    """A contradiction in a geometry. location : below `geometry`."""
 
     location: Location
     what: str
@@ -118,7 +118,7 @@ class GeometryProblem(NamedTuple):
 
 
 def contradictions(geometry: Any) -> list[GeometryProblem]:
-    """Everything in a geometry that does not fit together, as far as it could be read.
+    """All contradictions in the readable parts of a geometry.
 
     geometry : a `Geometry`, or what `section.readable` makes of a faulty one.
     """
@@ -153,7 +153,7 @@ def _frame_contradictions(base: Any) -> Iterator[GeometryProblem]:
 
 
 def _point_contradictions(geometry: Any) -> Iterator[GeometryProblem]:
-    """Points that are the same, and a plate whose points lie in line."""
+    """Coinciding points, and a plate with collinear points."""
     lists: tuple[tuple[Location, Any], ...] = (
         (("base", "joints_B_mm"), getattr(getattr(geometry, "base", None), "joints_B_mm", None)),
         (("platform", "joints_P_mm"), getattr(getattr(geometry, "platform", None), "joints_P_mm", None)),
@@ -172,7 +172,7 @@ def _point_contradictions(geometry: Any) -> Iterator[GeometryProblem]:
 
 
 def _count_contradictions(geometry: Any) -> Iterator[GeometryProblem]:
-    """As many joints and axes as links, and nothing that a tripod cannot have."""
+    """Check that joints and axes match the links, and that a tripod has only keys of a tripod."""
     kinematics = getattr(geometry, "kinematics", None)
     if kinematics is None:
         return

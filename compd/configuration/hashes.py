@@ -1,4 +1,4 @@
-"""Hashes of a configuration, which recordings, models and machine zero repeat: equal for what says the same."""
+"""Hashes of a configuration, repeated in recordings, models and machine zero; equal for equivalent settings."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pydantic import BaseModel
 
 from compd.configuration.operation import TargetSettings, VoteSettings
 
-# What says how far a gauge is believed, and not what it shows.
+# Keys about the trust in a gauge, not its value.
 NOT_IN_ZERO = (
     *("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss"),
     *("plausible", "fastest_change", "apart"),
 )
-# Options that a later release has brought, with the value that leaves everything as it was.
+# Options of later releases, with their neutral values.
 _LATER_OPTIONS: Mapping[str, Any] = {
     "fastest_mm_per_s": None,
     "acceleration_mm_per_s2": None,
@@ -58,7 +58,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "standing_temperature_K": VoteSettings().standing_temperature_K,
     "tip_error_um": None,
 }
-# Up to 0.2.0 these drivers had a limit of their own, mm/s, which was part of the hashes.
+# Speed limits (mm/s) of drivers up to 0.2.0, which were part of the hashes.
 _FORMER_SPEED_LIMITS: Mapping[str, float] = {
     "heidenhain_nd28x": 200.0,
     **dict.fromkeys(
@@ -91,7 +91,7 @@ def hash_of(configuration: object, fields: tuple[str, ...], without: tuple[str, 
 
 
 def _stated_options(options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options that say anything: one that a later release has brought, and that is left out, changes no hash."""
+    """The effective options: an omitted option of a later release changes no hash."""
     stated = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
     if "low_latency" in stated:  # false if left out, up to 0.2.0
         stated["low_latency"] = bool(stated["low_latency"])

@@ -14,7 +14,7 @@ from compd.text import join_words
 
 
 class _Library(NamedTuple):
-    """A package that is not installed with compd, and the extra that installs it."""
+    """An optional package, and the extra that installs it."""
 
     package: str
     extra: str
@@ -24,7 +24,7 @@ LIBRARIES: Mapping[str, _Library] = {"opc_ua": _Library("asyncua", "opcua"), "mq
 
 
 def line_problems(sections: Sections) -> Iterator[Problem]:
-    """Every contradiction between lines, and between a line and its gauges, as far as they could be read."""
+    """Every contradiction between lines, and between a line and its gauges, in the readable parts."""
     yield from _port_problems(sections)
     yield from _kind_problems(sections)
     yield from _library_problems(sections)
@@ -34,7 +34,7 @@ def line_problems(sections: Sections) -> Iterator[Problem]:
 
 
 def _port_problems(sections: Sections) -> Iterator[Problem]:
-    """A port or an address that two lines name: behind one address a gateway's units wait for each other."""
+    """A port or an address of two lines: units behind one gateway wait for each other."""
     line_of_port: dict[str, str] = {}
     for name, line in sections.lines.items():
         port = getattr(line, "port", None)
@@ -53,7 +53,7 @@ def _port_problems(sections: Sections) -> Iterator[Problem]:
 
 
 def endpoint(port: str) -> str:
-    """A port by one spelling: host:port for any that is reached by TCP, whatever is spoken there."""
+    """A port in a canonical spelling: host:port for any TCP port, independent of its protocol."""
     scheme, slashes, address = port.partition("//")
     if not slashes or scheme not in ("", "socket:", "rfc2217:"):
         return port
@@ -95,7 +95,7 @@ def _kind_problems(sections: Sections) -> Iterator[Problem]:
 
 
 def _library_problems(sections: Sections) -> Iterator[Problem]:
-    """A line whose kind needs a library that is not installed."""
+    """A line of a kind without its library."""
     for name, line in sections.lines.items():
         library = LIBRARIES.get(getattr(line, "kind", ""))
         if library is not None and find_spec(library.package) is None:
@@ -108,7 +108,7 @@ def _library_problems(sections: Sections) -> Iterator[Problem]:
 
 
 def _signal_problems(sections: Sections) -> Iterator[Problem]:
-    """A gauge that is asked by what its line does not have."""
+    """A gauge whose request needs a signal that its line lacks."""
     for name, options in sections.gauges.items():
         line = sections.lines.get(options.line)
         over_tcp = getattr(line, "kind", None) == "tcp" or str(getattr(line, "port", "")).startswith("socket://")
@@ -123,7 +123,7 @@ def _signal_problems(sections: Sections) -> Iterator[Problem]:
 
 
 def _power_problems(sections: Sections) -> Iterator[Problem]:
-    """A line whose DTR or RTS is not as a gauge on it needs it for its power."""
+    """A line whose DTR or RTS contradicts the power supply of a gauge."""
     needed: dict[tuple[str, str], tuple[str, bool]] = {}
     for name, options in sections.gauges.items():
         line = sections.lines.get(options.line)
@@ -147,7 +147,7 @@ def _power_problems(sections: Sections) -> Iterator[Problem]:
 
 
 def _process_problems(sections: Sections) -> Iterator[Problem]:
-    """A line that is to have a process of its own and does not exist, or is named twice."""
+    """A line for a process of its own that does not exist or is listed twice."""
     lines = sections.document.data.get("lines")
     if not isinstance(lines, dict):
         return

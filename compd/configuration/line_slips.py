@@ -1,4 +1,4 @@
-"""Slips in a line's port, rate or address, with which it is never opened, or opened to something else."""
+"""Slips in a line's port, rate or address that prevent opening it, or open something else."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from compd.configuration.line_checks import endpoint
 from compd.configuration.sections import Sections
 from compd.errors import Problem
 
-# Baud rates that pyserial does not list: MIDI, DMX512, and those of older modems and micro-controllers.
+# Baud rates missing in pyserial's list: MIDI, DMX512, and those of older modems and micro-controllers.
 _BAUDRATES = (*Serial.BAUDRATES, 14_400, 28_800, 31_250, 56_000, 76_800, 128_000, 250_000, 256_000)
-# What pyserial opens by a URL.
+# URL schemes of pyserial.
 _SCHEMES = ("socket", "rfc2217", "loop", "spy", "alt", "cp2110", "hwgrep")
-# RFC 1123, with the underscore of networks without a name server.
+# Host names by RFC 1123, with the underscore of networks without a name server.
 _HOST_NAME = re.compile(r"[A-Za-z0-9_]([A-Za-z0-9_-]*[A-Za-z0-9_])?(\.[A-Za-z0-9_]([A-Za-z0-9_-]*[A-Za-z0-9_])?)*\.?")
 
 
@@ -66,13 +66,13 @@ def _why_no_port(port: str, scheme: str) -> str:
         return "is no port of this computer"
     try:
         mode = Path(port).stat().st_mode
-    except (OSError, ValueError):  # not there yet, or nobody can say: another user's directory, too long a name
+    except (OSError, ValueError):  # not there yet, or unknown: another user's directory, too long a name
         return ""
     return "" if stat.S_ISCHR(mode) else "is no serial port, but something else"
 
 
 def _why_no_host(host: str) -> str:
-    """What is wrong with an address; "" for one that a device can have, and for a name."""
+    """The fault of an address; "" for a possible address of a device, and for a name."""
     try:
         address = ipaddress.ip_address(host.strip("[]"))
     except ValueError:
@@ -89,7 +89,7 @@ def _why_no_host(host: str) -> str:
 
 
 def _own_port(sections: Sections, name: str, address: str) -> Iterator[Problem]:
-    """A line whose device is the daemon itself."""
+    """A line to the daemon itself."""
     tcp = sections.document.value(("sockets", "tcp"))
     if not isinstance(tcp, dict) or "port" not in tcp:
         return

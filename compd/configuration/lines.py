@@ -1,4 +1,4 @@
-"""Lines: the wires that gauges hang on."""
+"""Lines: the wires of the gauges."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _TRIGGER = "latches all gauges of the line before each round: their readings hav
 
 
 class Rs485(Section):
-    """RTS as the direction of a two-wire RS-485 line, for adapters that do not switch it themselves."""
+    """RTS as the direction of a two-wire RS-485 line, for adapters without automatic switching."""
 
     rts_when_sending: bool = Field(default=True, description="RTS is HIGH while a request is sent, else LOW; or not")
     delay_before_s: NotNegative = Field(default=0.0, description="from the switch of RTS to the request")
@@ -141,7 +141,7 @@ class ModbusTcpLine(_LineSettings):
 
 
 def powered(line: AnyLine, gauges: Iterable[Gauge[Any]]) -> AnyLine:
-    """The line with DTR and RTS as its gauges need them, where its own keys leave them open."""
+    """The line with DTR and RTS as its gauges need them, unless set by its own keys."""
     if not isinstance(line, SerialPortSettings) or line.port.startswith("socket://"):
         return line
     needs: dict[str, bool] = {
@@ -152,7 +152,7 @@ def powered(line: AnyLine, gauges: Iterable[Gauge[Any]]) -> AnyLine:
 
 PolledLine = SerialLine | TcpLine | ModbusRtuLine | ModbusAsciiLine | ModbusTcpLine
 LineSettings = Annotated[PolledLine | OpcUaLine | MqttLine, Field(discriminator="kind")]
-# What each kind of line carries, as `Gauge.line_kind` has it.
+# Payload of each kind of line, as in `Gauge.line_kind`.
 CARRIES: Mapping[str, LineKind] = {
     "serial": "bytes",
     "tcp": "bytes",

@@ -39,12 +39,12 @@ from compd.stated_noise import StatedNoise, stated_noise
 if TYPE_CHECKING:
     import pandas as pd
 
-# Sidecars name any machine so that compd does not know.
+# Name in sidecars for any machine unknown to compd.
 _EXTERNAL = "external"
 
 
 def _own_name(machine: str) -> str:
-    """The name itself; ValueError where a sidecar would mean something else by it."""
+    """The name itself; ValueError for a name with another meaning in sidecars."""
     if machine == _EXTERNAL:
         raise ValueError("recordings of machines without a configuration have this name: choose another one")
     return machine
@@ -69,13 +69,13 @@ SECTIONS: Mapping[str, Any] = {
     "state": StateSettings,
     "effects": EffectFiles,
 }
-# What stands for a section that the file does not have.
+# Defaults of omitted sections.
 OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings(), "votes": VoteSettings(), "effects": ()}
 
 
 @dataclass(frozen=True, repr=False)
 class Configuration:
-    """A whole machine, checked: what `load_machine` returns.
+    """A whole, checked machine, as returned by `load_machine`.
 
     Attributes
     ----------
@@ -140,12 +140,12 @@ class Configuration:
         return {name: self.drivers[name](options) for name, options in self.gauges.items()}
 
     def noise_of(self, gauge: str) -> StatedNoise:
-        """How much the lengths of a gauge scatter. gauge : its name, or that of one of its channels."""
+        """Noise of a gauge's lengths. gauge : its name, or that of one of its channels."""
         name = gauge.split(".", maxsplit=1)[0]
         return stated_noise(self.gauges[name], self.drivers[name])
 
     def to_dataframe(self) -> pd.DataFrame:
-        """One row per channel that is wired, as a pandas data frame.
+        """One row per wired channel, as a pandas data frame.
 
         Returns
         -------
@@ -201,23 +201,23 @@ class Configuration:
     def config_hash(self) -> str:
         """Hash of everything in the file, equal for two daemons with the same configuration."""
         fields = ("machine", "geometry", "lines", "gauges", "wiring", "loop", "limits", "sockets", "state")
-        # an optional section that says nothing changes no hash: recordings and controllers know those of older releases
+        # an optional section without settings changes no hash: recordings and controllers know those of older releases
         said = tuple(name for name, default in OPTIONAL_SECTIONS.items() if getattr(self, name) != default)
         return hash_of(self, (*fields, *said))
 
     @property
     def geometry_hash(self) -> str:
-        """Hash of what a model is fitted on, the geometry without the limits of the links' length."""
+        """Hash of the basis of a model: the geometry without the limits of the links' length."""
         return hash_of(self, ("geometry",), without=("link_length_mm",))
 
     @property
     def zero_hash(self) -> str:
-        """Hash of what machine zero depends on, geometry, gauges and wiring, but no port, rate, limit or noise."""
+        """Hash of the basis of machine zero: geometry, gauges and wiring without ports, rates, limits and noise."""
         return hash_of(self, ("machine", "geometry", "gauges", "wiring"), without=NOT_IN_ZERO)
 
 
 class Examined(NamedTuple):
-    """A file as far as it can be read: what is to be mended, and the configuration where nothing is.
+    """The readable part of a file: its problems, and the configuration if there are none.
 
     geometry, wiring : None where they have a problem.
     """
@@ -247,7 +247,7 @@ def in_order(problems: Sequence[Problem]) -> list[Problem]:
 
 
 def examine(path: Path) -> Examined:
-    """Read a configuration as far as that is possible; every check is made that what could be read allows.
+    """Read a configuration as far as possible, with every check on its readable parts.
 
     Raises ConfigurationError where the file as a whole cannot be read.
     """
@@ -297,7 +297,7 @@ def examine(path: Path) -> Examined:
 def gauges_of(
     document: Document, problems: list[Problem]
 ) -> tuple[dict[str, GaugeOptions], dict[str, type[Gauge[Any]]]]:
-    """Each gauge's options, checked by its own driver's model, and its driver; the problems of a faulty one are noted.
+    """Each gauge's options, checked by its driver's model, and its driver; notes the problems of faulty ones.
 
     A gauge with faulty options is not among the options.
     """
@@ -352,7 +352,7 @@ def gauges_of(
 
 
 def _why_not_made(driver: type[Gauge[Any]], options: GaugeOptions) -> str | None:
-    """Why a driver, whose author may have made any mistake, cannot be made with these options; None where it can."""
+    """Reason why a driver, possibly faulty itself, cannot be created with these options; None if it can."""
     try:
         channels = [(channel.name, channel.unit) for channel in driver(options).channels]
     except Exception as error:  # noqa: BLE001
@@ -364,6 +364,6 @@ def _why_not_made(driver: type[Gauge[Any]], options: GaugeOptions) -> str | None
 
 
 def _line_number(where: str) -> int:
-    """The line in "file:line key.path"; 0 where there is none, so that problems of the whole file come first."""
+    """The line in "file:line key.path"; 0 without one, so that problems of the whole file come first."""
     found = re.search(r":(\d+)(?: |$)", where)
     return int(found[1]) if found else 0

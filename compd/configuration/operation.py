@@ -19,7 +19,7 @@ _GAUGE = "the gauge's name under `gauges:`; where it has several channels, `gaug
 
 
 class ScaleWire(Section):
-    """Which gauge is the linear scale of a link."""
+    """Assignment of a gauge to the linear scale of a link."""
 
     link: LinkNumber = Field(description="the link, counted from 1")
     gauge: GaugeChannel = Field(description=_GAUGE)
@@ -27,7 +27,7 @@ class ScaleWire(Section):
 
 
 class JointWire(Section):
-    """Which gauge is which joint comparator; their order numbers them 1, 2, 3 ..."""
+    """Assignment of a gauge to a joint comparator; the order numbers them 1, 2, 3 ..."""
 
     link: LinkNumber = Field(description="the link, counted from 1, at whose joint it is")
     role: Literal["S", "Ra", "Rb", "B"] = Field(
@@ -42,7 +42,7 @@ class JointWire(Section):
 
 
 class FrameWire(Section):
-    """Which gauge measures which of the nine frame distances."""
+    """Assignment of a gauge to one of the nine frame distances."""
 
     distance: FrameDistance = Field(
         description="t1 = b1 b2, t2 = b2 b3, t3 = b3 b1, between the supports of the base platform; u1 = b1 m1, "
@@ -84,7 +84,7 @@ class QuantityWire(Section):
 
 
 class Wiring(Section):
-    """Which gauge measures which quantity of the machine."""
+    """Assignment of gauges to the quantities of the machine."""
 
     scale: tuple[ScaleWire, ...] = Field(description="one entry for the linear scale of every link")
     joint: tuple[JointWire, ...] = Field(description="one entry for every joint comparator")
@@ -141,7 +141,7 @@ class AcquisitionSettings(Section):
 
 
 class LimitSettings(Section):
-    """What a correction may be, per link, and how wrong the tip."""
+    """Limits of the correction per link, and of the tip's error."""
 
     correction_mm: Positive = Field(description="largest correction of one link, to either side")
     slew_mm_per_s: Positive = Field(description="fastest change of a correction")
@@ -166,8 +166,10 @@ class FrameVote(Section):
 
 
 class VoteSettings(Section):
-    """What the gauges say of each other; the section may be left out. A gauge that others contradict is not believed
-    until a person accepts it."""
+    """Cross-checks between gauges; the section may be left out.
+
+    A gauge that others contradict is distrusted until a person accepts it.
+    """
 
     repeated_digits: bool = Field(
         default=True,
@@ -258,20 +260,20 @@ class TcpSocket(Section):
 
 
 class UnixSocket(Section):
-    """Clients on this computer; machine zero is taken here only."""
+    """Clients on this computer; machine zero is only taken here."""
 
     path: AbsolutePath = Field(max_length=100, description="absolute path of the Unix socket")
 
 
 class UdpTarget(Section):
-    """Where the binary SETPOINT goes, one packet per cycle."""
+    """Destination of the binary SETPOINT, one packet per cycle."""
 
     host: Text = Field(description="name or address of the controller")
     port: Annotated[int, Field(ge=1, le=65535)] = Field(description="UDP port of the controller")
 
 
 class TargetSettings(Section):
-    """What a controller's `TARGET` counts; the section may be left out."""
+    """Validity of a controller's `TARGET`; the section may be left out."""
 
     valid_for_s: Positive = Field(
         default=5.0,
@@ -282,7 +284,7 @@ class TargetSettings(Section):
 
 
 class SocketSettings(Section):
-    """Where clients connect."""
+    """Addresses for clients."""
 
     tcp: TcpSocket | None = Field(default=None, description="clients over TCP; left out: none")
     unix: UnixSocket = Field(description="clients on this computer; machine zero and models are asked for here only")
@@ -294,7 +296,7 @@ class SocketSettings(Section):
 
 
 class StateSettings(Section):
-    """What the daemon keeps across restarts, and what it starts with."""
+    """State that the daemon keeps across restarts, and its model at the start."""
 
     directory: AbsolutePath = Field(description="absolute path of the directory in which machine zero is kept")
     model_file: AbsolutePath | None = Field(

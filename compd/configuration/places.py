@@ -1,4 +1,4 @@
-"""Places of a configuration outside of its file: directories that it names, and files."""
+"""Paths in a configuration: directories and files that it names."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from compd.configuration.document import Document
 from compd.configuration.operation import SocketSettings, StateSettings
 from compd.errors import Problem
 
-# Below these, the service manager makes the daemon's own directory: RuntimeDirectory=, StateDirectory=.
+# Below these the service manager creates the daemon's own directory: RuntimeDirectory=, StateDirectory=.
 _OF_SERVICE_MANAGER = tuple(map(Path, ("/run", "/var/lib")))
-# File systems of the kernel, in which nobody can make a directory.
+# File systems of the kernel, where no directory can be created.
 _OF_KERNEL = tuple(map(Path, ("/proc", "/sys")))
-# In memory, as a rule.
+# Usually in memory, emptied at each start.
 _EMPTIED = tuple(map(Path, ("/run", "/var/run", "/dev/shm")))
-# Directories of the Filesystem Hierarchy Standard 3.0 that no program has for itself.
+# Shared directories of the Filesystem Hierarchy Standard 3.0.
 _SYSTEMS = frozenset(
     map(
         Path,
@@ -31,7 +31,7 @@ _SYSTEMS = frozenset(
 
 
 def place_problems(document: Document, sockets: SocketSettings | None, state: StateSettings | None) -> list[Problem]:
-    """A place that can never be what the configuration wants it to be."""
+    """A path that can never serve its purpose in the configuration."""
     problems = []
     if sockets is not None and _is_something_else(Path(sockets.unix.path)):
         problems.append(
@@ -65,7 +65,7 @@ def place_problems(document: Document, sockets: SocketSettings | None, state: St
 
 
 def place_warnings(document: Document, sockets: SocketSettings | None, state: StateSettings | None) -> list[Problem]:
-    """A directory that this user can neither write nor make, and sockets that are open to other computers."""
+    """A directory that this user can neither write nor create, and sockets open to other computers."""
     warnings = []
     for location, path, what_for in _directories(sockets, state):
         if _why_impossible(path) or path.parent in _OF_SERVICE_MANAGER:
@@ -91,7 +91,7 @@ def place_warnings(document: Document, sockets: SocketSettings | None, state: St
 def _directory_slips(
     document: Document, sockets: SocketSettings | None, state: StateSettings | None
 ) -> Iterator[Problem]:
-    """A directory that is everybody's, the system's, or emptied when the computer starts."""
+    """A directory that is public, the system's, or emptied when the computer starts."""
     for location, path, what_for in _directories(sockets, state):
         existing = _nearest(path)
         why = ""
@@ -127,7 +127,7 @@ def _open_socket_warnings(document: Document, sockets: SocketSettings | None) ->
 def _directories(
     sockets: SocketSettings | None, state: StateSettings | None
 ) -> Iterator[tuple[tuple[str, ...], Path, str]]:
-    """Location in the file, path, and what it is for, of every directory that the daemon makes."""
+    """Location in the file, path and purpose of every directory that the daemon creates."""
     if sockets is not None:
         yield ("sockets", "unix", "path"), Path(sockets.unix.path).parent, "the Unix socket"
     if state is not None:
@@ -144,7 +144,7 @@ def _why_impossible(path: Path) -> str:
 
 
 def _nearest(path: Path) -> Path:
-    """The path itself, or the nearest place above it that exists."""
+    """The path itself, or its nearest existing ancestor."""
     return next((place for place in (path, *path.parents) if os.path.lexists(place)), Path("/"))
 
 

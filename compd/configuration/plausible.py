@@ -1,4 +1,4 @@
-"""Which values of a configuration are plausible: one table, with the reason of every limit.
+"""Plausible values of a configuration: one table, with the reason of every limit.
 
 A value beyond is no error, for there are machines of all sizes; `compd check` and `compd run` warn of it. It is most
 often a slip of the unit or of the decimal point, and it would let a fault pass that compd could have found.
@@ -14,16 +14,16 @@ from compd.configuration.document import Document, Location
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
 
-# A coordinate below this, with all others of its list, is more likely in metres than of a machine for a watchmaker.
+# Smallest size (mm) of a machine: if all coordinates of a list are below it, they are probably in metres.
 _SMALLEST_MACHINE_MM = 5.0
 _LARGEST_MACHINE_MM = 1e5
-# Of a rotation vector, rad, as people round it up.
+# Longest rotation vector (rad): pi, rounded up.
 _PI = 3.15
 _DEGREES = "a rotation vector is no longer than pi. In degrees?"
 
 
 class PlausibleRange(NamedTuple):
-    """Of one key. key : dotted; `*` stands for any name or entry. reason : of the limit that was passed."""
+    """Plausible range of one key. key : dotted; `*` stands for any name or entry. reason : of the exceeded limit."""
 
     key: str
     lowest: float
@@ -151,7 +151,7 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
     ),
 )  # fmt: skip
 
-# Lists of points, of which at least one must be this far from the origin.
+# Lists of points, with the least distance (mm) of the farthest one from the origin.
 _POINTS: tuple[Location, ...] = (
     ("geometry", "base", "supports_B_mm"),
     ("geometry", "base", "joints_B_mm"),
@@ -163,7 +163,7 @@ _POINTS: tuple[Location, ...] = (
 def implausible(
     document: Document, sections: Mapping[str, Any], gauges: Mapping[str, GaugeOptions]
 ) -> Iterator[Problem]:
-    """A warning for every value that is probably a slip. sections : as far as they could be read."""
+    """A warning for every probable slip. sections : the readable ones."""
     values = {**sections, "gauges": gauges}
     for plausible in PLAUSIBLE:
         for location, value in _values(values, plausible.key.split("."), ()):
@@ -212,7 +212,7 @@ def _points_out_of_scale(document: Document, sections: Mapping[str, Any]) -> Ite
 
 
 def _tool_points(sections: Mapping[str, Any]) -> Iterator[Location]:
-    """Points that may lie at an origin, but not near it: the base's origin, or the tip at machine zero."""
+    """Points that may lie at an origin, but not close to it: the base's origin, or the tip at machine zero."""
     yield ("geometry", "base", "origin_B0_in_M_mm")
     tool = getattr(sections.get("geometry"), "tool", None)
     if getattr(tool, "on", None) == "platform":
@@ -220,7 +220,7 @@ def _tool_points(sections: Mapping[str, Any]) -> Iterator[Location]:
 
 
 def _times_that_do_not_fit(document: Document, sections: Mapping[str, Any]) -> Iterator[Problem]:
-    """Times that make sense by themselves, but not beside the others."""
+    """Times that are plausible alone, but contradict others."""
     rate_hz = _value(sections, "loop", "rate_hz")
     valid_for_s = _value(sections, "sockets", "valid_for_s")
     if rate_hz and valid_for_s and valid_for_s * rate_hz < 2:

@@ -1,4 +1,4 @@
-"""Lines on which the devices speak by themselves: OPC UA and MQTT."""
+"""Lines with pushed values: OPC UA and MQTT."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from compd.configuration.section import AbsolutePath, Positive, Section, Text, r
 
 
 class PushedLineSettings(Section):
-    """What every such line has."""
+    """Common keys of these lines."""
 
-    # Nobody can be asked to latch where nobody is asked.
+    # Devices that push their values cannot be told to latch.
     round_trigger: ClassVar[None] = None
 
     timeout_s: Positive = Field(description="how long the other end may take to accept a connection, or to answer")

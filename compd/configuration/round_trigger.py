@@ -1,4 +1,4 @@
-"""What latches all gauges of a line at once, before they are read one after the other."""
+"""The message that latches all gauges of a line at once, before they are read in turn."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from compd.text import unescape
 
 SettleTime = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)]
 Register = Annotated[int, Field(ge=0, le=0xFFFF)]
-# Modbus Application Protocol V1.1b3, 6.12: registers of one request by function 16.
+# Most registers of one request by function 16 (Modbus Application Protocol V1.1b3, 6.12).
 MOST_WRITTEN = 123
 WRITE_COIL, WRITE_REGISTERS = 5, 16
 BROADCAST = 0
 
 
 class TriggerBytes(Section):
-    """Bytes that every gauge on the line hears, and that none of them answers."""
+    """Bytes that every gauge on the line receives without answering."""
 
     out: str = Field(min_length=1, description=r"what is sent, as in a described gauge: \r \n \t \\ \xHH by their code")
     out_terminator: str = Field(default="", description="what ends it")
     settle_s: SettleTime = Field(
-        default=0.0, description="how long the devices are busy with it: the first is asked then"
+        default=0.0, description="how long the devices are busy with it; the first one is polled after that"
     )
 
     @field_validator("out", "out_terminator")
@@ -39,7 +39,7 @@ class TriggerBytes(Section):
 
 
 class TriggerWrite(Section):
-    """Something that is written to all Modbus slaves at once, or to the one of them that latches the others."""
+    """Values written to all Modbus slaves at once, or to the one that latches the others."""
 
     function: Literal[5, 6, 16] = Field(description="5: one coil, 6: one register, 16: several registers")
     address: Register = Field(description="of the coil or the first register, from 0")
@@ -52,7 +52,7 @@ class TriggerWrite(Section):
     )
     settle_s: SettleTime | None = Field(
         default=None,
-        description="how long the devices are busy with it: the first is asked then; must be given for unit 0",
+        description="how long the devices are busy with it; the first one is polled after that; required for unit 0",
     )
 
     @model_validator(mode="after")

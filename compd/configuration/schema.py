@@ -43,7 +43,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def _collect(kind: Any, definitions: dict[str, Any]) -> dict[str, Any]:
-    """The schema of one model or type; its own definitions go to `definitions`."""
+    """The schema of one model or type; its own definitions are added to `definitions`."""
     part = TypeAdapter(kind).json_schema(ref_template="#/$defs/{model}")
     definitions.update(part.pop("$defs", {}))
     return part

@@ -21,7 +21,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 def _printable(text: str) -> str:
-    """The text itself; ValueError where it has characters that neither a terminal nor a path takes."""
+    """The text itself; ValueError for characters that terminals or paths cannot contain."""
     if not text.isprintable():
         raise ValueError("must have printable characters only")
     return text
@@ -31,7 +31,7 @@ Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
 AbsolutePath = Annotated[str, Field(pattern=r"^/"), AfterValidator(_printable)]
 
 _REFUSAL = "refusal"
-# What pydantic says of a value of the wrong kind, in the words of a file.
+# Messages for pydantic's errors of type, in the terms of a file.
 _WHAT = {
     "model_type": "must be a section: `key: value` lines, indented",
     "model_attributes_type": "must be a section: `key: value` lines, indented",
@@ -48,7 +48,7 @@ _WHAT = {
     "bool_type": "must be true or false",
     "bool_parsing": "must be true or false",
 }
-# What a pattern means; others are shown as they are.
+# Patterns in words; others are shown as they are.
 _PATTERNS = {
     "^/": "an absolute path, /...",
     "^[0-9a-f]{64}$": "64 hexadecimal digits, as `sha256sum FILE` prints them",
@@ -56,23 +56,23 @@ _PATTERNS = {
     r"^[a-z][a-z0-9_]*_(degC|N|hPa|pct|mm|1)$": "small letters with a unit: temperature_room_degC, force_N, ...",
     r"^[A-Za-z0-9_]+(\.[A-Za-z0-9_]+)?$": "gauge or gauge.channel, of letters, digits and _",
 }
-# A list or mapping longer than this is not repeated in a message: the line is enough to find it.
+# Longest list or mapping (characters) repeated in a message; the line is enough to find a longer one.
 _LONGEST_VALUE = 80
 
 
 class Section(BaseModel):
-    """A part of a document that a person writes: unknown keys are refused, values cannot change."""
+    """A part of a document written by a person: unknown keys are refused, values are immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def refusal(what: str, allowed: str = "", next_step: str = "") -> PydanticCustomError:
-    """An error for a validator to raise that becomes a Problem in exactly these words."""
+    """An error for validators that becomes a Problem in exactly these words."""
     return PydanticCustomError(_REFUSAL, "{what}", {"what": what, "allowed": allowed, "next_step": next_step})
 
 
 def validate(kind: Any, document: Document, location: Location, problems: list[Problem]) -> Any:
-    """The value at `location` of the document as `kind`; None where it is wrong, and `problems` then says why.
+    """The value at `location` of the document as `kind`; None for a wrong one, with the reason in `problems`.
 
     kind : a pydantic model or any type that pydantic's TypeAdapter takes. A location that the document does not have
         is validated as None.
@@ -85,7 +85,7 @@ def validate(kind: Any, document: Document, location: Location, problems: list[P
 
 
 def readable(kind: Any, value: Any) -> Any:
-    """`value` as `kind`, or as much of it as can be read, for checks that must not wait until the rest is mended.
+    """The readable part of `value` as `kind`, for checks in spite of other faults.
 
     A section with a faulty key becomes a namespace with the same attributes, None for what is missing or cannot be
     read; of a list or mapping the faulty entries do. None where nothing can be read.
@@ -126,7 +126,7 @@ def _is_tagged(model: type[BaseModel], value: Mapping[Any, Any]) -> bool:
 
 
 def validation_problems(error: ValidationError, document: Document, location: Location, kind: Any) -> list[Problem]:
-    """Every error that pydantic found in the value at `location`, in the words of the person who wrote the file.
+    """Every error that pydantic found in the value at `location`, in the terms of the file.
 
     kind : the type that was validated; its models name the keys that are allowed beside an unknown one.
     """
@@ -134,7 +134,7 @@ def validation_problems(error: ValidationError, document: Document, location: Lo
 
 
 def separate_errors(error: ValidationError) -> list[ErrorDetails]:
-    """What pydantic found, without what only follows from it: a list with a faulty item counts as too short, too."""
+    """pydantic's errors without consequential ones: a list with a faulty item also counts as too short."""
     details = error.errors(include_url=False)
     places = [detail["loc"] for detail in details]
     return [
@@ -145,7 +145,7 @@ def separate_errors(error: ValidationError) -> list[ErrorDetails]:
 
 
 def unknown_key(document: Document, location: Location, allowed: Sequence[str]) -> Problem:
-    """The problem of a key that nothing reads, with the allowed key that resembles it most.
+    """The problem of an unknown key, with the most similar allowed key.
 
     Its value is not shown: it may be a password, under whatever key somebody thought of.
     """
@@ -206,7 +206,7 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
 
 
 def _remedy(what: str, value: Any) -> str:
-    """What to write instead, where that is clear."""
+    """The correct value, if it is clear."""
     if isinstance(value, str) and "number" in what and re.fullmatch(r"[-+]?\d+,\d+", value):
         return f"write {value.replace(',', '.')}, with a point"
     if what == "must be a text" and isinstance(value, int | float):
@@ -215,7 +215,7 @@ def _remedy(what: str, value: Any) -> str:
 
 
 def value_text(value: Any, location: Location = ()) -> str:
-    """A value as a problem shows it: not at all where it is long, since the line is enough to find it, or a secret."""
+    """A value as shown in a problem; "" for a long one, which the line finds, and for a secret."""
     if holds_secret(location) or has_secret(value):
         return ""
     text = repr(value)

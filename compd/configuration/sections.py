@@ -1,4 +1,4 @@
-"""What could be read of a configuration, section by section, for the checks across them."""
+"""The readable parts of a configuration by section, for the checks across sections."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from compd.gauge import Gauge, GaugeOptions
 
 @dataclass(frozen=True)
 class Sections:
-    """What could be read of a document, as `section.readable` gives it: None where something has a problem of its own.
+    """The readable parts of a document, from `section.readable`: None for a faulty section.
 
     links : of the machine, 3 or 6. gauges : options by name, without the faulty ones. drivers : the gauges' driver
         classes by name.

@@ -1,4 +1,4 @@
-"""A machine's configuration by its path, or by the name of one that comes with compd."""
+"""A machine's configuration by its path, or by the name of a shipped one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TypeAlias
 from compd.configuration.machine_configuration import Configuration, load
 from compd.errors import CompdError, ConfigurationError, Problem
 
-# In the installed package, or in the checkout.
+# Directories in the installed package, and in a checkout.
 _PLACES = (Path(__file__).parents[1] / "shipped_config", Path(__file__).parents[2] / "config")
 # A configuration, its path, or the name of one that comes with compd.
 Machine: TypeAlias = Configuration | str | Path

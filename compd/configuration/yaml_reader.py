@@ -1,4 +1,4 @@
-"""YAML as people write machines, effects and models in it: plain data, and the line of every part of it.
+"""YAML of machines, effects and models: plain data, and the line of every part of it.
 
 The scalars are those of YAML 1.2: `on` is a word, 1e-6 a number, 010 ten. Merge keys (`<<: *anchor`) work. What no
 file of this kind needs is refused with its line, before it costs time or memory: collections as keys, tags, anchors
@@ -26,21 +26,23 @@ from compd.text import holds_secret
 
 Location = tuple[str | int, ...]
 
-# A configuration has 20 kB, a sidecar and a model less. A device or a recording given by mistake has more.
+# Largest file (bytes). A configuration has 20 kB, a sidecar and a model less; a device or a recording given by mistake
+# has more.
 LARGEST_BYTES = 1_000_000
-# A configuration has 6 levels and 2000 nodes, aliases unfolded; these leave room for every file that a person writes.
+# Most levels and nodes, aliases unfolded. A configuration has 6 levels and 2000 nodes, so that these fit every file
+# written by a person.
 DEEPEST_LEVEL = 50
 MOST_NODES = 100_000
-# PyYAML 6.0.4 reads ahead of the levels that are counted here, and has a limit of its own (1000): its words.
+# Message of PyYAML 6.0.4 at its own limit (1000 levels), since it reads ahead of the levels counted here.
 _LIBRARYS_LIMIT = "maximum nesting depth"
 _LONGEST_KEY = 60
-# Parts of a file in the words of PyYAML: an alias, a tag, a character.
+# Quoted parts of a file in PyYAML's messages: an alias, a tag, a character.
 _QUOTED = re.compile(r"\s*(?:'[^']*'|\"[^\"]*\")")
 
 _TAG = "tag:yaml.org,2002:"
 _MERGE = f"{_TAG}merge"
 _SCALARS = tuple(_TAG + name for name in ("str", "int", "float", "bool", "null"))
-# YAML 1.2, section 5.1: what may stand in a file.
+# Characters outside those allowed in a file (YAML 1.2, section 5.1).
 _NOT_YAML = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -70,7 +72,7 @@ _Loader.add_implicit_resolver(
 
 
 def dotted(location: Location) -> str:
-    """('wiring', 'joint', 0, 'link') -> "wiring.joint[1].link"; entries are counted from 1, as people do."""
+    """('wiring', 'joint', 0, 'link') -> "wiring.joint[1].link"; entries are counted from 1."""
     text = ""
     for part in location:
         text += f"[{part + 1}]" if isinstance(part, int) else f"{'.' if text else ''}{_key_text(part)}"
@@ -92,7 +94,7 @@ def read_text(path: Path, kind: str) -> str:
 
 
 def decode(content: bytes, path: Path) -> str:
-    """The text of a file's content. Raises ConfigurationError for one that is too large or in another encoding."""
+    """The text of a file's content. Raises ConfigurationError for too large a file or another encoding."""
     if len(content) > LARGEST_BYTES:
         raise _unusable(path, "is too large for a file that a person writes", allowed=f"{LARGEST_BYTES} bytes")
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -160,7 +162,7 @@ def parse_yaml(
 
 @dataclass
 class _Reading:
-    """Turns nodes into plain data; the line of every part goes to `lines`, what is wrong to `problems`.
+    """Converts nodes to plain data; the line of every part goes to `lines`, faults to `problems`.
 
     unquoted : the same problems without the keys and values of the file.
     """
@@ -200,7 +202,7 @@ class _Reading:
             own_lines[key] = self.lines[here] = line
             data[key] = self.plain(value_node, here)
         for merged in self._merged(node, location):
-            # what stands in the mapping itself counts, and of several merged ones the first
+            # keys of the mapping itself take precedence, then those of the first merged one
             for key_node, value_node in merged.value:
                 if key_node.tag == _MERGE:
                     continue
@@ -211,7 +213,7 @@ class _Reading:
         return data
 
     def _merged(self, node: yaml.MappingNode, location: Location) -> Iterator[yaml.MappingNode]:
-        """The mappings that `<<` names, and those that they merge themselves, the one that counts most first."""
+        """The mappings named by `<<`, and those that they merge themselves, in the order of precedence."""
         for key_node, value_node in node.value:
             if key_node.tag != _MERGE:
                 continue
@@ -245,7 +247,7 @@ class _Reading:
             if node.tag == f"{_TAG}int" and isinstance(self.loader, _Loader):
                 return _whole_number(node.value)
             return self.loader.construct_object(node, deep=True)
-        except (ValueError, KeyError, TypeError, AttributeError):  # a tag that the value does not fit, or 5000 digits
+        except (ValueError, KeyError, TypeError, AttributeError):  # a value that does not fit its tag, or 5000 digits
             kind = node.tag.removeprefix(_TAG)
             self._add(node.start_mark.line + 1, location, f"cannot be read as {kind}", value=_shortened(node.value))
             return None
@@ -263,10 +265,10 @@ class _Reading:
 
 
 def _check_structure(text: str, path: Path) -> None:
-    """Raise ConfigurationError for what cannot be composed: too many levels, an anchor within itself."""
+    """Raise ConfigurationError for too many levels, or a recursive alias."""
     loader = _Loader(text)
     try:
-        anchors: list[str | None] = []  # of the collections that are open
+        anchors: list[str | None] = []  # of the open collections
         while loader.check_event():
             event = loader.get_event()
             assert event is not None
@@ -281,7 +283,7 @@ def _check_structure(text: str, path: Path) -> None:
             elif isinstance(event, yaml.AliasEvent) and event.anchor in anchors:
                 raise _unusable(
                     f"{path}:{line}",
-                    "this alias stands within what it stands for",
+                    "recursive alias",
                     next_step="write out what is meant",
                 )
     finally:
@@ -319,7 +321,7 @@ def _children(node: yaml.Node) -> list[yaml.Node]:
 
 
 def _whole_number(text: str) -> int:
-    """Decimal, or with 0x or 0o; a leading zero says nothing, as in YAML 1.2."""
+    """Decimal, or with 0x or 0o; a leading zero has no meaning, as in YAML 1.2."""
     digits = text.lstrip("+-")
     base: Mapping[str, int] = {"0x": 16, "0o": 8}
     value = int(digits, base.get(digits[:2].lower(), 10))

@@ -1,4 +1,4 @@
-"""What a case says: the qualities that were required, what was observed, and whether the driver passes."""
+"""Result of a case: required and observed qualities, and whether the driver passes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from compd.conformance.faults import Fault
 from compd.conformance.harness import ConformanceSession, Poll
 from compd.gauge import Quality
 
-# What a damaged reply may give. OK is allowed where the driver finds the whole reply in the damage: it must be right.
+# Allowed qualities of a damaged reply. OK is allowed, with the right value, if the driver finds the whole reply in the
+# damage.
 DAMAGED = frozenset({Quality.MISMATCH, Quality.CRC, Quality.INCOMPLETE})
 NO_ANSWER = frozenset({Quality.TIMEOUT, Quality.SILENT})
 NO_VALUE = frozenset(
@@ -21,7 +22,7 @@ NO_NUMBER = DAMAGED | NO_ANSWER | NO_VALUE
 
 BY_TCP = "TCP's own checksum keeps it from the driver"
 IN_VIRTUAL_TIME = "in virtual time"
-MOST_EXCHANGES = 64  # no driver makes more in one poll
+MOST_EXCHANGES = 64  # most exchanges of a driver in one poll
 REAL_TIME_TRIES = 3
 
 Verdict = Literal["pass", "FAIL", "-"]
@@ -39,14 +40,14 @@ class CaseResult:
 
 @dataclass(frozen=True)
 class Subject:
-    """The driver and the wire that it is tried on, as far as the cases depend on them.
+    """The properties of driver and wire on which the cases depend.
 
     registers : a Modbus driver, else one on a line of bytes.
     over_tcp : TCP's own checksum keeps damage from the driver.
     checksum : the protocol has one of its own.
     exact : in virtual time; cases that need thousands of polls run there alone.
     error_replies : whole replies by which the device reports an error, and the quality that must come.
-    unasked : the device speaks by itself.
+    unsolicited : the device speaks by itself.
     options : those that the driver is tried with.
     another : the driver once more, with other options and a simulated device of its own, on a virtual wire.
     """
@@ -56,18 +57,18 @@ class Subject:
     checksum: bool
     exact: bool
     error_replies: Mapping[bytes, Quality]
-    unasked: bool = False
+    unsolicited: bool = False
     options: Any = None
     another: Callable[[Any], ConformanceSession] | None = field(default=None, repr=False)
 
     @property
     def tries(self) -> int:
-        """How often a case is tried until it counts as failed; in virtual time nothing is late by chance."""
+        """Tries of a case before it counts as failed; one in virtual time, which has no random delays."""
         return 1 if self.exact else REAL_TIME_TRIES
 
     def possible(self, kinds: Iterable[Fault]) -> Sequence[Fault]:
-        """Those of the faults that this device's replies can have."""
-        return [fault for fault in kinds if not (self.unasked and fault.only_of_answers)]
+        """The faults that this device's replies can have."""
+        return [fault for fault in kinds if not (self.unsolicited and fault.only_of_answers)]
 
 
 Case = Callable[[ConformanceSession, Subject], CaseResult]
@@ -77,22 +78,22 @@ def result_of(
     case: str,
     allowed: frozenset[Quality],
     observed: str,
-    complaints: Sequence[str],
+    violations: Sequence[str],
     undetectable: Sequence[str] = (),
 ) -> CaseResult:
-    """FAIL with the first complaint; "-" where there is none, but something that no driver could detect."""
+    """FAIL with the first violation; "-" for a fault that no driver could detect."""
     required = " | ".join(str(quality) for quality in Quality if quality in allowed)
-    if complaints:
-        more = f" (and {len(complaints) - 1} more)" if len(complaints) > 1 else ""
-        return CaseResult(case, required, complaints[0] + more, "FAIL")
+    if violations:
+        more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
+        return CaseResult(case, required, violations[0] + more, "FAIL")
     if undetectable:
         more = f" (and {len(undetectable) - 1} more)" if len(undetectable) > 1 else ""
         return CaseResult(case, required, f"not detectable on this wire: {undetectable[0]}{more}", "-")
     return CaseResult(case, required, observed, "pass")
 
 
-def complaints_of(poll: Poll, allowed: frozenset[Quality]) -> list[str]:
-    """What is wrong with a poll: numbers, or a quality that is not allowed."""
+def violations_of(poll: Poll, allowed: frozenset[Quality]) -> list[str]:
+    """Violations of a poll: numbers, or a quality that is not allowed."""
     unwanted = poll.qualities - allowed
     return [*poll.wrong, *([str(poll)] if unwanted and not poll.wrong else [])]
 
@@ -115,7 +116,7 @@ def faulty_polls(
 ) -> CaseResult:
     """One poll under each of `tries` (the faults of its replies), each followed by polls until all is good again."""
     qualities: set[str] = set()
-    complaints: list[str] = []
+    violations: list[str] = []
     undetectable: list[str] = []
     slowest = 0
     for reply_faults in tries:
@@ -123,10 +124,10 @@ def faulty_polls(
         poll = session.poll(reply_faults)
         delivered = ", ".join(repr(exchange.delivered) for exchange in session.exchanges)
         qualities |= {str(quality) for quality in poll.qualities}
-        complaints += [f"{name}: {text}: {delivered}" for text in complaints_of(poll, allowed)]
+        violations += [f"{name}: {text}: {delivered}" for text in violations_of(poll, allowed)]
         undetectable += [f"{name}: {text}: {delivered}" for text in poll.undetectable]
         recovering, good = session.recover()
         slowest = max(slowest, recovering)
-        complaints += [f"after {name}: {text}" for text in complaints_of(good, GOOD)]
+        violations += [f"after {name}: {text}" for text in violations_of(good, GOOD)]
     text = ", ".join(sorted(qualities)) + f"; right again after {slowest} poll{'s' * (slowest != 1)}"
-    return result_of(case, allowed, text, complaints, undetectable)
+    return result_of(case, allowed, text, violations, undetectable)

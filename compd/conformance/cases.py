@@ -1,4 +1,4 @@
-"""All cases, in their order: what happens on the wire, the quality that must come, and the one that came."""
+"""All cases in their order: events on the wire, the required and the observed quality."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from compd.conformance.waiting_cases import waits, waits_after_faults
 from compd.conformance.wire_cases import CASES_ON_RTU, WIRE_CASES
 
 CASES: tuple[Case, ...] = (*VALUE_CASES, *WIRE_CASES, *DAMAGE_CASES, *REPLY_CASES)
-# A device that speaks unasked has no answers that could be late, or asked for twice.
+# Cases of polled devices: late answers and repeated requests.
 CASES_OF_ANSWERS: tuple[Case, ...] = (*waiting_cases.CASES_OF_ANSWERS, *wire_cases.CASES_OF_ANSWERS)
-# A driver that fails in one of these is tried no further: each poll would take its time, or be wrong.
+# Cases whose failure ends the test: each further poll would be slow or wrong.
 FIRST_CASES = ("waits", "units and scale", "waits after faults")
 
 
@@ -28,7 +28,7 @@ def run_cases(session: ConformanceSession, subject: Subject) -> Iterator[CaseRes
         yield result
         if result.verdict == "FAIL":
             return
-    cases = [*(() if subject.unasked else CASES_OF_ANSWERS), *CASES]
+    cases = [*(() if subject.unsolicited else CASES_OF_ANSWERS), *CASES]
     cases += CASES_ON_RTU if subject.registers and not subject.over_tcp else ()
     for case in cases:
         yield run_case(case, session, subject)
@@ -48,7 +48,7 @@ def _units_and_scale(session: ConformanceSession, subject: Subject) -> CaseResul
 
 
 def run_case(case: Case, session: ConformanceSession, subject: Subject) -> CaseResult:
-    """In real time a case that fails is tried again: a busy computer is late by chance, a wrong driver wrong always."""
+    """Repeat a case that fails in real time: a busy computer is late by chance, a faulty driver fails always."""
     late: list[str] = []
     for _ in range(subject.tries):
         result = case(session, subject)

@@ -1,4 +1,4 @@
-"""The checksum in a device's replies, learned from samples, so that a forged reply can have a right one.
+"""The checksum in a device's replies, learned from samples, for forged replies with a right one.
 
 Without it a driver would refuse a forged reply for its checksum, and nothing would be known of all else that it checks.
 """
@@ -33,14 +33,14 @@ ENCODINGS: Mapping[str, Encoding] = {
     "decimal": lambda check: f"{int.from_bytes(check, 'big'):03d}".encode(),
     "decimal, two digits": lambda check: f"{int.from_bytes(check, 'big') % 100:02d}".encode(),
 }
-MOST_BEFORE = 3  # bytes of a head that the checksum leaves out
-MOST_BETWEEN = 1  # bytes between what it covers and itself: NMEA's *
-MOST_BEHIND = 3  # bytes of a terminator
-FEWEST_SAMPLES = 4  # different ones: a wrong algorithm fits by chance in one of 256 to the power of their number
+MOST_BEFORE = 3  # most bytes of a head outside the checksum
+MOST_BETWEEN = 1  # most bytes between the covered part and the checksum: NMEA's *
+MOST_BEHIND = 3  # most bytes of a terminator
+FEWEST_SAMPLES = 4  # fewest different samples: n of them fit a wrong algorithm by chance once in 256^n
 
 
 class ReplyChecksum(NamedTuple):
-    """How a reply's checksum is made, and where it stands."""
+    """Algorithm and position of a reply's checksum."""
 
     algorithm: str
     encoding: str
@@ -49,7 +49,7 @@ class ReplyChecksum(NamedTuple):
     behind: int
 
     def place(self, reply: bytes) -> slice:
-        """Where it stands in a reply of this length."""
+        """Its position in a reply of this length."""
         end = len(reply) - self.behind
         return slice(end - len(self._of(b"")), end)
 
@@ -64,7 +64,7 @@ class ReplyChecksum(NamedTuple):
 
 
 def checksum_in(samples: Sequence[bytes]) -> ReplyChecksum | None:
-    """The checksum that all of the replies have; None where no known one fits."""
+    """The checksum of all replies; None if no known one fits."""
     different = list(dict.fromkeys(samples))
     if len(different) < FEWEST_SAMPLES:
         return None

@@ -1,4 +1,4 @@
-"""Which functions of the computer's clock are called: a driver has no clock of its own."""
+"""Calls of the computer's clock functions: a driver must use the line's clock."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WAITS_OF_THREADS = [function.__code__ for function in (threading.Condition.wait,
 
 @contextmanager
 def clock_calls() -> Iterator[list[str]]:
-    """The clock functions of the computer that are called meanwhile, by their names."""
+    """Names of the clock functions called during the block."""
     called: list[str] = []
     watched = {id(getattr(time, name)): f"time.{name}" for name in CLOCK_FUNCTIONS}
     watched[id(select.select)] = "select.select"
@@ -36,11 +36,11 @@ def clock_calls() -> Iterator[list[str]]:
             if name:
                 called.append(name)
 
-    if sys.getprofile() is not None:  # a profiler is at work, and there can be one alone
+    if sys.getprofile() is not None:  # a profiler is active, and only one is possible
         yield called
         return
     collecting = gc.isenabled()
-    gc.disable()  # what a collection calls is not the driver's
+    gc.disable()  # calls by a garbage collection are not the driver's
     sys.setprofile(note)
     try:
         yield called

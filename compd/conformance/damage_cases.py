@@ -1,4 +1,4 @@
-"""Replies with small damage: each bit turned, each byte lost or come twice."""
+"""Replies with small damage: each bit flipped, each byte lost or doubled."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from compd.conformance.case_result import (
     Case,
     CaseResult,
     Subject,
-    complaints_of,
     result_of,
+    violations_of,
 )
 from compd.conformance.faults import Fault
 from compd.conformance.harness import ConformanceSession
@@ -25,7 +25,7 @@ from compd.gauge import Quality
 
 
 def _bit_flips(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """Every single bit of a reply turned, one at a time."""
+    """Every single bit of a reply flipped, one at a time."""
     case = "one bit turned"
     if subject.over_tcp:
         return CaseResult(case, "", BY_TCP, "-")
@@ -36,7 +36,7 @@ def _bit_flips(session: ConformanceSession, subject: Subject) -> CaseResult:
 
 
 def _bytes_lost(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """Each byte of a reply lost, lost with all before it, or come twice."""
+    """Each byte of a reply lost, lost with all before it, or doubled."""
     case = "bytes lost, or twice"
     if subject.over_tcp:
         return CaseResult(case, "", BY_TCP, "-")
@@ -55,32 +55,32 @@ def _bytes_lost(session: ConformanceSession, subject: Subject) -> CaseResult:
 def _damaged(
     session: ConformanceSession, subject: Subject, case: str, tries: Sequence[Sequence[Fault]], advice: str
 ) -> CaseResult:
-    """Replies with small damage: no number that the device would not itself have sent in these very bytes."""
-    complaints, after, undetectable = [], [], []
+    """Replies with small damage: a number counts only if the device itself would have sent these bytes."""
+    violations, after, undetectable = [], [], []
     for reply_faults, sign in itertools.product(tries, (1.0, -1.0)):
         name = reply_faults[-1].name
         _advance_on_one_side(session, sign)
         poll = session.poll(reply_faults, new_values=False)
         delivered = ", ".join(repr(exchange.delivered) for exchange in session.exchanges)
-        complaints += [f"{name}: {text}: {delivered} is no reply of the device" for text in poll.wrong]
+        violations += [f"{name}: {text}: {delivered} is no reply of the device" for text in poll.wrong]
         undetectable += [f"{name}: {text}: {delivered}" for text in poll.undetectable]
         if Quality.DRIVER_ERROR in poll.qualities:
-            complaints.append(f"{name}: {poll}: {delivered}")
-        after += [f"after {name}: {text}" for text in complaints_of(session.recover()[1], GOOD)]
+            violations.append(f"{name}: {poll}: {delivered}")
+        after += [f"after {name}: {text}" for text in violations_of(session.recover()[1], GOOD)]
     if subject.checksum:
-        complaints += undetectable
-    if undetectable and not (after or complaints):
+        violations += undetectable
+    if undetectable and not (after or violations):
         text = f"{len(undetectable)} of {2 * len(tries)} give another number that the device could have sent"
         return CaseResult(
             case, "no wrong number, with a checksum", f"{text}: not detectable on this wire, {advice}", "-"
         )
     return result_of(
-        case, DAMAGED | NO_ANSWER | GOOD, f"{2 * len(tries)} of them, no wrong number", after or complaints
+        case, DAMAGED | NO_ANSWER | GOOD, f"{2 * len(tries)} of them, no wrong number", after or violations
     )
 
 
 def _advance_on_one_side(session: ConformanceSession, sign: float) -> None:
-    """New values, all of one sign where the device can show them: a lost minus must not go unseen."""
+    """New values, all of one sign if the device can show them, so that a lost minus is noticed."""
     session.sensors.advance()
     for name, value in session.sensors.values.items():
         lowest, highest = session.sensors.whole.get(name, session.sensors.extents[name])
@@ -91,13 +91,13 @@ def _advance_on_one_side(session: ConformanceSession, sign: float) -> None:
 def good_poll(session: ConformanceSession) -> Sequence[Exchange]:
     """The exchanges of a poll without faults."""
     session.recover()
-    if session.wire.pause_s:  # the first poll after a fault has two lines: one that was under way, and its own
+    if session.wire.pause_s:  # the first poll after a fault has two lines: a pending one, and its own
         session.poll()
     return tuple(session.exchanges)
 
 
 def fault_at(number: int, fault: Fault) -> Sequence[Fault]:
-    """The fault for one of a poll's replies, the first being 0."""
+    """The fault for one of a poll's replies, counted from 0."""
     return [*[faults.NONE] * number, fault]
 
 

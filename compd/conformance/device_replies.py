@@ -1,4 +1,4 @@
-"""What the device would send if its sensors had other values: by that a number is right, wrong, or neither.
+"""The device's replies for other values of its sensors, which decide whether a number is right, wrong, or neither.
 
 A number is right if the device, with its sensor at that number, would have sent what it sent: no more than the last
 digit of the device lies between them. A number out of a damaged reply that is not right is either the driver's fault,
@@ -13,20 +13,21 @@ from collections.abc import Mapping, Sequence
 
 from compd.conformance.peer import Exchange, Peer, SensorValues
 
-# Of a digit: so far from the values that the device shows alike a number may be. One that is off by a digit is out.
+# Largest distance (digits) of a number from the values that the device shows alike. One that is off by a digit is
+# wrong.
 SLACK_DIGITS = 0.25
-ROUNDING = 1e-9  # of the value or the range: floating point
-NEAR = 1e-6  # of the value or the range: two values so near are not those of another channel, or beyond an end
-PART_OF_A_DIGIT = 1 / 4096  # to which the ends of a digit are searched
-SMALLEST_STEP = 1e-10  # of the range: where the search for a digit begins
-BEYOND = 1e3  # times the value or the range: a device that shows the same so far away shows no more than its end
+ROUNDING = 1e-9  # share of the value or the range: floating point
+NEAR = 1e-6  # share of the value or the range: distance of values of another channel, or beyond an end
+PART_OF_A_DIGIT = 1 / 4096  # accuracy of the search for the ends of a digit
+SMALLEST_STEP = 1e-10  # share of the range: start of the search for a digit
+BEYOND = 1e3  # multiple of the value or the range at which an unchanged display shows the device's end
 _LEADING = re.compile(rb"(?<!\d)(?<!\d[.,])( *)([+-]?)([ 0]*)(?=\d)")
 _EXPONENT_OF_ZERO = re.compile(rb"(?<=\d[eE])-(?=0+(?!\d))")
 CONTROL = frozenset(b"\r\n\t\x02\x03\x04\x06\x15\x1b")
 
 
 def is_text(reply: bytes) -> bool:
-    """Whether a reply is made of characters that can be printed, and of what frames them."""
+    """Whether a reply consists of printable characters and framing ones."""
     return bool(reply) and all(0x20 <= byte < 0x7F or byte in CONTROL for byte in reply)
 
 
@@ -43,19 +44,19 @@ class DeviceReplies:
         self._lengths: dict[bytes, set[int]] = {}  # of replies with values, by request
 
     def learn(self, exchanges: Sequence[Exchange]) -> None:
-        """Remember how long the replies of a poll without faults are."""
+        """Remember the lengths of the replies in a poll without faults."""
         for exchange in exchanges:
             self._lengths.setdefault(exchange.request, set()).add(len(exchange.reply))
 
     def at(self, exchanges: Sequence[Exchange], **values: float) -> tuple[bytes, ...] | None:
-        """The replies of these exchanges with other values of some channels; None where the simulated device fails."""
+        """The replies of these exchanges with other values of some channels; None if the simulated device fails."""
         try:
             return self._peer.would_answer((e.request for e in exchanges), {**self._sensors.values, **values})
         except Exception:  # noqa: BLE001  a simulated device is anybody's code: it may have no form for such a value
             return None
 
     def is_right(self, channel: str, number: float, exchanges: Sequence[Exchange]) -> bool:
-        """Whether `number` is what the device shows for the present value of `channel`, to its last digit."""
+        """Whether `number` is the device's display of the present value of `channel`, to its last digit."""
         value = self._sensors.values[channel]
         if abs(number - value) <= self._rounding(channel) + self.digit.get(channel, 0.0) / 2:
             return True
@@ -71,7 +72,7 @@ class DeviceReplies:
         return lowest - slack <= number <= highest + slack
 
     def are_right(self, numbers: Mapping[str, float], exchanges: Sequence[Exchange]) -> bool:
-        """Whether all of `numbers` surely are right, which is known sooner than of each by itself."""
+        """Whether all of `numbers` are certainly right; faster than checking each."""
         values = self._sensors.values
         far = {
             k: v for k, v in numbers.items() if not abs(v - values[k]) <= self._rounding(k) + self.digit.get(k, 0) / 2
@@ -84,7 +85,11 @@ class DeviceReplies:
 
         Where it shows no number for them, because they are beyond its range, only the shape of its replies counts.
         """
-        for nudge in (0.0, SLACK_DIGITS, -SLACK_DIGITS):  # a device that cuts its last digit shows a number just below
+        for nudge in (
+            0.0,
+            SLACK_DIGITS,
+            -SLACK_DIGITS,
+        ):  # a device that truncates its last digit shows a number just below
             values = {
                 name: number + math.copysign(nudge * self.digit.get(name, 0.0), number)
                 for name, number in numbers.items()
@@ -99,7 +104,7 @@ class DeviceReplies:
         return False
 
     def interval(self, channel: str, exchanges: Sequence[Exchange]) -> tuple[float, float]:
-        """Lowest and highest value of `channel` that the device shows like the present one; infinite at its ends."""
+        """Lowest and highest value of `channel` with the same display as the present one; infinite at its ends."""
         value = self._sensors.values[channel]
         ends = []
         for direction in (-1.0, 1.0):
@@ -146,7 +151,7 @@ class DeviceReplies:
         return ROUNDING * self._scale(channel)
 
     def _alike(self, delivered: bytes, reply: bytes, request: bytes) -> bool:
-        """Whether two replies are the same, but for what stands before a number, and the sign of an exponent of 0."""
+        """Whether two replies are equal up to the padding before a number, and the sign of an exponent of 0."""
         if delivered == reply:
             return True
         if not (is_text(delivered) and is_text(reply)):
@@ -161,7 +166,7 @@ class DeviceReplies:
 
 
 def _is_beyond(exchange: Exchange, reply: bytes) -> bool:
-    """Whether a damaged reply has its former shape, and the device for what it says `reply`, which has another."""
+    """Whether a damaged reply kept its shape, while the device has another one for its value, `reply`."""
     shape = _shape(exchange.delivered)
     damaged = is_text(exchange.delivered) and exchange.delivered != exchange.reply
     return damaged and shape == _shape(exchange.reply) and shape != _shape(reply)

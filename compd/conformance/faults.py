@@ -1,4 +1,4 @@
-"""What a wire can do to a reply: each fault turns the device's bytes into pieces that arrive at times."""
+"""Faults of a wire: each turns the bytes of a reply into pieces with arrival times."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 from pymodbus.framer.rtu import FramerRTU
 
-# No number, name or terminator contains these: garbage of digits passes for a digit on a wire without checksum.
+# Garbage outside numbers, names and terminators: digits would pass on a wire without checksum.
 GARBAGE_BYTES = bytes([0x00, 0x04, 0x1F, 0x23, 0x7E, 0x80, 0xAA, 0xF8, 0xFE, 0xFF])
 GARBAGE = b"\xf8\x00\x23"
 MBAP_LENGTH = 7  # transaction, protocol, length, unit of a Modbus TCP frame
@@ -25,7 +25,7 @@ class Piece(NamedTuple):
 class Fault:
     """`act(reply, timeout_s)`: the pieces that come in place of `reply`; `timeout_s` is the line's.
 
-    only_of_answers : nothing is wrong with it where a device speaks unasked: it is another line, as good as any.
+    only_of_answers : harmless where a device sends unsolicited readings: it is another line, as good as any.
     """
 
     name: str
@@ -80,12 +80,12 @@ def doubled() -> Fault:
 
 
 def cut(fraction: float = 0.5) -> Fault:
-    """The rest of the reply never comes."""
+    """The rest of the reply is lost."""
     return Fault(f"cut at {fraction:.2f}", lambda reply, _: [Piece(0.0, reply[: _at(reply, fraction)])])
 
 
 def flipped(bit: int) -> Fault:
-    """One bit turned; `bit` counts through the reply and begins again at its end."""
+    """One bit flipped; `bit` counts through the reply, modulo its length."""
 
     def act(reply: bytes, _: float) -> Sequence[Piece]:
         place, mask = (bit // 8) % len(reply), 1 << bit % 8
@@ -95,7 +95,7 @@ def flipped(bit: int) -> Fault:
 
 
 def lost(place: int, count: int = 1) -> Fault:
-    """`count` bytes from `place` on never come; both count through the reply."""
+    """`count` bytes from `place` on are lost; both count through the reply."""
 
     def act(reply: bytes, _: float) -> Sequence[Piece]:
         return [Piece(0.0, reply[:place] + reply[place + count :])]
@@ -104,7 +104,7 @@ def lost(place: int, count: int = 1) -> Fault:
 
 
 def repeated(place: int) -> Fault:
-    """The byte at `place` comes twice."""
+    """The byte at `place` is doubled."""
     return Fault(f"byte {place} twice", lambda reply, _: [Piece(0.0, reply[: place + 1] + reply[place:])])
 
 

@@ -1,4 +1,4 @@
-"""One driver on one wire: polled as the daemon does, every number compared with what the device's sensor had."""
+"""One driver on one wire: polled as by the daemon, every number compared with the device's sensor."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from compd.conformance.device_replies import DeviceReplies
 from compd.conformance.faults import Fault
 from compd.conformance.peer import Exchange, Peer, SensorValues
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, bad
-from compd.live.acquisition import NOTHING_UNDER_WAY
+from compd.live.acquisition.polled_round import NO_REPLY_PENDING
 
-LOOKS = 24  # fault-free polls before all else
-DIGITS_FROM = 2  # of them, those from which the device's digit is taken
+LOOKS = 24  # fault-free polls at the start
+DIGITS_FROM = 2  # number of the first of them for learning the device's digit
 STAMP_ROUNDING_S = 1e-9
 MOST_RECOVERING_POLLS = 4
-SETTLING_DRAINS = 3  # each waits for a timeout of silence: longer than any reply here is late
-# In line timeouts, after a request without an answer: the wait for the reply, then the line is drained for one more.
+SETTLING_DRAINS = 3  # each waits for a timeout of silence, longer than any reply here is late
+# Time after a request without an answer, in line timeouts: the wait for the reply, and one for draining.
 ASKED_AGAIN_TIMEOUTS = 2.0
 
 
 class ConformanceWire(Protocol):
     """A wire with a device at its far end: virtual, pty or TCP.
 
-    exact : in virtual time. pause_s : between two lines of a device that speaks unasked, s; 0 where it is asked.
+    exact : in virtual time. pause_s : time between two unsolicited lines, s; 0 for a device that is polled.
     """
 
     peer: Peer
@@ -73,13 +73,12 @@ class Poll:
 
 @dataclass
 class ConformanceSession:
-    """A driver that polls over `wire`, as a line's thread would: drained after a fault, opened anew when lost,
-    at rest after a silence."""
+    """A driver polled over `wire` as by a line's thread: drains after faults, reopens if lost, rests after silence."""
 
     gauge: Gauge[Any]
     wire: ConformanceWire
     sensors: SensorValues
-    most_requests: int = 0  # of a poll without faults
+    most_requests: int = 0  # lengths in a poll without faults
     _line: Any = None
     replies: DeviceReplies = field(init=False)
 
@@ -88,7 +87,7 @@ class ConformanceSession:
 
     @property
     def exchanges(self) -> Sequence[Exchange]:
-        """Those of the last poll."""
+        """Exchanges of the last poll."""
         return self.wire.peer.exchanges
 
     def poll(self, faults: Iterable[Fault] = (), new_values: bool = True) -> Poll:
@@ -111,7 +110,7 @@ class ConformanceSession:
         return poll
 
     def recover(self) -> tuple[int, Poll]:
-        """Poll without faults until all is good: how many polls that took, and the last one."""
+        """Poll without faults until all is good; return the number of polls and the last one."""
         polls = [self.poll()]
         while polls[-1].qualities != {Quality.OK} and len(polls) < MOST_RECOVERING_POLLS:
             polls.append(self.poll())
@@ -120,7 +119,7 @@ class ConformanceSession:
         return len(polls), Poll(last.readings, wrong, (), last.duration_s)
 
     def calibrate(self) -> str | None:
-        """Learn the device's digit from fault-free polls; what is wrong with these, if anything is."""
+        """Learn the device's digit from fault-free polls; return their violations."""
         names = [channel.name for channel in self.gauge.channels]
         if len(set(names)) != len(names):
             return f"channels named twice: {', '.join(sorted({name for name in names if names.count(name) > 1}))}"
@@ -136,11 +135,11 @@ class ConformanceSession:
                 for name in names:
                     self.replies.interval(name, self.exchanges)
         for name, (lowest, highest) in self.sensors.extents.items():
-            self.replies.digit.setdefault(name, highest - lowest)  # a switch: half of it is all it shows
+            self.replies.digit.setdefault(name, highest - lowest)  # a switch: half of its range is its digit
         return None
 
     def settle(self) -> None:
-        """Wait until nothing is under way to us any more."""
+        """Wait until no data is in transit to the product."""
         if self._line is not None:
             for _ in range(SETTLING_DRAINS):
                 self._line.drain()
@@ -158,7 +157,7 @@ class ConformanceSession:
         self.wire.close()
 
     def _read(self) -> tuple[Sequence[Reading], LineFault | None]:
-        """The readings, and the fault of the whole poll in place of them."""
+        """The readings, or the fault of the whole poll."""
         try:
             if self._line is None:
                 self._line = self.wire.open()
@@ -174,12 +173,12 @@ class ConformanceSession:
         return [nothing] * len(self.gauge.channels), fault
 
     def _after(self, fault: LineFault) -> None:
-        """As the line's thread does: drain, or close what is lost."""
+        """Drain, or close a lost line, as the line's thread does."""
         if self._line is None:
             return
         try:
             if fault.quality is not Quality.LINE_LOST:
-                if fault.quality not in NOTHING_UNDER_WAY:
+                if fault.quality not in NO_REPLY_PENDING:
                     self._line.drain()
                 return
         except LineFault:
@@ -188,7 +187,7 @@ class ConformanceSession:
         self._line = None
 
     def _judge(self, readings: Sequence[Reading], started_s: float) -> tuple[list[str], list[str]]:
-        """Every OK reading that should not be one: the driver's fault, and what nobody can detect."""
+        """Every wrong OK reading: faults of the driver, and undetectable ones."""
         channels = self.gauge.channels
         if len(readings) != len(channels):
             return [f"{len(readings)} readings for {len(channels)} channels"], []
@@ -226,17 +225,17 @@ class ConformanceSession:
         return text
 
     def _stamp(self, channel: Channel, reading: Reading, started_s: float) -> Iterable[str]:
-        """What is wrong with a reading's time stamp: that of its request, or, unasked, since the line before began."""
+        """Faults of a time stamp: it must follow its request, or the start of the previous unsolicited line."""
         earliest_s, event = started_s, "the request of this poll had left"
         if self.wire.exact and self.exchanges:
-            earliest_s = self.exchanges[0].heard_s - STAMP_ROUNDING_S
+            earliest_s = self.exchanges[0].received_s - STAMP_ROUNDING_S
         if self.wire.pause_s:
             earliest_s -= self.wire.pause_s + self.wire.peer.longest * self.wire.character_s
             event = "the line before had begun"
         if reading.time_s < earliest_s:
             early_ms = (earliest_s - reading.time_s) * 1e3
             yield f"{channel.name}: time stamp {early_ms:.3f} ms before {event}"
-        # an understated age: stamped after the device had looked
+        # an understated age: stamped after the device had sampled
         sensed_s = self.sensors.sensed_s.get(channel.name, math.nan)
         if reading.time_s > sensed_s + STAMP_ROUNDING_S:
             late_ms = (reading.time_s - sensed_s) * 1e3

@@ -1,4 +1,4 @@
-"""Options of a gauge with one of them changed: another unit of its kind, or a device that was set otherwise."""
+"""Options of a gauge with one change: another unit of its kind, or a device with other settings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from compd.gauge import GaugeOptions
 
 
 def other_settings(options: GaugeOptions) -> Iterator[tuple[str, GaugeOptions]]:
-    """What was changed ("address=2") and the options; for whole numbers, texts that end so, choices, switches."""
+    """The change ("address=2") and the options, for whole numbers, texts ending in one, choices, switches."""
     for name, field in type(options).model_fields.items():
         if name in GaugeOptions.model_fields:
             continue
@@ -25,7 +25,7 @@ def other_settings(options: GaugeOptions) -> Iterator[tuple[str, GaugeOptions]]:
 
 
 def _others(value: Any, annotation: Any) -> list[Any]:
-    """Other values of the same kind; [] where it is not known which there are."""
+    """Other values of the same kind; [] if unknown."""
     if get_origin(annotation) is Literal:
         return [choice for choice in get_args(annotation) if choice != value]
     if isinstance(value, bool):

@@ -11,14 +11,14 @@ from compd.conformance.faults import NONE, Fault, Piece
 from compd.gauge import Channel
 from compd.simulation import ModbusSlaves, SimulatedByteDevice, SimulatedRegisterDevice
 
-# Where a gauge does not say what it can show, by unit.
+# Ranges of gauges without a stated one, by unit.
 RANGES = {"mm": (-0.9, 0.9), "degC": (5.0, 45.0), "N": (-50.0, 50.0), "hPa": (950.0, 1050.0), "pct": (10.0, 90.0)}
 OTHER_RANGE = (-0.9, 0.9)
 GOLDEN = (math.sqrt(5) - 1) / 2  # its multiples modulo 1 spread evenly: neighbours in time are far apart
 
 
 class SensorValues:
-    """The sensors' values by channel: new ones for every poll, so that an old reply is a wrong one.
+    """The sensors' values by channel: new ones for every poll, so that an old reply is wrong.
 
     extents : by channel, the lowest and highest value that it takes from poll to poll.
     whole : by channel, the lowest and highest value that the device was seen to show.
@@ -48,29 +48,29 @@ class SensorValues:
         self._looked_at.add(channel)
         return self.values[channel]
 
-    def stamp(self, heard_s: float) -> None:
-        """What was sensed since the last call was sensed at `heard_s`."""
-        self.sensed_s.update(dict.fromkeys(self._looked_at, heard_s))
+    def stamp(self, received_s: float) -> None:
+        """Set the time of everything sensed since the last call to `received_s`."""
+        self.sensed_s.update(dict.fromkeys(self._looked_at, received_s))
         self._looked_at.clear()
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """One request of a poll, at what time it was heard (s), the device's reply, and what of it was delivered.
+    """One request of a poll: time of reception (s), the device's reply, and its delivered part.
 
-    request : b"" where the device was asked by DTR, or has spoken unasked: it was heard as DTR fell, or as it began.
+    request : b"" for a pulse of DTR or an unsolicited reading; it was received as DTR fell, or as the reading began.
     pause_s : before the reply, of no driver's making, s: DTR was LOW, or the device silent between two lines.
     """
 
     request: bytes
-    heard_s: float
+    received_s: float
     reply: bytes
     delivered: bytes
     pause_s: float = 0.0
 
 
 class Peer:
-    """The simulated device behind a wire that damages replies: each reply takes the next of the faults that were set.
+    """The simulated device behind a damaging wire: each reply takes the next of the given faults.
 
     exchanges : of the poll under way; longest : bytes of the longest reply so far.
     """
@@ -84,15 +84,15 @@ class Peer:
         self._sensors = sensors
         self._faults: Iterator[Fault] = iter(())
         self._beyond: Fault | None = None
-        self._counts: dict[bytes, int] = {}  # of registers, by unit, function and address: the fewest asked for
+        self._counts: dict[bytes, int] = {}  # fewest registers requested, by unit, function and address
 
     def begin_poll(self, faults: Iterable[Fault]) -> None:
-        """A poll begins; `faults` are those of its replies, one each."""
+        """Begin a poll; `faults`: one for each of its replies."""
         self.exchanges = []
         self._faults = iter(faults)
 
     def end_map(self, beyond: Fault | None) -> None:
-        """Let the map of a Modbus slave on a serial line end with what the driver reads; None: as it was.
+        """Let the map of a serial Modbus slave end with the driver's registers; None: restore it.
 
         beyond : what happens to the reply where one register more is asked for.
         """
@@ -101,13 +101,13 @@ class Peer:
 
     @property
     def blocks(self) -> int:
-        """Blocks of registers that were asked for since `end_map`."""
+        """Blocks of registers requested since `end_map`."""
         return len(self._counts)
 
-    def answer(self, request: bytes, heard_s: float, timeout_s: float, pause_s: float = 0.0) -> Sequence[Piece]:
-        """The pieces that come back when `request` has arrived at `heard_s`; see `Exchange`."""
+    def answer(self, request: bytes, received_s: float, timeout_s: float, pause_s: float = 0.0) -> Sequence[Piece]:
+        """The pieces that come back when `request` has arrived at `received_s`; see `Exchange`."""
         reply = self._reply(request)
-        self._sensors.stamp(heard_s)
+        self._sensors.stamp(received_s)
         pieces: Sequence[Piece] = []
         if reply:
             self.longest = max(self.longest, len(reply))
@@ -116,11 +116,11 @@ class Peer:
             pieces = fault.act(reply, timeout_s)
         if request or reply:
             delivered = b"".join(piece.data for piece in pieces)
-            self.exchanges.append(Exchange(request, heard_s, reply, delivered, pause_s))
+            self.exchanges.append(Exchange(request, received_s, reply, delivered, pause_s))
         return pieces
 
     def would_answer(self, requests: Iterable[bytes], values: Mapping[str, float]) -> tuple[bytes, ...]:
-        """The device's replies to the same requests if its sensors had `values`. What the device raises passes."""
+        """The device's replies to the same requests with `values` at its sensors. Passes on its exceptions."""
         present, self._sensors.values = self._sensors.values, dict(values)
         sensed_s = dict(self._sensors.sensed_s)
         try:
@@ -132,11 +132,11 @@ class Peer:
 
     def _reply(self, request: bytes) -> bytes:
         if request or isinstance(self._device, ModbusSlaves):
-            return self._device.hear(request)
+            return self._device.receive(request)
         return self._device.speak()
 
     def _is_beyond(self, request: bytes) -> bool:
-        """Whether a request asks for one register more than the driver needs."""
+        """Whether a request is for one register more than the driver needs."""
         block, count = request[:4], int.from_bytes(request[4:6], "big")
         fewest = self._counts[block] = min(self._counts.get(block, count), count)
         return count == fewest + 1

@@ -1,4 +1,4 @@
-"""Replies that are not what they should be: damaged, of other units, with other units of length, errors."""
+"""Wrong replies: damaged, of other devices, with other units of length, errors."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from compd.conformance.case_result import (
     Case,
     CaseResult,
     Subject,
-    complaints_of,
     faulty_polls,
     one_poll_each,
     result_of,
+    violations_of,
 )
 from compd.conformance.damage_cases import fault_at, good_poll
 from compd.conformance.harness import ConformanceSession
@@ -28,9 +28,9 @@ from compd.conformance.reply_text import Forgery, ReplyText, most_frequent_lengt
 from compd.conformance.value_cases import share_of
 from compd.gauge import Quality
 
-# Of Modbus: all that a slave or gateway answers a read with, and one that no table has.
+# Modbus exceptions: all of a slave or gateway for a read, and one outside every table.
 EXCEPTIONS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 0x5A)
-SAMPLES = 48  # replies of which what is constant is learned
+SAMPLES = 48  # replies for learning the constant parts
 TRIES_FOR_A_BASE = 24
 FOREIGN = b"\x01\x84\x02\xc2\xc1\r\n"
 BY_REGISTERS = "a line of registers checks its frames itself"
@@ -51,7 +51,7 @@ class _Reply:
     others: Mapping[str, Sequence[bytes]]
 
 
-# Forgeries of a reply, and the channels that a driver must not take out of all of them.
+# Forgeries of a reply, and the channels that a driver must refuse in at least one of them.
 ForgedSet = tuple[Sequence[Forgery], Iterable[str]]
 
 
@@ -111,7 +111,7 @@ def _exchanged_characters(session: ConformanceSession, subject: Subject) -> Case
         if not reply.text.is_text:
             return
         for letters in reply.text.letters():
-            yield letters, reply.channels  # one of a set of letters may be a judgement
+            yield letters, reply.channels  # a letter of a set may be a judgement
         for forgery in [*reply.text.units(), *reply.text.signs()]:
             yield [forgery], reply.channels
 
@@ -120,7 +120,7 @@ def _exchanged_characters(session: ConformanceSession, subject: Subject) -> Case
 
 
 def _wrong_checksums(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """Whole replies whose checksum, wherever one is known in them, is wrong in a single byte."""
+    """Whole replies with a single wrong byte in a known checksum."""
 
     def forgeries(reply: _Reply) -> Iterator[ForgedSet]:
         for forgery in reply.text.checksums():
@@ -131,39 +131,39 @@ def _wrong_checksums(session: ConformanceSession, subject: Subject) -> CaseResul
 
 
 def _another_unit(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """A second device of the same kind, or one that is set otherwise, answers in place of this one."""
+    """A second device of the same kind, or one with other settings, answers in place of this one."""
     case = "another unit, or other settings"
     if why_not := _why_not(subject):
         return CaseResult(case, "", why_not, "-")
-    complaints: list[str] = []
+    violations: list[str] = []
     undetectable: list[str] = []
     tried = 0
     identity = (session.gauge.reply_identity or "").encode("latin-1")
     for reply in _replies(session):
         if reply.channels and (other := reply.text.without(identity)):
-            complaints.append(f"`reply_identity` is {identity!r}, and a reply is {other!r}")
+            violations.append(f"`reply_identity` is {identity!r}, and a reply is {other!r}")
         for forgery in [*reply.text.addresses(), *reply.text.identities(identity)]:
-            complaints += _taken(session, reply, forgery, reply.channels)
+            violations += _taken(session, reply, forgery, reply.channels)
             tried += 1
     requests = [exchange.request for exchange in good_poll(session)]
     another = subject.another
     for setting, second in [(text, another(o)) for text, o in other_settings(subject.options)] if another else ():
-        second.sensors.advance()  # other values than the first one has
+        second.sensors.advance()  # values different from those of the first one
         replies = [exchange.reply for exchange in second.exchanges] if second.poll().ok else []
         others = [exchange.request for exchange in second.exchanges]
         who = "a device" if others == requests else "a unit"
         second.close()
-        if not replies or any(others) != any(requests):  # one that is not asked by bytes hears no request
+        if not replies or any(others) != any(requests):  # a device without requests in bytes receives none
             continue
         tried += 1
         poll = session.poll([faults.replaced(reply) for reply in replies])
         text = f"the reply of {who} with {setting}, {b', '.join(replies)!r}"
-        complaints += [f"{text}: {wrong}" for wrong in poll.wrong]
+        violations += [f"{text}: {wrong}" for wrong in poll.wrong]
         undetectable += [f"{text}: {wrong}" for wrong in poll.undetectable]
         session.recover()
     if not tried:
         return CaseResult(case, "", "the driver has no options that another unit would have otherwise", "-")
-    return result_of(case, NO_NUMBER, f"{tried} of them, no wrong number", complaints, undetectable)
+    return result_of(case, NO_NUMBER, f"{tried} of them, no wrong number", violations, undetectable)
 
 
 def _forged_replies(
@@ -175,36 +175,36 @@ def _forged_replies(
     passed: str,
     none: str,
 ) -> CaseResult:
-    """Every set of forgeries in the place of its reply; of at least one of a set the driver must take no number.
+    """Every set of forgeries in place of its reply; the driver must refuse at least one of a set.
 
     allowed : qualities, as of `result_of`. passed : what there was where all is well. none : why there is no forgery.
     """
     if why_not := _why_not(subject):
         return CaseResult(case, "", why_not, "-")
-    complaints: list[str] = []
+    violations: list[str] = []
     tried = 0
     for reply in _replies(session):
         for forged_set, channels in forgeries(reply):
             taken = [_taken(session, reply, forgery, channels) for forgery in forged_set]
-            complaints += taken[0] if all(taken) else []
+            violations += taken[0] if all(taken) else []
             tried += len(taken)
     if not tried:
         return CaseResult(case, "", none, "-")
-    return result_of(case, allowed, f"{tried} of them, {passed}", complaints)
+    return result_of(case, allowed, f"{tried} of them, {passed}", violations)
 
 
 def _why_not(subject: Subject) -> str:
-    """Why forged replies cannot be tried on this wire; "" where they can."""
+    """Reason why forged replies cannot be tried on this wire; "" if they can."""
     if subject.registers:
         return BY_REGISTERS
     return "" if subject.exact else IN_VIRTUAL_TIME
 
 
 def _replies(session: ConformanceSession) -> Iterator[_Reply]:
-    """Each reply of a poll without faults, with what is constant in it."""
-    heard = good_poll(session)
+    """Each reply of a poll without faults, with its constant parts."""
+    received = good_poll(session)
     sampled = [_values_at(session, sample) for sample in range(SAMPLES)]
-    for number, exchange in enumerate(heard):
+    for number, exchange in enumerate(received):
         replies = [session.replies.at([exchange], **values) for values in sampled]
         texts = [reply[0] if reply else b"" for reply in replies]
         length = most_frequent_length([text for text in texts if text])
@@ -230,14 +230,14 @@ def _values_at(session: ConformanceSession, sample: int) -> dict[str, float]:
 
 
 def _taken(session: ConformanceSession, reply: _Reply, forgery: Forgery, channels: Iterable[str]) -> list[str]:
-    """What is wrong if the driver takes a number of `channels` out of a forgery; [] if it does not.
+    """Violations by a driver that takes a number of `channels` from a forgery; [] if it refuses.
 
     A number that the device would itself have sent so is not wrong, nor one that is converted from another unit.
     """
     poll = session.poll(fault_at(reply.number, faults.replaced(forgery.reply)))
-    complaints = []
+    violations = []
     if Quality.DRIVER_ERROR in poll.qualities:
-        complaints.append(f"{forgery.what}: {poll}: {forgery.reply!r}")
+        violations.append(f"{forgery.what}: {poll}: {forgery.reply!r}")
     for channel, reading in zip(session.gauge.channels, poll.readings, strict=False):
         if channel.name not in channels or not reading.ok or poll.undetectable:
             continue
@@ -246,11 +246,11 @@ def _taken(session: ConformanceSession, reply: _Reply, forgery: Forgery, channel
             digit = forgery.factor * session.replies.digit[channel.name]
             if abs(reading.value - converted) <= digit:
                 continue
-        complaints.append(
+        violations.append(
             f"{forgery.what}: {channel.name} is {reading.value:.9g} {channel.unit}, ok, out of {forgery.reply!r}"
         )
-    complaints += [f"after {forgery.what}: {text}" for text in complaints_of(session.recover()[1], GOOD)]
-    return complaints[:1]
+    violations += [f"after {forgery.what}: {text}" for text in violations_of(session.recover()[1], GOOD)]
+    return violations[:1]
 
 
 def _other_digits(reply: bytes) -> Iterator[bytes]:

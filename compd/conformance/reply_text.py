@@ -1,4 +1,4 @@
-"""What is constant in a device's replies: letters, an address, an end; and forgeries that change it."""
+"""Constant parts of a device's replies (letters, an address, an end), and forgeries that change them."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 from compd.conformance.checksum_repair import ReplyChecksum, checksum_in
 from compd.conformance.device_replies import CONTROL, is_text
 
-FEWEST_ALIKE = 6  # replies of the same length, of which what does not change is taken as constant
-SUBSTITUTES = b"XQZ"  # letters that stand for no unit or judgement
+FEWEST_ALIKE = 6  # fewest replies of the same length for learning the constant parts
+SUBSTITUTES = b"XQZ"  # letters without a meaning as unit or judgement
 # mm in one of them
 UNIT_WORDS = {b"mm": 1.0, b"um": 1e-3, b"nm": 1e-6, b"cm": 10.0, b"in": 25.4, b"inch": 25.4, b"mil": 0.0254, b"m": 1e3}
 INCH_MARK = b'"'
-NO_ADDRESS = frozenset({0x00, 0xFF})  # what fills a binary frame
-# Texts by which instruments say that they have no number.
+NO_ADDRESS = frozenset({0x00, 0xFF})  # fill bytes of a binary frame
+# Texts of instruments for a missing number.
 ERROR_TEXTS = (
     b"", b"ERR", b"ERROR", b"Err 5", b"ERR9", b"E01", b"E 42", b"ER99", b"ER,99", b"NG", b"NAK", b"?", b"OVER",
     b"UNDER", b"OL", b"-OL", b"OVERFLOW", b"NO DATA", b"nan", b"inf", b"-inf", b"NONE", b"-----", b"+-----",
@@ -27,7 +27,7 @@ FIELD_FILLINGS = b"-*+ #?EF."
 
 @dataclass(frozen=True)
 class Forgery:
-    """A reply that the device does not send, and what was changed in it. factor : of all numbers, by another unit."""
+    """A forged reply, and the change in it. factor : of all numbers, by another unit."""
 
     what: str
     reply: bytes
@@ -35,7 +35,7 @@ class Forgery:
 
 
 class ReplyText:
-    """The replies to one request, as far as they are alike whatever the sensors show.
+    """The common parts of the replies to one request, for all values of the sensors.
 
     base : the reply that forgeries are made of, one of those of the most frequent length.
     """
@@ -101,7 +101,7 @@ class ReplyText:
                 yield self._with(slice(place, place + 1), other.encode(), what)
 
     def addresses(self) -> Iterator[Forgery]:
-        """Replies with another number in the place of one that the request has too: those of other units."""
+        """Replies of other units: with another number in place of one from the request."""
         for token in self._tokens():
             start = self.base.find(token)
             while start >= 0:
@@ -123,7 +123,7 @@ class ReplyText:
         return bytes([token[0] % 0xFE + 1])
 
     def checksums(self) -> Iterator[Forgery]:
-        """Replies in which one byte of the checksum is another one."""
+        """Replies with one changed byte of the checksum."""
         for place in range(self._check_place.start, self._check_place.stop):
             byte = self.base[place : place + 1]
             other = bytes([byte[0] ^ 0x40]) if not self.is_text else (b"0" if byte != b"0" else b"1")
@@ -131,13 +131,13 @@ class ReplyText:
             yield Forgery(f"byte {place}, of the checksum, is {other!r} in place of {byte!r}", reply)
 
     def identities(self, identity: bytes) -> Iterator[Forgery]:
-        """Replies in which one byte of what says whose they are is another one."""
+        """Replies with one changed byte of their identity."""
         for place in range(len(identity)):
             other = bytes([self.base[place] + 1 & 0x7F])
             yield self._with(slice(place, place + 1), other, f"byte {place}, of `reply_identity`, is {other!r}")
 
     def errors(self) -> Iterator[Forgery]:
-        """Error texts in place of the reply: as short as they are, and as long as the reply."""
+        """Error texts in place of the reply, short ones and ones padded to the reply's length."""
         end = self.terminator
         length = len(self.base) - len(end)
         for text in ERROR_TEXTS:
@@ -146,7 +146,7 @@ class ReplyText:
                     yield Forgery(f"{reply + end!r} in its place", reply + end)
 
     def fields(self, others: Sequence[bytes]) -> Iterator[Forgery]:
-        """Replies with no number in the place in which `others` differ from this one."""
+        """Replies without a number at the place where `others` differ from this one."""
         differing = [
             place
             for place in range(len(self.base))
@@ -173,5 +173,5 @@ class ReplyText:
 
 
 def most_frequent_length(replies: Sequence[bytes]) -> int:
-    """The length that most replies have."""
+    """The most common length of the replies."""
     return Counter(map(len, replies)).most_common(1)[0][0]

@@ -24,13 +24,13 @@ from compd.gauge import Gauge, Quality
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.pushed_gauge import PushedGauge
 
-SLOWEST_BAUD = 1200  # of every device in the shipped table
+SLOWEST_BAUD = 1200  # slowest rate of all devices in the shipped table
 SLOW_TIMEOUT_S = 0.3
 
 
 @dataclass(frozen=True)
 class DriverUnderTest:
-    """A driver with its simulated device and the options that it is tried with."""
+    """A driver with its simulated device and the options of the test."""
 
     name: str
     gauge: type[Gauge[Any]]
@@ -43,25 +43,25 @@ class DriverUnderTest:
 
     @property
     def error_replies(self) -> Mapping[bytes, Quality]:
-        """Whole replies by which the device reports an error, and the quality of each, as its simulator has them."""
+        """Whole error replies of the device by its simulator, with the quality of each."""
         device = self.simulator(self.options, lambda channel: math.nan)
         replies = getattr(device, "error_replies", {})
         return {reply: Quality(quality) for reply, quality in replies.items()}
 
     @property
     def by_dtr(self) -> bool:
-        """Whether its device is asked by DTR."""
+        """Whether its device is triggered by DTR."""
         return "DTR" in self.gauge(self.options).serial_signals
 
     @property
-    def unasked(self) -> bool:
-        """Whether its device speaks without being asked."""
+    def unsolicited(self) -> bool:
+        """Whether its device sends unsolicited readings."""
         device = self.simulator(self.options, lambda channel: 0.0)
         return not self.registers and not self.by_dtr and bool(device.speak())
 
     def kinds(self) -> tuple[Kind, ...]:
-        """The kinds of line of this computer on which it can be tried."""
-        if self.by_dtr or self.unasked:
+        """The kinds of this computer's lines for the test."""
+        if self.by_dtr or self.unsolicited:
             return ()
         return ("modbus_rtu", "modbus_tcp") if self.registers else ("serial", "tcp")
 
@@ -69,26 +69,26 @@ class DriverUnderTest:
         checksum = self.registers or self.gauge.integrity == "checksum"
         errors = self.error_replies
         return Subject(
-            self.registers, over_tcp, checksum, exact, errors, self.unasked, self.options, self._with_options
+            self.registers, over_tcp, checksum, exact, errors, self.unsolicited, self.options, self._with_options
         )
 
     def peer(self, over_tcp: bool = False) -> tuple[Peer, SensorValues]:
-        """The simulated device at the far end, and the values of its sensors. `over_tcp`: Modbus in TCP framing."""
+        """The simulated device at the far end, with the values of its sensors. `over_tcp`: Modbus in TCP framing."""
         sensors = SensorValues(self.gauge(self.options).channels, self.gauge.sample_range)
         return Peer(self.simulator, self.options, sensors, over_tcp), sensors
 
     def virtual(self, character_s: float = 0.0) -> ConformanceSession:
-        """On a wire in virtual time."""
+        """The test on a wire in virtual time."""
         return self.virtual_with_wire(character_s)[0]
 
     def virtual_with_wire(self, character_s: float = 0.0) -> tuple[ConformanceSession, VirtualWire]:
-        """The same, and the wire, whose time can pass between polls."""
+        """The same with the wire, whose time can pass between polls."""
         peer, sensors = self.peer()
-        wire = VirtualWire(peer, self.registers, character_s=character_s, unasked=self.unasked)
+        wire = VirtualWire(peer, self.registers, character_s=character_s, unsolicited=self.unsolicited)
         return self._session(wire, sensors), wire
 
     def real(self, kind: Kind, directory: Path, **settings: Any) -> ConformanceSession:
-        """On a pty or TCP port; `settings`: baud, timeout_s."""
+        """The test on a pty or TCP port; `settings`: baud, timeout_s."""
         peer, sensors = self.peer(over_tcp=kind == "modbus_tcp")
         return self._session(RealWire(peer, kind, directory, **settings), sensors)
 
@@ -136,7 +136,7 @@ def driver_under_test(
 
 
 def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iterator[tuple[str, CaseResult]]:
-    """Every case on every kind of wire, as they come: (wire, result).
+    """Results of every case on every kind of wire, as they arrive: (wire, result).
 
     First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; once at SLOWEST_BAUD. A driver that fails
     in one of FIRST_CASES is tried no further.
@@ -148,13 +148,13 @@ def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iter
                 return
         slow = driver.virtual(CHARACTER_BITS / SLOWEST_BAUD)
         yield "virtual time", slowest_line(slow, SLOWEST_BAUD)
-        if driver.unasked:
+        if driver.unsolicited:
             yield "virtual time", opened_within_a_line(*driver.virtual_with_wire(CHARACTER_S))
             yield "virtual time", seldom_read(*driver.virtual_with_wire())
         if not on_real_wires:
             return
         if not driver.kinds():
-            why = "a pty and TCP have no DTR" if driver.by_dtr else "a device that speaks unasked: in virtual time"
+            why = "a pty and TCP have no DTR" if driver.by_dtr else "unsolicited readings are tried in virtual time"
             yield "ptys, ports", CaseResult("on ptys and TCP ports", "", why, "-")
             return
         for kind in driver.kinds():

@@ -15,12 +15,12 @@ from compd.lines import RtuMaster, StreamLine
 TURNAROUND_S = 1e-3  # from the last bit of a request to the first of the reply
 GAP_S = 2e-3  # silence before a request, as `open_line` keeps it at 19200 baud and below
 
-# Between two lines of a device that speaks unasked, in line timeouts: the line's own timeout must be longer.
+# Time between two unsolicited lines, in line timeouts; the line's own timeout must be longer.
 PAUSE_TIMEOUTS = 0.8
 
 
 class VirtualClock:
-    """Time that passes only while somebody waits."""
+    """Clock that advances only during waits."""
 
     def __init__(self) -> None:
         self.now_s = 1000.0
@@ -39,15 +39,15 @@ class VirtualWire:
     exact = True
 
     def __init__(
-        self, peer: Peer, registers: bool, timeout_s: float = 0.1, character_s: float = 0.0, unasked: bool = False
+        self, peer: Peer, registers: bool, timeout_s: float = 0.1, character_s: float = 0.0, unsolicited: bool = False
     ) -> None:
-        """unasked : the device speaks by itself, with `pause_s` between two lines."""
+        """unsolicited : the device speaks by itself, with `pause_s` between two lines."""
         self.peer = peer
         self.clock = VirtualClock()
         self.timeout_s = timeout_s
         self.character_s = character_s
         self.plugged = True
-        self.pause_s = PAUSE_TIMEOUTS * timeout_s if unasked else 0.0
+        self.pause_s = PAUSE_TIMEOUTS * timeout_s if unsolicited else 0.0
         self._speaks_s = self.clock.now_s + self.pause_s  # next
         self._dtr_fell_s: float | None = None
         self._registers = registers
@@ -69,16 +69,16 @@ class VirtualWire:
         self._speaks_s = self.clock.now_s + self.pause_s
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """No resources to release."""
 
     def check(self) -> None:
         if not self.plugged:
             raise LineFault(Quality.LINE_LOST, "unplugged")
 
     def carry(self, request: bytes) -> None:
-        """To the device; its reply gets under way."""
-        heard_s = self.clock.now_s + len(request) * self.character_s
-        self._send(self.peer.answer(request, heard_s, self.timeout_s), heard_s + TURNAROUND_S)
+        """Send to the device, which starts its reply."""
+        received_s = self.clock.now_s + len(request) * self.character_s
+        self._send(self.peer.answer(request, received_s, self.timeout_s), received_s + TURNAROUND_S)
 
     def set_dtr(self, high: bool) -> None:
         """A device that is asked by DTR answers when it is HIGH again, and may have sampled as soon as it fell."""
@@ -90,13 +90,13 @@ class VirtualWire:
             self._send(self.peer.answer(b"", fell_s, self.timeout_s, low_s), self.clock.now_s + TURNAROUND_S)
 
     def rest(self, duration_s: float) -> None:
-        """Time passes without anybody reading, s."""
+        """Let time (s) pass without reading."""
         self.clock.now_s += duration_s
         while self.pause_s and self._speaks_s <= self.clock.now_s:
             self._speak()
 
     def _speak(self) -> None:
-        """The next line of a device that speaks unasked."""
+        """The next line of a device that sends unsolicited readings."""
         begins_s = self._speaks_s
         pieces = self.peer.answer(b"", begins_s, self.timeout_s, self.pause_s)
         self._send(pieces, begins_s)
@@ -104,7 +104,7 @@ class VirtualWire:
         self._speaks_s = begins_s + length * self.character_s + self.pause_s
 
     def _send(self, pieces: Sequence[Piece], first_s: float) -> None:
-        """On their way to the product, from `first_s` on; character by character where the line has a pace."""
+        """Send pieces to the product from `first_s` on; character by character if the line has a pace."""
         for piece in pieces:
             start_s = first_s + piece.delay_s
             if not self.character_s:
@@ -115,7 +115,7 @@ class VirtualWire:
                 heapq.heappush(self._arriving, (due_s, next(self._order), bytes([byte])))
 
     def arrive(self, timeout_s: float) -> bytes:
-        """What comes within `timeout_s`; time moves on to there."""
+        """Data within `timeout_s`; advances the time to its arrival."""
         until_s = self.clock.now_s + max(0.0, timeout_s)
         while self.pause_s and self._speaks_s <= min([until_s, *(item[0] for item in self._arriving[:1])]):
             self._speak()
@@ -152,4 +152,4 @@ class VirtualPort:
         """Simulated devices do not see it."""
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """No resources to release."""

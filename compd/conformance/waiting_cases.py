@@ -1,4 +1,4 @@
-"""What a driver waits for: its replies alone, by the line's clock; and that it asks no more than once."""
+"""Waits of a driver: for its replies only, by the line's clock; and one request at a time."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from compd.conformance.harness import ConformanceSession
 from compd.conformance.virtual import GAP_S, TURNAROUND_S
 
 LOOKS = 5
-LONGEST_BLOCK_S = 0.05  # by the computer's clock, in each of LOOKS polls; other threads take less of it
-IDLE_TIMEOUTS = 0.5  # in line timeouts: waiting in a poll whose replies come at once
-EXCHANGE_S = GAP_S + TURNAROUND_S  # of a virtual line
-LONGEST_WAIT_S = 10.0  # for a reply that does not come
+LONGEST_BLOCK_S = 0.05  # by the computer's clock, in each of LOOKS polls; above the share of other threads
+IDLE_TIMEOUTS = 0.5  # in line timeouts: wait in a poll with immediate replies
+EXCHANGE_S = GAP_S + TURNAROUND_S  # duration of an exchange on a virtual line
+LONGEST_WAIT_S = 10.0  # longest wait for a missing reply
 FAULTS = (
     faults.SILENT, faults.cut(0.5), faults.garbage_before(), faults.garbage_inside(), faults.late(1.5),
     faults.replaced(b"ERR\r\n"),
@@ -29,7 +29,7 @@ FAULTS = (
 
 
 def waits(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """First of all cases, without faults: a driver that waits by itself would take for ever in the others."""
+    """The first case, without faults: a driver with waits of its own would take too long in the others."""
     case, required = "waits", "for its replies alone, by the line's clock"
     if not subject.exact:
         return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
@@ -38,7 +38,7 @@ def waits(session: ConformanceSession, subject: Subject) -> CaseResult:
         started_s, gave_up = time.perf_counter(), resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw
         with clock_calls() as called:
             poll = session.poll()
-        # a thread that waits gives the processor up; one from which it is taken has no part in that
+        # a waiting thread yields the processor; a preempted one does not
         waited = resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw > gave_up
         blocked_s.append(time.perf_counter() - started_s if waited else 0.0)
         if called:
@@ -55,7 +55,7 @@ def waits(session: ConformanceSession, subject: Subject) -> CaseResult:
 
 
 def waits_after_faults(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """The same where replies do not come, or are damaged."""
+    """The same with missing or damaged replies."""
     case, required = "waits after faults", "for its replies alone, by the line's clock"
     if not subject.exact:
         return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
@@ -69,12 +69,12 @@ def waits_after_faults(session: ConformanceSession, subject: Subject) -> CaseRes
         session.settle()
         session.recover()
     if longest_s > LONGEST_WAIT_S:
-        return CaseResult(case, required, f"waits {longest_s:.3g} s for a reply that does not come", "FAIL")
+        return CaseResult(case, required, f"waits {longest_s:.3g} s longest wait for a missing reply", "FAIL")
     return CaseResult(case, required, f"at most {longest_s:.3g} s on the line's clock", "pass")
 
 
 def _retries(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """No more requests in a poll that fails than in one that does not."""
+    """A failing poll has no more requests than a good one."""
     case, required = "no request twice", "as many requests as without a fault, or fewer"
     if not subject.exact:
         return CaseResult(case, "", IN_VIRTUAL_TIME, "-")

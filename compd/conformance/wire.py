@@ -1,4 +1,4 @@
-"""The real thing: a pty or a TCP port of this computer, with the device and its faults behind it."""
+"""Real wires: a pty or a TCP port of this computer, with the device and its faults behind it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Kind = Literal["serial", "tcp", "modbus_rtu", "modbus_tcp"]
 FAST_BAUD = 115200
 CHARACTER_BITS = 10  # 8N1: a pty knows no parity
 TURNAROUND_S = 1e-3
-# Long enough that a busy computer's pauses do not pass for a silent device.
+# Line timeout (s), above the pauses of a busy computer, which would look like a silent device.
 TIMEOUT_S = 0.2
 FORMAT = "8N1"
 
@@ -67,7 +67,7 @@ class RealWire:
         self._follow()
 
     def close(self) -> None:
-        """End the thread and give everything back."""
+        """End the thread and release all resources."""
         self._stopping = True
         os.write(self._wake_write, b"!")
         self._thread.join()
@@ -90,7 +90,7 @@ class RealWire:
                 return ModbusTcpLine(kind="modbus_tcp", host=LOOPBACK, port=self._tcp_port, timeout_s=self.timeout_s)
 
     def _follow(self) -> None:
-        """Let the thread see what was set, and wait until it has."""
+        """Wait until the thread has taken over new settings."""
         self._followed.clear()
         os.write(self._wake_write, b"!")
         self._followed.wait()
@@ -101,7 +101,7 @@ class RealWire:
             ready, _, _ = select.select([self._wake_read, *fds], [], [], self._deliver())
             for fd in ready:
                 if fd != self._wake_read and self._end is not None:
-                    self._hear(self._end, fd)
+                    self._receive(self._end, fd)
             if self._wake_read in ready:
                 os.read(self._wake_read, 1)
                 self._set_plug(self._plugged)
@@ -120,16 +120,16 @@ class RealWire:
             self._end = None
             self._arriving.clear()
 
-    def _hear(self, end: End, fd: int) -> None:
+    def _receive(self, end: End, fd: int) -> None:
         data = end.read(fd)
-        if not data:  # a client that comes or goes: nothing is under way to it
+        if not data:  # a client that connects or leaves: no data is in transit to it
             self._arriving = [item for item in self._arriving if item[2] != fd]
             heapq.heapify(self._arriving)
             return
-        # A pty passes a request on at once; on a wire it takes its time.
-        heard_s = self.clock.monotonic() + len(data) * self.character_s
-        for piece in self.peer.answer(data, heard_s, self.timeout_s):
-            due_s = heard_s + TURNAROUND_S + piece.delay_s
+        # A pty passes a request on at once, without the time on a wire.
+        received_s = self.clock.monotonic() + len(data) * self.character_s
+        for piece in self.peer.answer(data, received_s, self.timeout_s):
+            due_s = received_s + TURNAROUND_S + piece.delay_s
             for byte in piece.data if self._baud < FAST_BAUD else ():
                 due_s += self.character_s
                 heapq.heappush(self._arriving, (due_s, next(self._order), fd, bytes([byte])))
@@ -138,7 +138,7 @@ class RealWire:
                 heapq.heappush(self._arriving, (due_s, next(self._order), fd, piece.data))
 
     def _deliver(self) -> float | None:
-        """Write what is due; the time (s) until more is, None if nothing is under way."""
+        """Write due data; return the time (s) until the next, None if there is none."""
         while self._arriving and self._end is not None:
             due_s, _, fd, data = self._arriving[0]
             wait_s = due_s - self.clock.monotonic()

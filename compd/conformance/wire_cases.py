@@ -1,4 +1,4 @@
-"""Faults of the wire: late, cut, doubled, garbled, silent, unplugged. Whatever comes, no number may be wrong."""
+"""Faults of the wire: late, cut, doubled, garbled, silent, unplugged. No number may ever be wrong."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from compd.conformance.case_result import (
     Case,
     CaseResult,
     Subject,
-    complaints_of,
     every_reply,
     faulty_polls,
     one_poll_each,
     result_of,
+    violations_of,
 )
 from compd.conformance.harness import ASKED_AGAIN_TIMEOUTS, ConformanceSession
 from compd.gauge import Quality
 
-ENDS_OF_MAPS = (2, 3, 4)  # of them, those with which slaves answer where their registers end
+ENDS_OF_MAPS = (2, 3, 4)  # those of them that slaves send beyond their last register
 
-IN_A_ROW = 5  # more than any driver counts before it does something else
+IN_A_ROW = 5  # more than any driver counts before it acts
 IN_ANY_ORDER = 300
 
 
@@ -61,7 +61,7 @@ def _late(session: ConformanceSession, _: Subject) -> CaseResult:
 
 
 def _later(session: ConformanceSession, subject: Subject) -> CaseResult:
-    """So late that it comes while the next request waits for its own reply, which takes its time, too.
+    """Late enough to arrive while the next request waits for its own, slow reply.
 
     A timeout, the drain after it and the rest are over by then: a device can hardly be later.
     """
@@ -69,18 +69,18 @@ def _later(session: ConformanceSession, subject: Subject) -> CaseResult:
     if not subject.exact:
         return CaseResult(case, "", IN_VIRTUAL_TIME, "-")
     allowed = NO_ANSWER | DAMAGED | GOOD
-    complaints = []
+    violations = []
     observed: set[str] = set()
     for timeouts in (ASKED_AGAIN_TIMEOUTS + share for share in (0.3, 0.6)):
         for delay in (timeouts, 0.9):
             poll = session.poll([faults.late(delay)])
             observed |= {str(quality) for quality in poll.qualities}
-            complaints += [f"late by {timeouts} timeouts: {text}" for text in complaints_of(poll, allowed)]
+            violations += [f"late by {timeouts} timeouts: {text}" for text in violations_of(poll, allowed)]
         session.settle()
-        complaints += complaints_of(session.recover()[1], GOOD)
-    if complaints and not subject.registers:
-        return CaseResult(case, "", f"not detectable on this wire, {complaints[0]}", "-")
-    return result_of(case, allowed, ", ".join(sorted(observed)), complaints)
+        violations += violations_of(session.recover()[1], GOOD)
+    if violations and not subject.registers:
+        return CaseResult(case, "", f"not detectable on this wire, {violations[0]}", "-")
+    return result_of(case, allowed, ", ".join(sorted(observed)), violations)
 
 
 def _split(session: ConformanceSession, _: Subject) -> CaseResult:
@@ -99,20 +99,20 @@ def _cut(session: ConformanceSession, _: Subject) -> CaseResult:
 
 
 def _end_of_map(session: ConformanceSession, _: Subject) -> CaseResult:
-    """A slave whose registers end behind the last one that is read, which the line asks beyond: it must learn that."""
-    complaints = []
+    """A slave whose registers end at the last one read: the line asks beyond it, and must learn that."""
+    violations = []
     for beyond in (faults.SILENT, *(faults.refused(code, over_tcp=False) for code in ENDS_OF_MAPS)):
         session.reopen()
         session.wire.peer.end_map(beyond)
         polls = [session.poll()]
         learning = 2 * session.wire.peer.blocks + 1
         polls += [session.poll() for _ in range(learning)]
-        complaints += [f"{beyond.name}: {text}" for poll in polls for text in poll.wrong]
+        violations += [f"{beyond.name}: {text}" for poll in polls for text in poll.wrong]
         last = [session.poll() for _ in range(learning)]
-        complaints += [f"{beyond.name}, still: {text}" for poll in last for text in complaints_of(poll, GOOD)]
+        violations += [f"{beyond.name}, still: {text}" for poll in last for text in violations_of(poll, GOOD)]
     session.wire.peer.end_map(None)
     session.reopen()
-    return result_of("the map ends: silent, exceptions 2, 3, 4", GOOD, "ok, once the line knows", complaints)
+    return result_of("the map ends: silent, exceptions 2, 3, 4", GOOD, "ok, once the line knows", violations)
 
 
 def _unplugged(session: ConformanceSession, _: Subject) -> CaseResult:
@@ -122,19 +122,19 @@ def _unplugged(session: ConformanceSession, _: Subject) -> CaseResult:
     session.wire.replug()
     count, good = session.recover()
     lost = frozenset({Quality.LINE_LOST})
-    complaints = [text for poll in polls for text in complaints_of(poll, lost | NO_ANSWER)]
+    violations = [text for poll in polls for text in violations_of(poll, lost | NO_ANSWER)]
     if Quality.LINE_LOST not in polls[1].qualities:
-        complaints.append(f"still {polls[1]} at the second poll")
-    complaints += [f"replugged: {text}" for text in complaints_of(good, GOOD)]
+        violations.append(f"still {polls[1]} at the second poll")
+    violations += [f"replugged: {text}" for text in violations_of(good, GOOD)]
     return result_of(
-        "unplugged, replugged", lost, f"line_lost; right again after {count} poll{'s' * (count != 1)}", complaints
+        "unplugged, replugged", lost, f"line_lost; right again after {count} poll{'s' * (count != 1)}", violations
     )
 
 
 def slowest_line(session: ConformanceSession, baud: int) -> CaseResult:
     """A wire at its lowest speed: replies take long and are whole."""
-    complaints = [text for poll in (session.poll(), session.poll()) for text in complaints_of(poll, GOOD)]
-    return result_of(f"the line at {baud} baud", GOOD, "ok", complaints)
+    violations = [text for poll in (session.poll(), session.poll()) for text in violations_of(poll, GOOD)]
+    return result_of(f"the line at {baud} baud", GOOD, "ok", violations)
 
 
 def _many_faults(session: ConformanceSession, subject: Subject) -> CaseResult:
@@ -146,20 +146,20 @@ def _many_faults(session: ConformanceSession, subject: Subject) -> CaseResult:
         (faults.SILENT, faults.cut(0.5), faults.garbage_before(), faults.garbage_inside(), faults.late(1.5))
     )
     mixed = [*kinds, faults.NONE, *subject.possible([faults.doubled()]), faults.split(0.5)]
-    complaints = []
+    violations = []
     for fault in kinds:
         for number in range(IN_A_ROW):
-            texts = complaints_of(session.poll(every_reply(fault)), NO_NUMBER | GOOD)
-            complaints += [f"{fault.name}, for the {number + 1}. time: {text}" for text in texts]
-        complaints += complaints_of(session.recover()[1], GOOD)
+            texts = violations_of(session.poll(every_reply(fault)), NO_NUMBER | GOOD)
+            violations += [f"{fault.name}, for the {number + 1}. time: {text}" for text in texts]
+        violations += violations_of(session.recover()[1], GOOD)
     random = Random(0)
     for _ in range(IN_ANY_ORDER):
         chosen = [random.choice(mixed) for _ in range(2)]
-        texts = complaints_of(session.poll(chosen), NO_NUMBER | GOOD)
-        complaints += [f"{' and '.join(fault.name for fault in chosen)}: {text}" for text in texts]
+        texts = violations_of(session.poll(chosen), NO_NUMBER | GOOD)
+        violations += [f"{' and '.join(fault.name for fault in chosen)}: {text}" for text in texts]
     session.settle()
-    complaints += complaints_of(session.recover()[1], GOOD)
-    return result_of(case, NO_NUMBER | GOOD, f"{len(kinds) * IN_A_ROW + IN_ANY_ORDER} of them", complaints)
+    violations += violations_of(session.recover()[1], GOOD)
+    return result_of(case, NO_NUMBER | GOOD, f"{len(kinds) * IN_A_ROW + IN_ANY_ORDER} of them", violations)
 
 
 WIRE_CASES: tuple[Case, ...] = (

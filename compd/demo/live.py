@@ -11,9 +11,9 @@ from compd.demo.session import wait_for_gauges
 from compd.demo.simulated_daemon import simulated_daemon
 from compd.errors import DaemonError
 
-# An hour of warming up in three minutes: what moves can be seen to move.
-LIVE_SPEEDUP = 20.0
-# The machine stands at machine zero for so long, s: zero is taken in it.
+# Speed-up of weather and warm-up: an hour in three minutes makes the motion visible.
+SPEEDUP = 20.0
+# Time (s) at machine zero, in which zero is taken.
 ZERO_HOLD_S = 30.0
 ANSWER_TIMEOUT_S = 15.0
 WATCH_HZ = 10.0
@@ -32,7 +32,7 @@ def run_live(configuration: Configuration, seed: int, serve: Callable[[str], Non
 
 
 def take_zero(unix_socket: Path) -> None:
-    """Take machine zero of a daemon, as soon as every gauge is good. Raises DaemonError where it is refused thrice."""
+    """Take machine zero of a daemon as soon as every gauge is good. Raises DaemonError after three refusals."""
     with connect(unix_socket, ANSWER_TIMEOUT_S) as observer, connect(unix_socket, ANSWER_TIMEOUT_S) as daemon:
         setpoints = daemon.watch(WATCH_HZ)
         for tries_left in reversed(range(ZERO_TRIES)):

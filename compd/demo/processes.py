@@ -13,7 +13,7 @@ from pathlib import Path
 
 from compd.errors import DaemonError, Problem
 
-# The first start on a machine compiles the kernels; a slow one needs a minute or two.
+# Longest wait (s) for a start: the first one compiles the kernels, up to two minutes on a slow computer.
 START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 10.0
 POLL_EVERY_S = 0.05

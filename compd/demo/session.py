@@ -20,18 +20,18 @@ from compd.simulation import ControlClient
 
 # Kinds of compensation: of nothing, of the joints, of joints and frame.
 KINDS = ("none", "joints", "full")
-# Twenty seconds of demo are forty minutes of weather and warm-up.
+# Speed-up of weather and warm-up: twenty seconds of demo are forty minutes.
 SPEEDUP = 120.0
-# Longer than the kernels take to compile: the machine stands at machine zero until it is driven.
+# Time (s) at machine zero, until the first drive; longer than the kernels take to compile.
 ZERO_HOLD_S = 600.0
 SETPOINT_RATE_HZ = 50.0
-# Rest at a target: a little longer than the slowest gauge needs to be read anew.
+# Rest (s) at a target: a little longer than the period of the slowest gauge.
 DWELL_S = 0.5
-# Distance from the setpoint within which the links have arrived: they follow its last micrometres all the time.
+# Distance (mm) from the setpoint within which the links have arrived; they keep following its last micrometres.
 ARRIVED_MM = 0.005
-# Taking machine zero averages the gauges for a second.
+# Timeout (s) of taking machine zero, which averages the gauges for a second.
 ANSWER_TIMEOUT_S = 15.0
-# Half edges of the box of targets about machine zero, within reach of every shipped machine.
+# Half edges (mm) of the box of targets about machine zero, within reach of every shipped machine.
 REACH_MM = (60.0, 60.0, 40.0)
 
 
@@ -129,7 +129,7 @@ def wait_for_gauges(observer: Client, setpoints: Iterator[dict[str, Any]]) -> No
 
 
 def _visit(machine: ControlClient, elapsed_s: float, target_mm: NDArray[Any], setpoint: dict[str, Any]) -> DemoVisit:
-    """Tip errors that the commands of each kind of compensation would have now; the machine is at the last."""
+    """Tip errors of the commands of each kind of compensation now; the machine is at the last."""
     full = np.array(setpoint["scale_setpoint_mm"])
     none = full - np.array(setpoint["correction_mm"])
     commands = {"none": none, "joints": none + np.array(setpoint["sources_mm"]["joints"]), "full": full}
@@ -148,7 +148,7 @@ def _next_target(configuration: Configuration, random: np.random.Generator) -> N
 
 
 def _in_B0(configuration: Configuration, tip_M_mm: NDArray[Any]) -> NDArray[Any]:
-    """(3,) the place in {B0} of a place in {M}."""
+    """(3,) coordinates in {B0} of a place in {M}."""
     base = configuration.geometry.base
     rotation = Rotation.from_rotvec(base.rotation_B0_in_M_rad)
     return np.asarray(rotation.inv().apply(tip_M_mm - np.array(base.origin_B0_in_M_mm)))

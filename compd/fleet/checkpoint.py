@@ -1,4 +1,4 @@
-"""The table of a run while it goes on: whatever ends the program, what was done until a moment before is kept."""
+"""The table of a running examination: results up to a moment before any end of the program are kept."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from compd.fleet.recording_result import RecordingResult
 from compd.fleet.table import write_table
 
-# To write the table of 500 recordings takes 20 ms; a diagnosis takes seconds.
+# Least interval (s) of writes. Writing the table of 500 recordings takes 20 ms; a diagnosis takes seconds.
 WRITE_EVERY_S = 10.0
 
 
@@ -31,7 +31,7 @@ class Checkpoint:
         return len(self._results)
 
     def add(self, result: RecordingResult) -> None:
-        """Take a result, and write the table where that is due."""
+        """Take a result, and write the table if due."""
         self._results.append(result)
         now_s = self._monotonic()
         if now_s - self._written_s >= WRITE_EVERY_S:

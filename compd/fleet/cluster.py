@@ -1,4 +1,4 @@
-"""Where the work is done: on a Dask cluster that runs already, or on all cores of this computer."""
+"""The computers that do the work: a running Dask cluster, or all cores of this computer."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from compd.release import __version__
 if TYPE_CHECKING:
     from distributed import Client
 
-# A scheduler in the same building answers within milliseconds.
+# Timeout (s) of connecting; a scheduler in the same building answers within milliseconds.
 CONNECT_S = 10
 # One thread each, also where a worker's own settings say otherwise: matrices are small, and there is a worker per core.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
 def check_installed() -> None:
-    """Raise CompdError where the packages are missing that a fleet needs."""
+    """Raise CompdError if packages for fleets are missing."""
     try:
         import distributed  # noqa: F401
         import pyarrow  # noqa: F401
@@ -42,7 +42,7 @@ def check_installed() -> None:
 def open_cluster(
     scheduler: str | None = None, paths: Sequence[Path] = (), processes: int | None = None
 ) -> Iterator[Client]:
-    """A client of a cluster, for as long as the block lasts.
+    """A client of a cluster, for the duration of the block.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def _local(processes: int) -> Iterator[Client]:
         # a worker that died is known at once; the engine tries its item again
         "distributed.scheduler.allowed-failures": 0,
         "distributed.nanny.pre-spawn-environ": _ONE_THREAD,
-        # nobody looks at what these watch, and they take a tenth of each processor
+        # these monitors are unused, and take a tenth of each processor
         "distributed.worker.profile.enabled": False,
         "distributed.admin.system-monitor.interval": "5s",
         "distributed.admin.tick.interval": "1s",
@@ -99,7 +99,7 @@ def _local(processes: int) -> Iterator[Client]:
             # no dashboard, and none of the ports that another cluster may have
             dashboard_address=None,
             scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-            # what happens to workers is told as the outcome of an item
+            # the fate of workers is reported as the outcome of an item
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
@@ -125,13 +125,13 @@ def _connected(scheduler: str) -> Iterator[Client]:
                 next_step="start one with `dask scheduler`, or leave it out: then this computer does the work",
             )
         ) from error
-    # that a scheduler is lost is told as the outcome of an item, too
+    # a lost scheduler is reported as the outcome of an item, too
     with silence_logging_cmgr(logging.CRITICAL), client:
         yield client
 
 
 def check_workers(client: Client, scheduler: str, paths: Sequence[Path] = ()) -> None:
-    """Raise CompdError where a cluster has no worker, or workers that cannot do the work: with every one of them.
+    """Raise CompdError for a cluster without workers, or for workers that cannot do the work, with all of them.
 
     paths : files that the workers must be able to read.
     """

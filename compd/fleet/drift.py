@@ -1,4 +1,4 @@
-"""How a parameter goes from campaign to campaign: a line by weighted least squares, named where it is no chance.
+"""Drift of a parameter over campaigns: a line by weighted least squares, named if it is no chance.
 
 The line is c + b t, weighted with the standard errors of the values. These say how well a recording determines the
 parameter, and not what else changes from campaign to campaign. How much that is shows in the scatter about the lines of
@@ -59,7 +59,7 @@ class Drift:
 
     @property
     def name(self) -> str:
-        """ "link_expansion.a": which parameter it is."""
+        """Name of the parameter: "link_expansion.a"."""
         return f"{self.effect}.{self.parameter}"
 
     @property
@@ -128,7 +128,7 @@ def _series(results: Iterable[RecordingResult]) -> list[Drift]:
 
 
 def _line(drift: Drift, criteria: FleetCriteria) -> _WeightedLine | None:
-    """The line of a parameter; None where none can be fitted."""
+    """The line of a parameter; None if none can be fitted."""
     weighable = np.isfinite(drift.value) & np.isfinite(drift.standard_error) & (drift.standard_error > 0)
     time, value, sigma = (column[weighable] for column in (drift.time, drift.value, drift.standard_error))
     if len(time) < criteria.fewest_campaigns or np.ptp(time) == 0:
@@ -164,5 +164,5 @@ def _judged(drift: Drift, line: _WeightedLine, scale: float, tried: int, criteri
 
 
 def named_drifts(found: Sequence[Drift]) -> list[Drift]:
-    """Those that are named, the surest first."""
+    """The named drifts, the surest first."""
     return sorted((drift for drift in found if drift.named), key=lambda drift: drift.p_value)

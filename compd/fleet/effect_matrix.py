@@ -1,4 +1,4 @@
-"""The figure that shows a fleet at a glance: a line for each machine, a column for each effect, in it its value."""
+"""The overview figure of a fleet: a line for each machine, a column with the value of each effect."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from compd.report import COLOURS, PageTable, style_figure
 
 NO_EFFECTS = PageTable(("",), [("no effect was found, and the models have none",)])
 ROW_PX = 26
-# What colours a cell beyond the share of recordings, 0 to 1: a number of its own for each.
+# Numbers of a cell's special colours, beyond the share of recordings (0 to 1).
 _DRIFTS, _DIFFERS, _UNEXPLAINED, _MOST = 2.0, 3.0, 4.0, 4.0
 # The column of effects that no machine has on most of its recordings.
 SELDOM = "seldom found"
-# Of a share that is on its way to be an effect: paler than any that is one.
+# Colour of a share below that of an effect: paler than any of an effect.
 _PALE = 0.4
 
 
 class _Cell(NamedTuple):
-    """What a cell shows: its colour's number, its text, and what the pointer shows."""
+    """Content of a cell: number of its colour, text, and text at the pointer."""
 
     colour: float
     text: str
@@ -73,7 +73,7 @@ def plot_effect_matrix(overview: Overview) -> Figure | PageTable:
 
 
 def _place(overview: Overview, machine: str) -> tuple[str, tuple[bool, ...], str]:
-    """By which machines are sorted: kinematics, then effects, the most common first, then the name."""
+    """Sort key of machines: kinematics, then effects, the most common first, then the name."""
     has = overview.steady[machine]
     return (
         overview.of(machine)[0].kinematics,
@@ -125,7 +125,7 @@ def _cell(overview: Overview, machine: str, column: str, series: Sequence[Drift]
 
 
 def _values_text(series: Sequence[Drift]) -> str:
-    """ "1.5" by the median; of one that drifts its line's ends, "0.5 to 2.3"; "0.7 ... 1.5" of several parameters."""
+    """ "1.5" for the median; "0.5 to 2.3" for the ends of a drift's line; "0.7 ... 1.5" for several parameters."""
     named = [drift for drift in series if drift.named]
     if named:
         first, last = (named[0].intercept + named[0].slope * float(named[0].time[k]) for k in (0, -1))

@@ -27,17 +27,17 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-# As long may a cluster be without any worker, s: those that died are started anew within that time, or nobody does it.
+# Longest time (s) of a cluster without workers; dead ones are restarted within it or never.
 LONGEST_WITHOUT_WORKERS_S = 60.0
-# At least so many tasks for each worker: the last ones are shared out evenly enough.
+# Fewest tasks for each worker, so that the last ones are shared evenly.
 _FEWEST_BATCHES = 8
-# How often it is looked whether there is a worker while no result comes, s.
+# Interval (s) of checks for a worker while no result comes.
 LOOK_EVERY_S = 5.0
 
 
 @dataclass(frozen=True)
 class Outcome(Generic[Item, Result]):
-    """What became of an item: its result, or the error that it raised.
+    """Outcome of an item: its result, or the error that it raised.
 
     An error that is a CompdError came from the work or says what happened to the cluster; any other is a defect.
     """
@@ -99,7 +99,7 @@ class _NoWorker(CompdError):
 def _run(
     client: Client, work: Callable[[Item], Result], batches: Sequence[Sequence[Item]]
 ) -> Iterator[Outcome[Item, Result]]:
-    """Every item's outcome, each batch tried once; what is left when the loop is left is cancelled."""
+    """Every item's outcome, each batch tried once; leaving the loop cancels the rest."""
     futures = client.map(_attempt, [(work, batch) for batch in batches], pure=False)
     waiting = {future.key: (batch, future) for batch, future in zip(batches, futures, strict=True)}
     # `waiting` alone has them, so that the cluster forgets results that have been read
@@ -124,7 +124,7 @@ def _run(
 
 
 def _outcomes_of(batch: Sequence[Item], future: Future[Any]) -> list[Outcome[Item, Any]]:
-    """The outcomes of items whose task is done, one way or another."""
+    """The outcomes of items whose task is done or has failed."""
     from distributed import KilledWorker
 
     try:
@@ -147,7 +147,7 @@ def _has_worker(client: Client) -> bool:
 
 
 def _attempt(task: tuple[Callable[[Item], Result], Sequence[Item]]) -> list[tuple[Result | None, Exception | None]]:
-    """What a worker does: the work on a few items, whose exceptions are values that every process can read."""
+    """A worker's task: the work on a few items; exceptions become values that every process can read."""
     work, batch = task
     done: list[tuple[Result | None, Exception | None]] = []
     for item in batch:
@@ -159,7 +159,7 @@ def _attempt(task: tuple[Callable[[Item], Result], Sequence[Item]]) -> list[tupl
 
 
 def _portable(error: Exception) -> Exception:
-    """The error, or its text where it does not survive the way to another process."""
+    """The error, or its text if it cannot be sent to another process."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:  # noqa: BLE001 - a class of its own may raise anything when it is made again

@@ -1,4 +1,4 @@
-"""Examining many recordings on a cluster: one result for each, a problem where one cannot be examined."""
+"""Examination of many recordings on a cluster: a result or a problem for each."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from compd.fleet.fleet_recording import FleetRecording
 from compd.fleet.machine_examination import Examination
 from compd.fleet.recording_result import NOT_DONE, Command, RecordingResult
 
-# Recordings in one task: to compare 600 rows takes 0.1 s, to diagnose them seconds.
+# Recordings in one task: comparing 600 rows takes 0.1 s, diagnosing them takes seconds.
 BATCH: Mapping[Command, int] = {"compare": 8, "diagnose": 1}
 
 
 @dataclass(frozen=True)
 class FleetRun:
-    """What became of the recordings of a fleet.
+    """Outcome of the examination of a fleet's recordings.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ def examine_fleet(
     progress: Callable[[RecordingResult], None] = lambda result: None,
     earlier: Iterable[RecordingResult] = (),
 ) -> FleetRun:
-    """Examine every recording; what is wrong with one stops none of the others.
+    """Examine every recording; a faulty one does not stop the others.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def examine_fleet(
     known = {result.basis: result for result in earlier if result.basis and not result.problem}
     results = {recording: known[basis[recording]] for recording in recordings if basis[recording] in known}
     kept = len(results)
-    # long ones first: none is left at the end for which all other workers wait
+    # long ones first, so that no worker idles at the end
     todo = sorted((recording for recording in recordings if recording not in results), key=_size, reverse=True)
     for result in results.values():
         progress(result)
@@ -91,13 +91,13 @@ def examine_fleet(
 
 
 def _size(recording: FleetRecording) -> int:
-    """Bytes of a recording; 0 where it cannot be looked at."""
+    """Bytes of a recording; 0 if inaccessible."""
     stamp = file_stamp(recording.path)
     return 0 if stamp is None else stamp[1]
 
 
 def _result(outcome: Outcome[FleetRecording, RecordingResult], examination: Examination, basis: str) -> RecordingResult:
-    """The result of a recording, with what it follows from; or of one that could not be examined."""
+    """The result of a recording with the hash of its inputs; or its problem."""
     if outcome.result is not None:
         return replace(outcome.result, basis=basis)
     error, recording = outcome.error, outcome.item

@@ -14,10 +14,10 @@ from compd.fleet.overview import Overview, short_name
 from compd.report import COLOURS, COLUMNS, SERIES_COLOURS, PageTable, style_figure
 
 NO_DRIFTS = PageTable(("",), [("no parameter has been determined on enough campaigns of one machine",)])
-# More small figures nobody looks through; the table has all numbers.
+# Most small figures of a page; the table has all numbers.
 MOST_PANELS = 9
 PANEL_PX = 260
-# Beyond so many machines in one small figure colours cannot be told apart: those that drift have one, others none.
+# Most machines with a colour of their own in one small figure; beyond it only drifting ones have one.
 MOST_COLOURED = len(SERIES_COLOURS)
 
 

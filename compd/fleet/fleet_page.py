@@ -1,4 +1,4 @@
-"""The page of a fleet: which machine has which effect, what drifts, which machine differs, what could not be read."""
+"""The page of a fleet: effects by machine, drifts, differing machines, unreadable recordings."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def write_fleet_page(path: Path, results: Sequence[RecordingResult]) -> None:
 
 
 def _matrix_caption(overview: Overview) -> str:
-    """How to read the colours, and which machines are left out."""
+    """Explanation of the colours, and the omitted machines."""
     text = (
         "Blue: found on most recordings; the number is the median over these, from the smallest to the largest where "
         "the effect has a number for each link or axis. Orange: it drifts, from the first to the last value of its "

@@ -1,4 +1,4 @@
-"""A recording of a fleet: where it lies, which machine it is of, when it began, and what its files hold."""
+"""A recording of a fleet: path, machine, start and contents of its files."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class FleetRecording:
 
 @dataclass(frozen=True)
 class RecordingFiles:
-    """The table of a recording and what lies beside it, before anybody knows of which machine it is."""
+    """The table of a recording and its neighbouring files, before its machine is known."""
 
     path: Path
 
     @cached_property
     def sidecar(self) -> Sidecar | None:
-        """What could be read of it; None where nothing could."""
+        """Its readable part; None if unreadable."""
         try:
             return read_sidecar(self.path.with_suffix(".yaml"), [])
         except CompdError:
@@ -50,12 +50,12 @@ class RecordingFiles:
 
     @property
     def configuration(self) -> str:
-        """The machine's name in the sidecar; "" where there is none."""
+        """The machine's name in the sidecar; "" if absent."""
         return "" if self.sidecar is None else self.sidecar.machine
 
     @property
     def started_at(self) -> datetime | None:
-        """When the campaign began, UTC: as the sidecar says, else the date in the name of the file or a directory."""
+        """Start of the campaign (UTC) by the sidecar, else by the date in the name of the file or a directory."""
         stated = None if self.sidecar is None else self.sidecar.provenance.get("started_at")
         try:
             return _in_utc(datetime.fromisoformat(str(stated)))
@@ -64,7 +64,7 @@ class RecordingFiles:
 
 
 def content_hash(path: Path) -> str:
-    """SHA-256 of the recording's table, its sidecar and its ball plate; "" where one of them cannot be read."""
+    """SHA-256 of the recording's table, its sidecar and its ball plate; "" if one of them is unreadable."""
     sidecar = RecordingFiles(path).sidecar
     balls = None if sidecar is None or sidecar.reference is None else sidecar.reference.balls
     digest = hashlib.sha256()

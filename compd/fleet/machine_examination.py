@@ -1,4 +1,4 @@
-"""Examining one recording: which machine and model are its own, then `compare` or `diagnose`."""
+"""Examination of one recording: finds its machine and model, then `compare` or `diagnose`."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from compd.model_file import ModelFile, read_model_file, read_stored
 from compd.recording import EXTERNAL
 from compd.release import __version__
 
-# Configurations, and models, that a process keeps: a fleet has hundreds of recordings of a few machines.
+# Most configurations, and models, in a process's cache: a fleet has hundreds of recordings of a few machines.
 MOST_KEPT = 64
-# Number of links -> the kinematics that have so many.
+# number of links -> kinematics
 KINEMATICS = {links: kinematics for kinematics, links in LINKS.items()}
 
 
 @dataclass(frozen=True)
 class Examination:
-    """What is done with each recording of a fleet; called with it, in any process.
+    """The examination of each recording of a fleet; called with it, in any process.
 
     Attributes
     ----------
@@ -54,15 +54,15 @@ class Examination:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Every file that it needs beside the recordings."""
+        """Every file needed beside the recordings."""
         return (*self.machines.paths, *self.models.paths, *filter(Path.is_absolute, map(Path, self.effects)))
 
     def model_path(self, recording: FleetRecording) -> str:
-        """The model file of a recording's machine; "" where it has none."""
+        """The model file of a recording's machine; "" without one."""
         return str(self.models.of(recording) or "")
 
     def basis(self, recording: FleetRecording) -> str:
-        """Hash of everything that its result follows from beside the code: two results with one hash are the same.
+        """Hash of all inputs of its result besides the code: results with equal hashes are equal.
 
         The recording's files and its machine's name, the configuration, the model, effects of one's own, the command
         and the release. "" where a file cannot be read.
@@ -78,7 +78,7 @@ class Examination:
         return content and hashlib.sha256("\0".join([content, *parts, *whole]).encode()).hexdigest()
 
     def __call__(self, recording: FleetRecording) -> RecordingResult:
-        """Examine one recording. Raises CompdError where it cannot be."""
+        """Examine one recording. Raises CompdError if that is impossible."""
         file = self.machines.of(recording)
         configuration = None if file is None else _configuration(file, file_stamp(file))
         path = recording.path
@@ -115,7 +115,7 @@ class Examination:
         model: ModelFile | None,
         long: LongRecording | None,
     ) -> RecordingResult:
-        """The recording beside the model, and the numbers that the model's effects would have on it."""
+        """The recording compared with the model, and the model's effects fitted on it."""
         comparison = compare(aligned, model) if long is None else _compared_by_blocks(long, model)
         verdict = ABOVE_FLOOR if comparison.floor.known else NOISE_NOT_KNOWN
         estimates: list[FleetEstimate] = []
@@ -186,7 +186,7 @@ def examination(
     models: Sequence[str | Path] = (),
     effects: Sequence[str | Path] = (),
 ) -> Examination:
-    """What is to be done with each recording, its files checked before any work begins.
+    """The examination of each recording, with its files checked before any work begins.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def examination(
 
 
 def _wherever(effects: str | Path) -> str:
-    """A source of effects as a process in another directory finds it; a name stays a name."""
+    """A source of effects with an absolute path, for a process in another directory; a name stays a name."""
     return str(Path(effects).absolute()) if Path(effects).exists() else str(effects)
 
 
@@ -236,5 +236,5 @@ def _compared_by_blocks(long: LongRecording, model: ModelFile | None) -> Compari
 
 
 def _kinematics(aligned: AlignedRecording) -> str:
-    """How the machine is built, as its configuration says; EXTERNAL for a model of one's own."""
+    """The machine's kinematics by its configuration; EXTERNAL for a model of one's own."""
     return EXTERNAL if aligned.model is None else KINEMATICS[aligned.rows.links]

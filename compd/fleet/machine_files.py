@@ -1,4 +1,4 @@
-"""Configurations, or models, of the machines of a fleet: which file is for which recording."""
+"""Configurations, or models, of a fleet's machines, by recording."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ class MachineFiles:
         return (*self.by_configuration.values(), *self.by_machine.values())
 
     def of(self, recording: FleetRecording) -> Path | None:
-        """The file for a recording; None where there is none."""
+        """The file for a recording; None if there is none."""
         return self.by_machine.get(recording.machine) or self.by_configuration.get(recording.configuration)
 
 
 def machine_files(
     places: Sequence[str | Path], machine_of: Callable[[Path], str], kind: str, problems: list[Problem]
 ) -> MachineFiles:
-    """The files that are meant; what cannot be read, is not there, or is the second for one machine, is a problem.
+    """The matching files; a problem for each unreadable or missing one, and for a second one of a machine.
 
     places : files, or patterns: ``"machines/*.yaml"`` by the machine that each of them names,
         ``"models/{machine}.yaml"`` by the machine's name in the fleet.
@@ -48,7 +48,7 @@ def machine_files(
     by_machine: dict[str, Path] = {}
     for place in map(str, places):
         matches = [Path(place)] if Path(place).exists() else sorted(matches_of(place))
-        # a name without wildcards is read all the same: that says what is wrong
+        # a name without wildcards is read in any case, to report its fault
         for path in matches or [Path(place)]:
             try:
                 configuration = machine_of(path.absolute())

@@ -1,4 +1,4 @@
-"""Which machine a recording is of, where a name in the sidecar is that of a configuration which many machines share.
+"""The machine of a recording whose sidecar names a configuration shared by many machines.
 
 A sidecar says `machine: tripod-cmm`: how the machine is built. Of twenty tripods that are built alike, the directory
 says which one it is, or a part of the file's name, by a pattern: 'data/{machine}_*.csv'.
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PLACEHOLDER = "{machine}"
 _DATE_PLACEHOLDER = "{date}"
-# What stands for itself in a pattern, and what a part of it matches.
+# Wildcards of a pattern, and their regular expressions.
 _TOKENS: Mapping[str, str] = {
     "**/": "(?:.*/)?",
     "**": ".*",
@@ -37,7 +37,7 @@ _TOKEN = re.compile("|".join(map(re.escape, _TOKENS)) + r"|\[[^/\]]+\]")
 
 
 class MachinesBy(StrEnum):
-    """What tells the machines of a fleet apart."""
+    """Distinguishing mark of a fleet's machines."""
 
     auto = "auto"
     directory = "directory"
@@ -47,7 +47,7 @@ class MachinesBy(StrEnum):
 def name_machines(
     recordings: Sequence[RecordingFiles], by: MachinesBy = MachinesBy.auto
 ) -> tuple[list[str], list[Problem]]:
-    """The machine of each recording, and remarks on how they were told apart where a person may want it otherwise.
+    """The machine of each recording, and remarks on choices that a person may want to change.
 
     A directory's name is its path below the one that has all recordings, without parts that are dates. By `auto`,
     directories count where recordings of one configuration lie in several of them, and most of them have recordings of
@@ -69,7 +69,7 @@ def name_machines(
 
 
 def machine_in(path: Path, pattern: str) -> str:
-    """What stands in the place of {machine} in a path that the pattern matches; "" where the pattern has none."""
+    """The text for {machine} in a path that matches the pattern; "" for a pattern without it."""
     match = _expression(pattern).fullmatch(str(path))
     return "" if match is None or PLACEHOLDER not in pattern else match["machine"]
 
@@ -107,7 +107,7 @@ def _shared_configurations(configurations: Sequence[str], directories: Sequence[
         if configuration and directory:
             having[directory].add(configuration)
             lying[configuration].add(directory)
-    # one recording with a wrong name in a machine's directory makes it no directory of a campaign
+    # a single misnamed recording does not turn a machine's directory into a campaign's
     of_one = sum(len(names) == 1 for names in having.values())
     if 2 * of_one <= len(having):
         return {}

@@ -1,4 +1,4 @@
-"""Dates in names of files and directories, as people write them."""
+"""Dates in names of files and directories."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _YEAR = re.compile(r"(?:19|20)\d\d")
 
 
 def date_in(names: Iterable[str]) -> datetime | None:
-    """The date in the first name that has one, at midnight where no time follows it; read as UTC."""
+    """The date in the first name that has one, at midnight without a time; read as UTC."""
     for name in names:
         if match := _DATE.search(name):
             month, day = match["month"] or match["month2"], match["day"] or match["day2"] or "1"
@@ -28,5 +28,5 @@ def date_in(names: Iterable[str]) -> datetime | None:
 
 
 def is_date(name: str) -> bool:
-    """Whether a directory's name is a date and nothing else: "2026", "2026-01", "2026-01-05"."""
+    """Whether a directory's name is only a date: "2026", "2026-01", "2026-01-05"."""
     return bool(_DATE.fullmatch(name) or _YEAR.fullmatch(name))

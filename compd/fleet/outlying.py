@@ -1,4 +1,4 @@
-"""Which machine differs from the others: in a parameter of an effect, or in its error.
+"""Machines that differ from the others in a parameter of an effect or in their error.
 
 Like is compared with like: the parameter with that of machines of one kinematics, the error with that of machines which
 have the same effects, too. A machine's value is compared with the median of all; the scale is their median absolute
@@ -21,16 +21,16 @@ from compd.fleet.drift import Drift
 from compd.fleet.recording_result import RecordingResult
 from compd.fleet.steady_effects import steady_effects
 
-# Of a normal distribution: standard deviation over median absolute deviation.
+# Standard deviation of a normal distribution over its median absolute deviation.
 _SIGMA_OF_MAD = 1.4826
-# Of a normal distribution: standard error of the median over that of the mean.
+# Standard error of the median of a normal distribution over that of the mean.
 _OF_MEDIAN = math.sqrt(math.pi / 2)
 ERROR, ERROR_LEFT = "error", "error with its effects"
 
 
 @dataclass(frozen=True)
 class OutlyingMachine:
-    """A machine with a value that no other machine's is like.
+    """A machine with a value unlike those of all others.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ def _errors(
         if value > 0:
             kind = (result.error_unit, result.kinematics, steady[result.machine])
             errors.setdefault(kind, {}).setdefault(result.machine, []).append(value)
-    # where no machine has an effect, this would be the error once more
+    # without any effect this would repeat the error
     return {kind: of for kind, of in errors.items() if quantity == ERROR or kind[2]}
 
 

@@ -1,4 +1,4 @@
-"""What a fleet's results say in words and tables, for the page and for the terminal."""
+"""Results of a fleet in words and tables, for the page and for the terminal."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _DATE = "%Y-%m-%d"
 
 @dataclass(frozen=True)
 class Overview:
-    """The results of a fleet with what follows from all of them together."""
+    """The results of a fleet with joint conclusions."""
 
     results: Sequence[RecordingResult]
 
@@ -46,7 +46,7 @@ class Overview:
 
     @cached_property
     def not_done(self) -> int:
-        """Number of recordings for which there was no time."""
+        """Number of recordings left undone for lack of time."""
         return sum(result.not_done for result in self.results)
 
     @cached_property
@@ -93,7 +93,7 @@ class Overview:
 
     @cached_property
     def quiet(self) -> list[str]:
-        """Machines of which nothing is to be said: no recording has an effect or an error that none explains."""
+        """Inconspicuous machines: no recording has an effect or an unexplained error."""
         return [
             machine
             for machine in self.machines
@@ -118,7 +118,7 @@ class Overview:
 
     @property
     def headline(self) -> str:
-        """How much was examined, and how many things are to be looked at, in a sentence or two."""
+        """Counts of examined recordings and of findings, in a sentence or two."""
         recordings = _counted(len(self.examined), "recording")
         text = f"{recordings} of {_counted(len(self.machines), 'machine')} examined"
         text += f"; {_counted(len(self.failed), 'other')} could not be" if self.failed else ""
@@ -135,7 +135,7 @@ class Overview:
         return f"{text} {join_words(findings)}." if findings else text
 
     def machine_table(self, without: Sequence[str] = ()) -> PageTable:
-        """A row for each machine: how many recordings, their verdicts, error and noise, effects.
+        """A row for each machine: number of recordings, verdicts, error and noise, effects.
 
         without : machines that are left out.
         """
@@ -161,15 +161,15 @@ class Overview:
         return PageTable(head, rows)
 
     def drift_sentences(self) -> list[str]:
-        """What drifts, the surest first."""
+        """Drifts, the surest first."""
         return [drift_sentence(drift) for drift in named_drifts(self.drifts)]
 
     def outlying_sentences(self) -> list[str]:
-        """Which machine differs, and by how much: the farthest first, then those that alone have an effect."""
+        """Differing machines: the farthest first, then those with an effect that no other has."""
         return [*map(outlying_sentence, self.outlying), *map(lone_sentence, self.lone)]
 
     def unexplained_sentences(self) -> list[str]:
-        """Which machine has an error of which no effect is the whole cause, and how large it is."""
+        """Machines with an unexplained error, and its size."""
         sentences = []
         for machine in self.unexplained_machines:
             results = self.of(machine)
@@ -184,7 +184,7 @@ class Overview:
         return sentences
 
     def sentences(self) -> list[str]:
-        """What to look at: what drifts, which machine differs, and what no effect explains."""
+        """Findings: drifts, differing machines, and unexplained errors."""
         return [*self.drift_sentences(), *self.outlying_sentences(), *self.unexplained_sentences()]
 
     def problem_table(self) -> PageTable:

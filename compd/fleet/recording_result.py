@@ -1,4 +1,4 @@
-"""What the examination of one recording says, as plain data: it travels between processes and into a table."""
+"""Result of the examination of one recording, as plain data for other processes and a table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Command = Literal["compare", "diagnose"]
 # Verdicts of `compare`; those of `diagnose` are `compd.diagnosis.verdict.Verdict`.
 AT_FLOOR, ABOVE_FLOOR, NOISE_NOT_KNOWN = "at_floor", "above_floor", "noise_not_known"
 
-# The problem of a recording for which there was no time.
+# The problem of a recording left undone for lack of time.
 NOT_DONE = "was not done: Ctrl-C ended the work before"
 
 
@@ -41,7 +41,7 @@ class FleetEstimate:
 
 @dataclass(frozen=True)
 class RecordingResult:
-    """One recording, examined; or the problem for which it could not be.
+    """An examined recording, or the problem that prevented it.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class RecordingResult:
 
     @property
     def not_done(self) -> bool:
-        """Whether nobody has looked at it yet, so that nothing is known to be wrong with it."""
+        """Whether it has not been examined yet, so that no fault is known."""
         return NOT_DONE in self.problem
 
     @property

@@ -1,4 +1,4 @@
-"""Which recordings lie in directories, or match patterns, and of which machine each of them is."""
+"""Recordings in directories or matching patterns, with their machines."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from compd.fleet.fleet_recording import FleetRecording, RecordingFiles
 from compd.fleet.machine_names import MachinesBy, machine_in, matches_of, name_machines
 from compd.recording import SECTIONS, SIDECAR
 
-# What the table of a recording may end in. Where two tables have one sidecar, the first of these counts.
+# Suffixes of a recording's table, in order of precedence for two tables with one sidecar.
 TABLES = (".csv", ".parquet")
-# Columns that nothing but a recording has: such a table without a sidecar is one that lacks it.
+# Columns found in recordings only: a table with one of them and without a sidecar lacks it.
 _OWN_COLUMNS = ("time_s", "scale_1_mm", "reference_x_mm", "reference_link_1_mm")
-# Enough for the header of a table with hundreds of columns.
+# Bytes to read for the header of a table with hundreds of columns.
 _HEADER_BYTES = 16384
 
 
 @dataclass(frozen=True)
 class FoundRecordings:
-    """What lies in the places that were searched.
+    """Contents of the searched places.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ def find_recordings(places: Sequence[str | Path], by: MachinesBy = MachinesBy.au
         Where a place does not exist, or no recording is in any of them.
     """
     problems: list[Problem] = []
-    # sidecar -> machine as a pattern has it, or "", and the table; a sidecar is one recording
+    # sidecar -> machine by the pattern, or "", and the table; a sidecar is one recording
     tables: dict[Path, tuple[str, Path]] = {}
     alone: dict[Path, None] = {}
     for place in map(str, places):
@@ -110,7 +110,7 @@ def _candidates(match: Path) -> Iterator[Path]:
 
 
 def _table(file: Path, named: bool) -> Path | None:
-    """The table of the recording that a file belongs to; None where it belongs to none.
+    """The table of the recording that a file belongs to; None if there is none.
 
     named : whether a person named this very file: then it is taken for a recording.
     """
@@ -121,7 +121,7 @@ def _table(file: Path, named: bool) -> Path | None:
 
 
 def _has_own_columns(file: Path) -> bool:
-    """Whether a table without a sidecar has columns that nothing but a recording has."""
+    """Whether a table without a sidecar has columns found in recordings only."""
     if file.suffix == ".parquet":
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -140,7 +140,7 @@ def _has_own_columns(file: Path) -> bool:
 
 
 def _looks_like_sidecar(path: Path) -> bool:
-    """Whether a YAML file names a machine and has no key that a sidecar has not: no configuration, no model file."""
+    """Whether a YAML file names a machine and has keys of a sidecar only, unlike a configuration or a model file."""
     try:
         data, _ = parse_yaml(read_text(path, SIDECAR.name), path, SIDECAR)
     except CompdError:

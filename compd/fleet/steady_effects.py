@@ -1,4 +1,4 @@
-"""The effects that a machine has on most of its recordings; on a few, an effect may be a chance or a weather's."""
+"""Effects that a machine has on most of its recordings; on a few, an effect may come from chance or weather."""
 
 from __future__ import annotations
 

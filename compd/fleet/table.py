@@ -24,7 +24,7 @@ from compd.fleet.recording_result import Command, FleetEstimate, RecordingResult
 if TYPE_CHECKING:
     import pyarrow as pa
 
-# In the schema's metadata; another number where a column changes its meaning.
+# Version in the schema's metadata; it changes with the meaning of a column.
 FORMAT_KEY, FORMAT = b"compd.fleet.format", b"2"
 
 
@@ -69,7 +69,7 @@ COLUMNS = (*OF_RECORDING, *OF_EFFECT, PROBLEM, BASIS)
 
 
 def check_table_path(path: Path, command: Command, overwrite: bool = False) -> None:
-    """Raise CompdError where the table cannot be written, before the long work.
+    """Raise CompdError if the table cannot be written, before the long work.
 
     An earlier table of this command is continued; one of the other command, which may have taken hours, is not replaced
     unless `overwrite`.
@@ -93,7 +93,7 @@ def check_table_path(path: Path, command: Command, overwrite: bool = False) -> N
 
 
 def is_table(path: Path) -> bool:
-    """Whether a file is a table of a fleet, and no recording or anything else."""
+    """Whether a file is a table of a fleet."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -117,7 +117,7 @@ def write_table(path: Path, results: Sequence[RecordingResult]) -> None:
 
 
 def read_table(path: Path) -> tuple[RecordingResult, ...]:
-    """The results of a table, as they were given to `write_table`. Raises CompdError for what is no such table."""
+    """The results of a table as given to `write_table`. Raises CompdError for any other file."""
     import pyarrow.parquet as pq
 
     if not is_table(path):
@@ -145,7 +145,7 @@ def read_table(path: Path) -> tuple[RecordingResult, ...]:
 
 
 def earlier_results(path: Path) -> tuple[RecordingResult, ...]:
-    """The results of a table that may be there; none where it is not, or has another release's format."""
+    """The results of an existing table; none if it is missing or has another release's format."""
     try:
         return read_table(path)
     except CompdError:
@@ -178,13 +178,13 @@ def _schema() -> pa.Schema:
 
 
 def _cells(source: object, columns: Iterable[TableColumn]) -> dict[str, Any]:
-    """The columns that are attributes of a result; what is not known is None."""
+    """The columns that are attributes of a result; None for unknown values."""
     cells = {column.name: getattr(source, column.name) for column in columns}
     return {name: None if value == "" or _is_nan(value) else value for name, value in cells.items()}
 
 
 def _result(rows: Sequence[Mapping[str, Any]]) -> RecordingResult:
-    """The result that these rows are of."""
+    """The result of these rows."""
     estimates = [
         FleetEstimate(**{**_known(row, OF_EFFECT), "rivals": tuple((row["rivals"] or "").split())})
         for row in rows
@@ -201,7 +201,7 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> RecordingResult:
 
 
 def _known(row: Mapping[str, Any], columns: Iterable[TableColumn]) -> dict[str, Any]:
-    """The cells of these columns, with "" and nan where a cell is empty."""
+    """The cells of these columns, with "" and nan for empty cells."""
     empty = {"string": "", "double": math.nan}
     return {column.name: empty.get(column.type) if row[column.name] is None else row[column.name] for column in columns}
 

@@ -1,5 +1,1 @@
-"""A gauge that no driver knows: its replies captured, what they mean asked, its description written and read back."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+"""Description of a gauge without a driver: capture replies, ask for their meaning, write and read back."""

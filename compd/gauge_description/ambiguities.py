@@ -1,4 +1,4 @@
-"""What stands beside a number in a gauge's replies and may belong to it: its sign, its unit, an address, a checksum.
+"""Ambiguous text beside a number in a gauge's replies: a sign, a unit, an address, a checksum.
 
 `compd gauge learn` asks instead of guessing: what it took for text that does not matter could turn the number round, or
 make it a thousand times too large. Each question names the option that answers it.
@@ -16,10 +16,10 @@ from compd.gauge_description.reply_columns import ReplyColumn, varying_word
 from compd.gauge_description.unit_words import is_wire_unit
 from compd.lines import CHECKSUMS
 
-# Decimals that a display of a length may have; more, and the last ones may be a checksum. In mm: 0.1 um.
+# Most decimals of a length display by unit (mm: 0.1 um); beyond them the last ones may be a checksum.
 USUAL_DECIMALS: Mapping[str, int] = {"mm": 4, "um": 3, "nm": 3, "inch": 6, "mil": 4}
 OTHER_DECIMALS = 4
-# What comparators write behind a value beyond or within its tolerance (Heidenhain ND 281, Mahr C1202: M).
+# Marks of comparators behind a value beyond or within its tolerance (Heidenhain ND 281, Mahr C1202: M).
 JUDGEMENTS = "<>= "
 _SIGN_LETTERS = {"L": "R", "R": "L", "l": "r", "r": "l"}
 STATUS = "a status: capture good replies alone, or name the others by --error"
@@ -27,7 +27,7 @@ BY_HAND = "or write the description by hand: docs/how-to/describe-a-gauge.md"
 
 
 def text_questions(columns: Sequence[ReplyColumn], k: int, answers: Answers) -> Iterator[Problem]:
-    """Questions on the text in column `k`: characters that vary, and what may be a sign although it never changed."""
+    """Questions on the text in column `k`: varying characters, and possible signs that never changed."""
     column = columns[k]
     texts = [part.text for part in column]
     varying = varying_word(texts)
@@ -226,7 +226,7 @@ def decimal_mark_of(columns: Sequence[ReplyColumn], answers: Answers) -> tuple[s
 
 
 def _table(words: set[str], factors: Mapping[str, float]) -> str:
-    """Words and factors as --factors wants them; FACTOR where the person has to say it."""
+    """Words and factors for --factors; FACTOR stands for one to be filled in."""
     return "|".join(f"{word}={factors.get(word, 1 if not word.strip() else 'FACTOR')}" for word in sorted(words))
 
 

@@ -1,4 +1,4 @@
-"""What a person says of a gauge's replies: the answers to the questions that the replies alone leave open."""
+"""A person's answers to the questions that a gauge's replies leave open."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Range = tuple[float, float] | Literal["unknown"]
 
 @dataclass(frozen=True)
 class Answers:
-    """Each is an option of `compd gauge learn`; all that is left out is asked where the replies do not say it.
+    """Each is an option of `compd gauge learn`; an omitted one is asked if the replies leave it open.
 
     Attributes
     ----------

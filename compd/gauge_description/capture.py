@@ -1,4 +1,4 @@
-"""Replies of an unknown gauge: out of a file, or from the wire."""
+"""Replies of an unknown gauge, from a file or from the wire."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from compd.gauge_tools import open_tapped_stream
 from compd.lines import StreamLine
 
 LONGEST_REPLY = 1024
-# What ends the lines of devices: CR, LF, ETX, EOT.
+# Line ends of devices: CR, LF, ETX, EOT.
 LINE_ENDS = b"\r\n\x03\x04"
 
 
 class CapturedReply(NamedTuple):
-    """A request, b"" where the device spoke unasked, and what came after it."""
+    """A request (b"" for unsolicited data) and the reply."""
 
     request: bytes
     reply: bytes
@@ -93,7 +93,7 @@ def capture_live(
 ) -> list[CapturedReply]:
     """`wanted` replies, captured on the wire.
 
-    out : the request with escapes: everything until silence is its reply. "" for a device that speaks unasked, whose
+    out : the request with escapes: everything until silence is its reply. "" for unsolicited data, whose
         whole lines are replies, each the first that begins after `between`.
     between : called between two captures with (captured so far, wanted): the person moves the gauge meanwhile.
     show : called with a line of text for all bytes that pass.
@@ -109,26 +109,26 @@ def capture_live(
         line = open_tapped_stream(settings, MonotonicClock(), show_bytes)
         try:
             while len(captured) < wanted:
-                reply = _reply_until_silence(line, request) if request else _line_unasked(line)
+                reply = _reply_until_silence(line, request) if request else _line_unsolicited(line)
                 captured.append(CapturedReply(request, reply))
                 if len(captured) < wanted:
                     between(len(captured), wanted)
         finally:
             line.close()
     except LineFault as fault:
-        unasked = "--timeout longer than the period of a device that speaks unasked, or --out with the request it wants"
+        hint = "--timeout longer than the period of unsolicited readings, or --out with the device's request"
         raise CompdError(
             Problem(
                 where=str(getattr(settings, "port", settings)),
                 what=f"reply {len(captured) + 1}: {fault}",
-                next_step="check port, baud, format" + (", request and its terminator" if request else f"; {unasked}"),
+                next_step="check port, baud, format" + (", request and its terminator" if request else f"; {hint}"),
             )
         ) from fault
     return captured
 
 
 def _reply_until_silence(line: StreamLine, request: bytes) -> bytes:
-    """What comes after a request, until the line is quiet. Raises LineFault: TIMEOUT when nothing does."""
+    """The reply to a request, until the line is quiet. Raises LineFault: TIMEOUT without a reply."""
     line.send(request)
     reply = b""
     while len(reply) < LONGEST_REPLY:
@@ -138,11 +138,13 @@ def _reply_until_silence(line: StreamLine, request: bytes) -> bytes:
             if fault.quality is not Quality.TIMEOUT or not reply:
                 raise
             return reply
-    raise LineFault(Quality.MISMATCH, f"no silence within {LONGEST_REPLY} bytes: if it speaks unasked, leave out --out")
+    raise LineFault(
+        Quality.MISMATCH, f"no silence within {LONGEST_REPLY} bytes: leave out --out for unsolicited readings"
+    )
 
 
-def _line_unasked(line: StreamLine) -> bytes:
-    """The first whole line of a device that speaks unasked: up to its terminator, or between two silences.
+def _line_unsolicited(line: StreamLine) -> bytes:
+    """The first whole line of a device that sends unsolicited readings: up to its terminator, or between two silences.
 
     Raises LineFault: TIMEOUT when nothing comes, MISMATCH for bytes without an end.
     """
@@ -158,7 +160,7 @@ def _line_unasked(line: StreamLine) -> bytes:
         if byte and (not text or byte in LINE_ENDS or text[-1:] not in LINE_ENDS):
             text += byte
             continue
-        # a byte behind a terminator, or a silence: what came before is a line
+        # a byte behind a terminator, or a silence, ends a line
         if from_its_beginning:
             return text
         text, from_its_beginning = byte, True

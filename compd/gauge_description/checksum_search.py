@@ -1,4 +1,4 @@
-"""Which checksum the last bytes of a gauge's replies are, of all that compd knows."""
+"""Identifies the checksum at the end of a gauge's replies among those that compd knows."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from typing import Literal, NamedTuple
 
 from compd.lines import CHECKSUMS, ChecksumField
 
-# Bytes left out in front (STX, $) and behind (ETX, *). Manuals leave out none to three.
+# Most bytes left out in front (STX, $) and behind (ETX, *); manuals leave out none to three.
 MOST_LEFT_OUT = 3
-# By chance alone a checksum must fit all replies less often than once in 2^18, of some 300 that are tried.
+# Least evidence (bits) for a checksum: a chance fit to all replies below 2^-18, as some 300 are tried.
 ENOUGH_BITS = 18.0
 
 
 class ChecksumEnd(NamedTuple):
-    """What every reply ends in: `converter`, as a description writes it, of `length` bytes."""
+    """Checksum at the end of every reply: `converter` in the notation of descriptions, of `length` bytes."""
 
     converter: str
     length: int
 
 
 def checksum_end(bodies: Sequence[bytes]) -> ChecksumEnd | None:
-    """The checksum that ends all of `bodies`, replies without terminator; None where none fits, or may by chance."""
+    """The checksum at the end of all `bodies` (replies without terminator); None without a significant fit."""
     different = sorted(set(bodies))
     if len(different) < 2:
         return None
@@ -36,7 +36,7 @@ def checksum_end(bodies: Sequence[bytes]) -> ChecksumEnd | None:
 
 
 def _fields() -> Iterator[ChecksumField]:
-    """Every checksum in every form; those that leave out least, and the longest, first."""
+    """Every checksum in every form; the longest ones with the fewest omitted bytes first."""
     digits: tuple[Literal["", "0", "#"], ...] = ("0", "#", "")
     left_out = sorted(itertools.product(range(MOST_LEFT_OUT + 1), repeat=2), key=sum)
     fields = [
@@ -61,7 +61,7 @@ def _fits(field: ChecksumField, body: bytes) -> bool:
 
 
 def _bits(field: ChecksumField, ends: set[bytes]) -> float:
-    """How much one reply says for a checksum: digits fit digits more often than bytes fit bytes."""
+    """Evidence (bits) of one reply for a checksum: digits fit by chance more often than bytes."""
     if field.digits == "#":
         return field.length * math.log2(10)
     if field.digits == "0":

@@ -24,14 +24,14 @@ from compd.plugins import GAUGES, load
 
 @dataclass(frozen=True)
 class GaugeDescription:
-    """Options for the driver `serial_ascii` (without `line`), and notes on what to look up in the manual."""
+    """Options for the driver `serial_ascii` (without `line`), and notes for looking up in the manual."""
 
     options: Mapping[str, Any]
     notes: tuple[str, ...]
 
 
 def learn_gauge(captured: Sequence[CapturedReply], answers: Answers) -> tuple[GaugeDescription, list[str]]:
-    """The description of a gauge, and the values that it gives of every reply.
+    """The description of a gauge, and its values of every reply.
 
     Raises DescriptionError where no description follows, with every question that is open, or where a reply does not
     fit the one that does.
@@ -73,7 +73,7 @@ def describe_replies(captured: Sequence[CapturedReply], answers: Answers) -> Gau
 
 
 def _questions(exchange: ObservedExchange, channels: ObservedChannels, answers: Answers) -> list[Problem]:
-    """The questions on what stands in the columns."""
+    """The questions on the contents of the columns."""
     questions: list[Problem] = []
     for k, column in enumerate(exchange.columns):
         if not column[0].is_number:

@@ -1,4 +1,4 @@
-"""How a column of numbers is written in a description: a converter as narrow as the numbers that came."""
+"""Converter for a column of numbers in a description, as narrow as the captured numbers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _SIGNED = re.compile(rb" *[+-]")
 
 
 def number_converter(texts: Sequence[bytes], mark: str, name: str, shown_decimals: int | None) -> tuple[str, str]:
-    """The converter of a number, and a note on what to look up in the manual ("" if nothing).
+    """The converter of a number, and a note for looking up in the manual ("" for none).
 
     texts : the number in every reply. mark : its decimal mark. name : its channel, "" where there is one.
     shown_decimals : how many decimals belong to the number; the digits behind them are skipped.

@@ -1,4 +1,4 @@
-"""Names, units and ranges of the numbers in a gauge's replies: what is known of them, and what has to be asked."""
+"""Names, units and ranges of the numbers in a gauge's replies: the known ones, and the open questions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from compd.units import unit_factor
 
 
 class ObservedChannels:
-    """The channels in all exchanges; `problems`: the questions on them that no answer settles."""
+    """The channels in all exchanges; `problems`: the open questions on them."""
 
     def __init__(self, exchanges: Sequence[ObservedExchange], answers: Answers) -> None:
         self.problems: list[Problem] = []
@@ -50,7 +50,7 @@ class ObservedChannels:
 
     @property
     def single(self) -> bool:
-        """Whether there is one channel, which needs no name in the replies."""
+        """Whether there is a single channel, which needs no name in the replies."""
         return len(self._read) == 1
 
     def is_read(self, exchange: ObservedExchange, k: int) -> bool:
@@ -58,15 +58,15 @@ class ObservedChannels:
         return (exchange.request, k) in self._units
 
     def is_in_question(self, exchange: ObservedExchange, k: int) -> bool:
-        """Whether the person has to say first if column `k` is a measurement at all."""
+        """Whether it is open if column `k` is a measurement at all."""
         return (exchange.request, k) in self._in_question
 
     def name(self, exchange: ObservedExchange, k: int) -> str:
-        """Of the number in column `k`: SKIPPED where it is not read, "" where it never changed and is no channel."""
+        """Name of the number in column `k`: SKIPPED for an unread one, "" for a constant that is no channel."""
         return self._names.get((exchange.request, k), "")
 
     def unit(self, exchange: ObservedExchange, k: int) -> str:
-        """Of the channel in column `k`, on the wire; "" where nobody says it."""
+        """Unit on the wire of the channel in column `k`; "" if unknown."""
         return self._units[exchange.request, k]
 
     def options(self) -> list[dict[str, Any]]:
@@ -135,7 +135,7 @@ class ObservedChannels:
         )
 
     def _for_each(self, where: str, what: str, given: Sequence[Any]) -> list[Any]:
-        """One for each channel; the same for all where one is given."""
+        """One range for each channel; a single given one is for all."""
         if len(given) == 1:
             return [given[0]] * len(self._read)
         if given and len(given) != len(self._read):
@@ -146,7 +146,7 @@ class ObservedChannels:
 
 
 def _unit(reply_units: Sequence[str], given: str) -> str:
-    """Of a number on the wire: what the person says, else what the replies do; mm where they change between units."""
+    """Unit of a number on the wire: the person's, else that of the replies; mm if they change between units."""
     units = [unit for unit in reply_units if unit in WIRE_UNITS]
     return given or ("mm" if "mm" in units else units[0] if units else "")
 
@@ -157,5 +157,5 @@ def _units_text(reply_units: Sequence[str]) -> str:
 
 
 def _factor(other: str, unit: str, reply_units: Sequence[str]) -> float | None:
-    """What a number in `other` is multiplied by where the replies say in which of several units each is."""
+    """Factor of a number in `other` if the replies name the unit of each number."""
     return unit_factor(other, unit) if len(reply_units) > 1 else None

@@ -17,7 +17,7 @@ FEWEST_REPLIES = 3
 class ObservedExchange:
     """A request, and the columns of its replies.
 
-    request : as bytes; b"" for a device that speaks unasked. columns : text and numbers in turn. numbers : the columns
+    request : as bytes; b"" for unsolicited data. columns : text and numbers in turn. numbers : the columns
     that may be channels. mark : the decimal mark. end : the converter of what ends every reply, a checksum, or "".
     problems : what is to be asked of the replies as a whole. notes : on what was taken for granted.
     """
@@ -65,16 +65,16 @@ class ObservedExchange:
         return not any(self.mark in text or "e" in text.lower() for text in self.texts(k))
 
     def units(self, k: int) -> list[str]:
-        """The units that the replies say of the number in column `k`, "" among them where one says none."""
+        """The units of the number in column `k` in the replies, including "" for a reply without one."""
         behind = {self._unit(unit_behind(text)) for text in self.texts(k + 1)}
         if behind != {("", "")}:
             return sorted({unit for unit, _ in behind})
         if k > 1 and any(unit_behind(text)[0] for text in self.texts(k - 1)):
-            return [""]  # it is that of the number before
+            return [""]  # it belongs to the previous number
         return sorted({self._unit(unit_before(text))[0] for text in self.texts(k - 1)})
 
     def in_a_clock(self, k: int) -> bool:
-        """Whether the two digits in column `k`, which never changed, are hours or minutes, which will."""
+        """Whether the two constant digits in column `k` are hours or minutes, which will change."""
         return all(len(text) == 2 for text in self.texts(k)) and any(
             0 < other < len(self.columns)
             and set(self.texts((k + other) // 2)) == {":"}
@@ -83,7 +83,7 @@ class ObservedExchange:
         )
 
     def _unit(self, unit_and_word: tuple[str, str]) -> tuple[str, str]:
-        """None where the person has said what the word means."""
+        """None if the person has given the word's meaning."""
         unit, word = unit_and_word
         explained = any(word in factor_words(table) for table in self._answers.factors)
         return ("", "") if explained or set(word) <= set(self._answers.ignored) else (unit, word)

@@ -1,4 +1,4 @@
-"""Replies read by the description that was made of them: what each of them is, and the first that does not fit."""
+"""Replies read by the new description: the values of each, and the first that does not fit."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def read_back(options: Mapping[str, Any], driver: type[Gauge[Any]], captured: Se
 
 
 def rounds(captured: Sequence[CapturedReply]) -> list[dict[bytes, bytes]]:
-    """The replies to each request, one of each at a time; where there are fewer to one, its last again."""
+    """The replies to each request, one of each at a time; the last one repeats for a request with fewer."""
     by_request: dict[bytes, list[bytes]] = {}
     for request, reply in captured:
         by_request.setdefault(request, []).append(reply)
@@ -61,7 +61,7 @@ def rounds(captured: Sequence[CapturedReply]) -> list[dict[bytes, bytes]]:
 
 
 class _RepeatedReplies:
-    """A line on which the same reply comes to a request every time."""
+    """A line with the same reply to a request every time."""
 
     def __init__(self, replies: Mapping[bytes, bytes]) -> None:
         self._replies = replies
@@ -74,7 +74,7 @@ class _RepeatedReplies:
     def next_line(
         self, terminator: bytes, limit: int, timeout_s: float | None = None, gap_timeout_s: float | None = None
     ) -> tuple[bytes, float]:
-        """A device that speaks unasked says it again and again."""
+        """A device that sends unsolicited readings repeats its line."""
         if not self._waiting:
             self._waiting = self._replies[b""]
         return self.receive_until(terminator, limit)[: -len(terminator)], 0.0

@@ -13,11 +13,11 @@ _SIGNS = ("", "+", "-", " ")
 
 
 class DescriptionError(CompdError):
-    """Replies from which no description follows."""
+    """Replies that yield no description."""
 
 
 class ReplyPart(NamedTuple):
-    """A piece of a reply: a number or the text between two numbers, and its first byte's place in the reply."""
+    """A piece of a reply: a number or the text between two numbers, and its position in the reply."""
 
     is_number: bool
     text: bytes
@@ -28,7 +28,7 @@ ReplyColumn = list[ReplyPart]
 
 
 class VaryingWord(NamedTuple):
-    """Where texts differ: what stands before it in all of them, the word of each, and what stands behind it."""
+    """A difference of texts: the common text before it, the word of each, and the common text behind it."""
 
     before: str
     words: tuple[str, ...]
@@ -95,7 +95,7 @@ def varying_word(texts: Sequence[bytes]) -> VaryingWord:
     rests = [text[len(before) :] for text in shown]
     behind = _common([rest[::-1] for rest in rests])[::-1]
     words = [rest[: len(rest) - len(behind)] for rest in rests]
-    # the letters that they have in common belong to the words: mm and um
+    # common letters belong to the words: mm and um
     if any(word[:1].isalpha() for word in words):
         letters = len(before) - len(before.rstrip("".join(filter(str.isalpha, set(before)))))
         words = [before[len(before) - letters :] + word for word in words]
@@ -108,7 +108,7 @@ def varying_word(texts: Sequence[bytes]) -> VaryingWord:
 
 
 def exchangeable(varying: VaryingWord, tables: Sequence[Sequence[str]] = ()) -> bool:
-    """Whether the words may stand for each other: signs, units, or words of one of the tables."""
+    """Whether the words are alternatives: signs, units, or words of one of the tables."""
     words = set(varying.words)
     return words <= set(_SIGNS) or all(map(is_wire_unit, words)) or any(words <= set(table) for table in tables)
 
@@ -118,7 +118,7 @@ def _exponents(*parts: ReplyPart) -> bool:
 
 
 def _common(texts: Sequence[str]) -> str:
-    """The longest beginning that all have."""
+    """The longest common prefix."""
     length = 0
     while all(len(text) > length and text[length] == texts[0][length] for text in texts):
         length += 1
@@ -143,7 +143,7 @@ def _parts(body: bytes, mark: str) -> list[ReplyPart]:
 
 
 def _cut_off(columns: Sequence[ReplyColumn], constant: bytes) -> list[ReplyColumn]:
-    """The columns with `constant` as text wherever every reply has it in front of more digits of a number."""
+    """The columns with `constant` as text if every reply has it in front of more digits of a number."""
     pattern = re.compile(rb" *" + re.escape(constant) + rb"(?=[ +-]*[0-9.,])")
     result = [list(column) for column in columns]
     for k in range(1, len(result), 2):
@@ -158,7 +158,7 @@ def _cut_off(columns: Sequence[ReplyColumn], constant: bytes) -> list[ReplyColum
 
 
 def _difference(k: int, place: int, body: bytes, first: bytes) -> DescriptionError:
-    """The error for reply `k`, which differs in form from the first one from byte `place` on."""
+    """The error for reply `k`, whose form differs from the first one's from byte `place` on."""
     return DescriptionError(
         Problem(
             where=f"reply {k + 1}, character {place + 1}",

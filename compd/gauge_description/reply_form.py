@@ -1,4 +1,4 @@
-"""What a gauge's replies look like, in the language of a description."""
+"""The form of a gauge's replies in the notation of descriptions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from compd.units import unit_factor
 
 
 def reply_form(exchange: ObservedExchange, channels: ObservedChannels, answers: Answers) -> tuple[str, list[str]]:
-    """The `in` of a description, as narrow as the replies, and notes on what to look up in the manual."""
+    """The `in` of a description, as narrow as the replies, and notes for looking up in the manual."""
     form, notes = "", list(exchange.notes)
     for k, column in enumerate(exchange.columns):
         texts = [part.text for part in column]
@@ -31,14 +31,14 @@ def reply_form(exchange: ObservedExchange, channels: ObservedChannels, answers: 
 
 
 def escaped(text: bytes, double: str = "") -> str:
-    r"""As a description writes it: \r \n \t \\ \xHH; characters of `double` twice."""
+    r"""Text in the notation of descriptions: \r \n \t \\ \xHH; characters of `double` twice."""
     named = {0x0D: r"\r", 0x0A: r"\n", 0x09: r"\t", 0x5C: r"\\"}
     shown = (named.get(b) or (chr(b) if 0x20 <= b < 0x7F else f"\\x{b:02x}") for b in text)
     return "".join(2 * character if character in double else character for character in shown)
 
 
 def _text(exchange: ObservedExchange, k: int, channels: ObservedChannels, answers: Answers) -> tuple[str, str]:
-    """Text that never changed, literally; words that multiply a number; characters that varied, as a set; a note."""
+    """The form of text: literal if constant, factors for words, a set for varying characters; and a note."""
     column = exchange.columns[k]
     varying = _word(exchange, k, answers)
     words = set(varying.words)
@@ -58,7 +58,7 @@ def _text(exchange: ObservedExchange, k: int, channels: ObservedChannels, answer
 
 
 def _word(exchange: ObservedExchange, k: int, answers: Answers) -> VaryingWord:
-    """The word in column `k` in which the replies differ, or one beside a number that a table of factors has."""
+    """The varying word in column `k`, or one beside a number that a table of factors has."""
     column = exchange.columns[k]
     varying = varying_word([part.text for part in column])
     if len(set(varying.words)) > 1:
@@ -76,7 +76,7 @@ def _word(exchange: ObservedExchange, k: int, answers: Answers) -> VaryingWord:
 
 
 def _owner(exchange: ObservedExchange, k: int, varying: VaryingWord, channels: ObservedChannels) -> int | None:
-    """The column of the channel that a word in column `k` belongs to: before it, where nothing stands between."""
+    """The channel's column of a word in column `k`: the one directly before it, if any."""
     before, behind = (channels.is_read(exchange, place) for place in (k - 1, k + 1))
     if before and (not behind or not varying.before.strip(" ")):
         return k - 1

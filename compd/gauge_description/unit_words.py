@@ -1,4 +1,4 @@
-"""Units as gauges write them beside their numbers, and which word beside a number is its unit."""
+"""Units in the notation of gauges, and recognition of the unit beside a number."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import re
 
 from compd.units import KNOWN_UNITS, unit_factor, unit_named
 
-# What a channel of a description may have on the wire, and a reply may say.
+# Units allowed on the wire in a description, and recognised in a reply.
 WIRE_UNITS = ("mm", "um", "nm", "inch", "mil", "degC", "degF", "kN", "hPa", "mbar", "kPa", "Pa", "pct")
-# In exactly these letters; a single one is as often a state or a side, but for the metre.
+# Units with exact letters; except for the metre, a single letter is as often a state or a side.
 _EXACT = {
     **{name: name for name in (*KNOWN_UNITS, "mil", "m") if len(name) > 1 or name == "m"},
     **{"\xb0C": "degC", "\xb0F": "degF", "%RH": "pct"},
@@ -18,14 +18,14 @@ _ENDS = re.compile(r"(?<![A-Za-z\xb5])([A-Za-z\xb5\xb0%]+|\") *$")
 
 
 def wire_unit(word: str) -> str:
-    """The unit that a word is, also one that no channel has (mV); "" if it is none."""
+    """The unit of a word, including those without a channel (mV); "" for no unit."""
     word = _latin(word)
     length = "" if len(word) == 1 and word.isalpha() else unit_named(word)
     return length if unit_factor(length, "mm") else _EXACT.get(word, "")
 
 
 def is_wire_unit(word: str) -> bool:
-    """Whether a word is a unit that a channel may have on the wire."""
+    """Whether a word is an allowed unit on the wire."""
     return wire_unit(word) in WIRE_UNITS
 
 

@@ -1,4 +1,4 @@
-"""The installed gauge drivers and presets: what each is, where its protocol was read, and the options it takes."""
+"""The installed gauge drivers and presets: description, source of the protocol, and options."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class DriverOption:
 
 @dataclass(frozen=True)
 class DriverDescription:
-    """What `compd gauge show` prints."""
+    """Text of `compd gauge show`."""
 
     text: str
     options: tuple[DriverOption, ...]
@@ -68,12 +68,12 @@ def catalogue() -> list[CatalogueEntry]:
 
 
 def polled_drivers() -> list[str]:
-    """Names of the drivers whose devices are asked, and do not speak by themselves, sorted."""
+    """Sorted names of the drivers with polled devices."""
     return [name for name in names(GAUGES) if not issubclass(load(GAUGES, name, name), PushedGauge)]
 
 
 def driver_description(name: str) -> DriverDescription:
-    """Text and options of the driver `name`. Raises PluginError where there is none."""
+    """Text and options of the driver `name`. Raises PluginError if there is none."""
     driver = load(GAUGES, name, name)
     return DriverDescription(driver_text(driver), tuple(_options(driver.Options)))
 
@@ -89,7 +89,7 @@ def _options(model: type[BaseModel], within: str = "") -> Iterator[DriverOption]
 
 
 def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
-    """The models that a key's value may be made of: itself, the items of a list, what may also be left out."""
+    """The models in a key's type: itself, the items of a list, the content of an optional."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for argument in get_args(annotation):
@@ -97,5 +97,5 @@ def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def driver_text(driver: type[Gauge[Any]]) -> str:
-    """What the device speaks and where that was read: `about`, else the docstring of the module, else of the class."""
+    """Protocol of the device and its source: `about`, else the docstring of the module, else of the class."""
     return driver.about or inspect.getdoc(inspect.getmodule(driver)) or inspect.getdoc(driver) or ""

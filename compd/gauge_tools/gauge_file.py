@@ -1,4 +1,4 @@
-"""A file of gauges and their lines: what `compd gauge learn --to` writes, and `read` and `watch` take.
+"""A file of gauges and their lines, written by `compd gauge learn --to` for `read` and `watch`.
 
 Its two sections stand in a machine's configuration in the same words, so that they are pasted there as they are.
 """
@@ -40,7 +40,7 @@ GAUGE_FILE = FileKind(
 
 
 def gauge_file_text(options: Mapping[str, Any], line: LineSettings | None) -> str:
-    """The file of one learned gauge. line : where it hangs; without it the file has no line of that name."""
+    """The file of one learned gauge. line : its line; None for a file without it."""
     gauge = {"driver": options["driver"], "line": LEARNED_LINE, **options}
     sections: dict[str, Any] = {}
     if line is not None:
@@ -51,7 +51,7 @@ def gauge_file_text(options: Mapping[str, Any], line: LineSettings | None) -> st
 
 
 def gauge_of_file(path: Path, name: str | None, port: PortArguments) -> GaugeTarget:
-    """The gauge `name` of a machine's configuration or of a file of gauges; the only one where `name` is None.
+    """The gauge `name` of a machine's configuration or of a file of gauges; None for the only one.
 
     port : where it hangs if the file does not say it; what the file says counts otherwise.
     Raises ConfigurationError for every problem of the file, and where there is no such gauge, or no line.

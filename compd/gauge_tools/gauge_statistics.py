@@ -1,4 +1,4 @@
-"""What `compd gauge watch` counts: rate, age, noise and faults of one gauge."""
+"""Statistics of `compd gauge watch`: rate, age, noise and faults of one gauge."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from compd.gauge import Channel, Quality, Reading
 
-WINDOW = 200  # polls that rate and noise are taken over
+WINDOW = 200  # polls for rate and noise
 
 
 class GaugeStatistics:
@@ -18,7 +18,7 @@ class GaugeStatistics:
     def __init__(self, channels: Sequence[Channel]) -> None:
         self.channels = channels
         self.polls = 0
-        self.faults: Counter[Quality] = Counter()  # in how many polls
+        self.faults: Counter[Quality] = Counter()  # number of polls
         self.last: Sequence[Reading] = ()
         self._values: list[deque[float]] = [deque(maxlen=WINDOW) for _ in channels]
         self._polled_s: deque[float] = deque(maxlen=WINDOW)
@@ -43,7 +43,7 @@ class GaugeStatistics:
         return (len(self._polled_s) - 1) / (self._polled_s[-1] - self._polled_s[0])
 
     def age_s(self, channel: int, now_s: float) -> float:
-        """Since the channel's newest good reading was asked for; nan if there is none."""
+        """Time (s) since the request of the channel's newest good reading; nan without one."""
         return now_s - self._good_s[channel]
 
     def noise(self, channel: int) -> float:

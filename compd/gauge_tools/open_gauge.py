@@ -1,4 +1,4 @@
-"""The gauge that a driver's name means, its line with every byte shown, and polling it as the daemon does."""
+"""A gauge by its driver's name, its line with every byte shown, and polling as by the daemon."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ SettingsT = TypeVar(
 )
 
 
-# Where nothing says how old a reading may be: one that is older is no measurement of now.
+# Default age (s) from which a reading is stale.
 STALE_AFTER_S = 10.0
 
 
 @dataclass(frozen=True)
 class PortArguments:
-    """A port as it is given on the command line; `baud` and `format` (8N1 ...) are None over TCP.
+    """A port from the command line; `baud` and `format` (8N1 ...) are None over TCP.
 
     keys : other keys of the line, as KEY=VALUE (VALUE in YAML).
     """
@@ -57,7 +57,7 @@ class PortArguments:
 
 @dataclass(frozen=True)
 class GaugeTarget:
-    """One gauge and the line that it hangs on. stale_after_s : age from which its readings are not used, s."""
+    """One gauge and its line. stale_after_s : age (s) from which its readings are not used."""
 
     name: str
     gauge: Gauge[Any]
@@ -132,7 +132,7 @@ def pushed_line_settings(port: PortArguments, line_kind: LineKind) -> OpcUaLine 
 
 
 def _assigned(option: str, assignments: Sequence[str], example: str) -> dict[str, Any]:
-    """The data of KEY=VALUE. ConfigurationError for an assignment that is none."""
+    """The data of KEY=VALUE. ConfigurationError for a malformed one."""
     data = {}
     for assignment in assignments:
         key, equals, value = assignment.partition("=")
@@ -185,7 +185,7 @@ def _validated(settings: type[SettingsT], **data: Any) -> SettingsT:
         ) from error
 
 
-# Called with ">" and the bytes that were sent, "<" and the bytes that were received.
+# Called with ">" and the sent bytes, "<" and the received bytes.
 ByteListener = Callable[[str, bytes], None]
 
 
@@ -218,7 +218,7 @@ class TappedPort:
 
 
 class TappedPushedLine:
-    """A line that speaks by itself, of which every message is shown to a listener."""
+    """A line with pushed messages, each shown to a listener."""
 
     def __init__(self, line: PushedLine, listener: ByteListener) -> None:
         self._line = line
@@ -248,7 +248,7 @@ def open_tapped_stream(
 
 
 def read_gauge(target: GaugeTarget, clock: Clock, listener: ByteListener) -> Sequence[Reading]:
-    """One poll on a line that is opened for it and closed again, with its bytes shown. Raises LineFault."""
+    """One poll on a line opened for it and closed again, with its bytes shown. Raises LineFault."""
     line: Any = open_tapped_line(target.line, clock, listener)
     try:
         if isinstance(target.line, PushedLineSettings):
@@ -261,7 +261,7 @@ def read_gauge(target: GaugeTarget, clock: Clock, listener: ByteListener) -> Seq
 
 
 def aged(reading: Reading, now_s: float, stale_after_s: float) -> Reading:
-    """The reading, or that it is stale, as the daemon has it at the monotonic time `now_s` (s)."""
+    """The reading as for the daemon at the monotonic time `now_s` (s); a stale one loses its value."""
     age_s = now_s - reading.time_s
     if not reading.ok or age_s <= stale_after_s:
         return reading
@@ -277,7 +277,7 @@ def _age_text(age_s: float) -> str:
 
 
 def poll_gauge(target: GaugeTarget, clock: Clock, polls: int | None) -> Iterator[Sequence[Reading]]:
-    """The readings of poll after poll (`polls` of them, or for ever), as a line's thread of the daemon polls.
+    """The readings of `polls` polls, or endlessly, made as by a line's thread of the daemon.
 
     After a fault the line is drained, after a loss it is opened anew; every channel then has the fault's quality.
     """
@@ -303,7 +303,7 @@ def poll_gauge(target: GaugeTarget, clock: Clock, polls: int | None) -> Iterator
 
 
 def _line_after_fault(line: Line | None, fault: LineFault) -> Line | None:
-    """The line, drained; None when it is lost."""
+    """The drained line; None if it is lost."""
     if line is None:
         return None
     if fault.quality is not Quality.LINE_LOST:

@@ -1,4 +1,4 @@
-"""Which presets a device on a serial port answers as: each preset's read request is sent, and what comes is judged.
+"""Presets that match a device on a serial port: sends each preset's read request, and judges the reply.
 
 Two presets may fit one device. None is announced alone unless it is the only one that fits, and a Modbus slave, which
 answers to every map that it has the registers of, is announced as a Modbus slave.
@@ -19,20 +19,20 @@ from compd.lines import Port, StreamLine, explained, open_line, open_stream, sho
 from compd.plugins import GAUGES, load, names
 
 PROBE_TIMEOUT_S = 0.5
-# So long a port is listened to first: a device that speaks unasked, once a second or more often, is not probed.
+# Time (s) to listen to a port before probing; a device that sends unsolicited data at 1 Hz or faster is not probed.
 LISTEN_S = 1.2
-# After this silence, s, a device has said all that it says to an empty or unknown command.
+# Silence (s) that ends a device's answer to an empty or unknown command.
 QUIET_S = 0.1
-# What ends a command of an instrument that speaks text.
+# End of a command of a text instrument.
 COMMAND_END = b"\r"
 _ENDS = re.compile(rb"[\r\n]*$")
-# What a line raises where nobody has answered, or not in this protocol.
+# Faults of a line without an answer, or without one in this protocol.
 _NO_ANSWER = (Quality.TIMEOUT, Quality.LINE_LOST)
 
 
 @dataclass(frozen=True)
 class PresetCandidate:
-    """A preset that can be tried without knowing more of the device, with its sample's options."""
+    """A preset that can be tried with its sample's options, without further knowledge of the device."""
 
     name: str
     gauge: Gauge[Any]
@@ -47,7 +47,7 @@ class PresetCandidate:
 
 @dataclass(frozen=True)
 class ProbeOutcome:
-    """What came of one candidate: its readings, or the fault."""
+    """Outcome of one candidate: its readings, or the fault."""
 
     candidate: PresetCandidate
     readings: Sequence[Reading] = ()
@@ -55,12 +55,12 @@ class ProbeOutcome:
 
     @property
     def fits(self) -> bool:
-        """Whether the reply was one of this preset: registers that it has, or a value."""
+        """Whether the reply fits this preset: existing registers, or a value."""
         return any(reading.ok for reading in self.readings) or (bool(self.readings) and self.candidate.on_registers)
 
     @property
     def answered(self) -> bool:
-        """Whether a device answered at all; of Modbus, by a frame that is whole."""
+        """Whether a device answered at all; for Modbus, with a whole frame."""
         if self.fault is None:
             return True
         if self.candidate.on_registers:
@@ -77,7 +77,7 @@ class ProbeOutcome:
 
 
 def preset_candidates() -> list[PresetCandidate]:
-    """Presets that say how their device is delivered and need no other options than their sample's."""
+    """Presets with stated port settings that need no options besides their sample's."""
     candidates = []
     for name in names(GAUGES):
         driver = load(GAUGES, name, name)
@@ -88,12 +88,15 @@ def preset_candidates() -> list[PresetCandidate]:
 
 
 def announcements(path: str, candidates: Sequence[PresetCandidate]) -> Iterator[str]:
-    """What answers on the port `path`, a line of text each. SENDS BYTES, unless a device speaks there unasked.
+    """Answers on the port `path`, a line of text each. SENDS BYTES, unless a device there sends unsolicited data.
 
     The presets that speak text come first: what is no text may leave an instrument in a state of its own.
     """
-    if heard := _heard(path):
-        yield f"a device speaks unasked, {shown(heard)}: nothing was sent; `compd gauge learn` with its baud rate"
+    if received := _received(path):
+        yield (
+            f"a device sends unsolicited data, {shown(received)}: nothing was sent; "
+            "`compd gauge learn` with its baud rate"
+        )
         return
     outcomes = [probe_port(path, candidate) for candidate in sorted(candidates, key=lambda c: c.on_registers)]
     text = [outcome for outcome in outcomes if outcome.fits and not outcome.candidate.on_registers]
@@ -171,12 +174,12 @@ class _ClosedCommands:
                 self._port.write(COMMAND_END)
                 self._discard()
         except LineFault:
-            pass  # the port is lost, and nothing is behind it
+            pass  # the port is lost
         finally:
             self._port.close()
 
     def _discard(self) -> None:
-        """What comes until the device is quiet, or for as long as a probe."""
+        """Data until the device is quiet, at most for the time of a probe."""
         for _ in range(int(PROBE_TIMEOUT_S / QUIET_S)):
             if not self._port.read(QUIET_S):
                 return
@@ -187,8 +190,8 @@ def _end(request: bytes) -> bytes:
     return match[0] if match else b""
 
 
-def _heard(path: str) -> bytes:
-    """What comes on a port without a request; b"" also where it cannot be opened."""
+def _received(path: str) -> bytes:
+    """Unsolicited data on a port; b"" also if it cannot be opened."""
     settings = byte_line_settings(PortArguments(path, 9600, "8N1", LISTEN_S))
     try:
         line = open_stream(settings, MonotonicClock())
@@ -202,7 +205,7 @@ def _heard(path: str) -> bytes:
 
 
 def _setting(outcome: ProbeOutcome) -> str:
-    """A candidate's name, with all that was taken for granted of the device."""
+    """A candidate's name, with all assumptions about the device."""
     candidate = outcome.candidate
     assumed = ", ".join(f"{key}={value}" for key, value in (candidate.gauge.sample_options or {}).items())
     return f"{candidate.name} at {candidate.baud} {candidate.format}" + (f", taken as {assumed}" if assumed else "")

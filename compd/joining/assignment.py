@@ -1,4 +1,4 @@
-"""Which dwell of the machine each point of an instrument belongs to, or why that cannot be told."""
+"""Assignment of each point of an instrument to a dwell of the machine, or the reason why it is ambiguous."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.joining.distances import separation_mm
 
-# Points nearer than this are repeats at one place, where the uncertainty is not larger: six standard deviations of a
-# laser tracker's 8 um at a few metres. Also the least distance at which a point no longer belongs to a dwell.
+# Largest distance (mm) of repeats at one place, unless the uncertainty is larger: six standard deviations of a laser
+# tracker's 8 um at a few metres. Also the least distance at which a point no longer belongs to a dwell.
 REPEAT_MM = 0.05
-# A point farther from its dwell than so many times the rms of the others does not belong to it.
+# Largest distance of a point from its dwell, in rms of the others.
 LIMIT_SIGMAS = 6.0
 # Another assignment competes if it lacks no more dwells of points than are allowed, and if fewer than this share of its
 # pairs are the same; it must then be worse by the factor CLEARLY_WORSE, as clock offsets must.
@@ -24,7 +24,7 @@ MOST_WITHOUT = 0.05
 
 @dataclass(frozen=True)
 class Assignment:
-    """Which dwell each of G points belongs to.
+    """The dwell of each of G points.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class NoAssignment:
-    """Why there is none.
+    """The reason why there is none.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class NoAssignment:
 
 
 def on_one_line(measured_mm: FloatArray) -> NoAssignment:
-    """Why points (G, d) on one line cannot be told: one that is far from all others makes a line of them, too."""
+    """The problem of points (G, d) on one line; a single point far from all others makes a line, too."""
     away_mm = np.linalg.norm(measured_mm - np.median(measured_mm, axis=0), axis=1)
     far = int(np.argmax(away_mm))
     return NoAssignment(
@@ -85,7 +85,7 @@ def repeat_distance_mm(sigma_mm: float) -> float:
 
 
 def unit_hint(place: FloatArray, point: FloatArray) -> str:
-    """A remark where the instrument's steps are so many times the machine's as one unit is of another."""
+    """A remark if the ratio of the instrument's steps to the machine's is that of two units."""
     steps = [float(np.median(np.abs(separation_mm(values[:-1], values[1:])))) for values in (place, point)]
     ratio = steps[1] / max(steps[0], 1e-9)
     for factor, mistake in ((25.4, "mm read as inches"), (1 / 25.4, "inches read as mm"), (1000.0, "mm read as m")):

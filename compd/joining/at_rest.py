@@ -221,7 +221,7 @@ def _problems(
 
 
 def _by_places(result: Assignment | NoAssignment, dwells: list[Dwell], export: InstrumentExport) -> _Assigned:
-    """What the places tell. Raises RecordingError where they do not."""
+    """The assignment by places. Raises RecordingError if they are ambiguous."""
     if isinstance(result, NoAssignment):
         where = str(export.path)
         if result.point is not None and result.dwell is not None:

@@ -31,13 +31,13 @@ from compd.joining.assignment import (
 )
 from compd.joining.distances import RigidMotion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
 
-# Fewer different points fit among many dwells by chance.
+# Fewest different points; fewer fit among many dwells by chance.
 LEAST_POINTS = 5
 # Points far apart from which triangles are made: some of them may be at no dwell.
 _CORNERS = 8
-# Triangles that must find the dwells of nearly all points; the others are then not tried.
+# Triangles that must find the dwells of nearly all points to end the search.
 _WITNESSES = 2
-# Triangles of dwells that are followed for one of the points, those with the most similar sides first.
+# Most triangles of dwells tried for one of the points, those with the most similar sides first.
 _CANDIDATES = 4000
 _ROUNDS = 6
 
@@ -45,7 +45,7 @@ _ROUNDS = 6
 def assign_by_distance(
     expected_mm: FloatArray, measured_mm: FloatArray, sigma_mm: float, in_M: bool = False
 ) -> Assignment | NoAssignment:
-    """The dwell of each point, or why it cannot be told.
+    """The dwell of each point, or the reason why it is ambiguous.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def _grown(
         if np.array_equal(now, nearest):
             break
         nearest = now
-        # the median, because points that do not belong there are among them
+        # the median, since some points do not belong there
         typical_mm = 1.5 * float(np.median(distance_mm[at_place, 0]))
         limit_mm = min(max(LIMIT_SIGMAS * typical_mm, near_mm), 3.0 * largest_rms_mm(place_mm))
     unclear: BoolArray = at_place & (distance_mm[:, 1] <= limit_mm)
@@ -173,7 +173,7 @@ def _grown(
 
 
 def _may_lack(points: int) -> float:
-    """How many of so many points may be at no dwell."""
+    """Most points at no dwell, by their number."""
     return max(1.0, MOST_WITHOUT * points)
 
 

@@ -13,14 +13,14 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.joining.distances import LARGEST_RMS_MM, RigidMotion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
 
 _LAST_NUMBER = re.compile(r"(?:.*\D)?0*(\d+)")
-# Robust registration: points far off are left out of it, until the same ones are.
+# Most rounds of the robust registration: points far off are left out until their set stays the same.
 _ROUNDS = 10
 _WRONG_SIGMAS = 6.0
 
 
 @dataclass(frozen=True)
 class NamedAssignment:
-    """Which dwell each of G points belongs to by its name.
+    """The dwell of each of G points by its name.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class NamedAssignment:
 
 @dataclass(frozen=True)
 class NameCheck:
-    """What the distances say about an assignment by name.
+    """Result of checking an assignment by name against the distances.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ def _ids_of_names(ids: Sequence[str], names: Sequence[str]) -> dict[str, str]:
 def check_names(
     expected_mm: FloatArray, measured_mm: FloatArray, dwell: IntArray, near_mm: float, in_M: bool = False
 ) -> NameCheck:
-    """Whether the points with a dwell have the distances of their dwells, and which of them have not.
+    """Whether the points with a dwell have the distances of their dwells, and the exceptions.
 
     expected_mm : (S, d). measured_mm : (G, d). dwell : (G,) -1 for none. near_mm : no point this near is wrong.
     in_M : the points are measured in {M}: nothing is laid over, and any number of places will do.
@@ -148,13 +148,13 @@ def check_names(
 
 
 def _in_place(p: FloatArray, q: FloatArray, allowed_mm: float, near_mm: float) -> BoolArray:
-    """(N,) the pairs in one frame that are as near to each other as most are."""
+    """(N,) pairs in one frame whose distance is typical."""
     residual_mm = np.linalg.norm(p - q, axis=1)
     return np.asarray(residual_mm <= _limit_mm(residual_mm, allowed_mm, near_mm))
 
 
 def _limit_mm(residual_mm: FloatArray, allowed_mm: float, near_mm: float) -> float:
-    """A point is wrong that is farther from its dwell than 6 times the typical residual, and than `near_mm`."""
+    """(N,) wrong points: farther from their dwell than 6 times the typical residual, and than `near_mm`."""
     return float(max(min(_WRONG_SIGMAS * 1.5 * float(np.median(residual_mm)), 3.0 * allowed_mm), near_mm))
 
 

@@ -32,15 +32,15 @@ from compd.joining.monotone_match import CLEAR_MARGIN, match_in_order
 
 # Points of one window: 28, 10 or 6 distances. Shorter ones are tried where gaps leave no longer part without one.
 _WINDOWS = (8, 5, 4)
-# Starts that are followed; repeats of one motion make as many equally good ones as there are cycles.
+# Starts to try; repeats of one motion make as many equally good ones as there are cycles.
 _STARTS = 12
 _ROUNDS = 6
-# Share of the points that a shift must leave a dwell to be compared.
+# Least share of the points with a dwell after a shift, for a comparison.
 _MOST = 0.75
 
 
 def assign_by_order(expected_mm: FloatArray, measured_mm: FloatArray, sigma_mm: float) -> Assignment | NoAssignment:
-    """The dwell of each point, or why it cannot be told.
+    """The dwell of each point, or the reason why it is ambiguous.
 
     expected_mm : (S, d) places of the dwells, in the order of time. measured_mm : (G, d) points in theirs.
     sigma_mm : standard uncertainty of the instrument per axis; nan where it is not known.
@@ -128,7 +128,7 @@ def _grown(
         q, p = measured_mm[points], expected_mm[dwell[points]]
         if not is_spread(p):
             return None
-        # the median, because points that do not belong there are among them
+        # the median, since some points do not belong there
         typical_mm = float(np.median(residual_mm[dwell[points], points])) * 1.5
         limit_mm = max(LIMIT_SIGMAS * typical_mm, near_mm)
     unclear = (dwell >= 0) & (match.margin < CLEAR_MARGIN)
@@ -143,7 +143,7 @@ def _grown(
 def _decided(
     assignments: list[Assignment], expected_mm: FloatArray, measured_mm: FloatArray
 ) -> Assignment | NoAssignment:
-    """The best of what was found, if it is clearly better than all others and right."""
+    """The best assignment, if it is clearly better than all others and right."""
     different = {tuple(assignment.dwell.tolist()): assignment for assignment in assignments}
     ordered = sorted(different.values(), key=lambda each: (-each.count, each.rms_mm))
     best = ordered[0]

@@ -17,12 +17,12 @@ from compd.instruments import LENGTH, Track
 from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
 from compd.recording import Frame, Recording, sidecar_contents, write_recording
 
-# The machine stands still where the instrument shows less motion than this, or less than its own noise can imitate.
+# Largest motion (mm) in the instrument's data of a machine at rest, unless its own noise imitates more.
 STILL_MM = 0.001
 # 1 um at 100 mm from the point about which the platform turns.
 STILL_RAD = 1e-5
 _NOISE_SIGMAS = 6.0
-# Between samples further apart than this many periods nothing is interpolated.
+# Longest gap (periods) between samples for interpolation.
 _GAP_PERIODS = 5.0
 # Instants around a row at which the instrument's position is compared with that of the row itself.
 _INSTANTS = 9
@@ -49,7 +49,7 @@ class JoinResult:
 
 @dataclass(frozen=True)
 class Instrument:
-    """What a person states about the instrument.
+    """A person's statements about the instrument.
 
     Attributes
     ----------
@@ -227,7 +227,7 @@ def _reference_at_rows(
     outside = (time_s < track.time_s[0]) | (time_s > track.time_s[-1])
     gap = ~outside & (track.time_s[after] - track.time_s[after - 1] > _GAP_PERIODS * track.period_s)
     position_mm = track.position_at(time_s)
-    # an offset that a person gave has no uncertainty: then only the neighbouring samples must agree
+    # a given offset has no uncertainty: only the neighbouring samples must agree
     std_s = float(np.hypot(0.0 if np.isnan(offset.std_s) else offset.std_s, track.time_std_s))
     reach_s = max(2.0 * std_s, 1.5 * track.period_s)
     shifts_s = np.linspace(-reach_s, reach_s, _INSTANTS)

@@ -27,17 +27,17 @@ from compd.arrays import FloatArray
 from compd.instruments import Track
 from compd.joining.shared_motion import SharedMotion
 
-# The least that the scales must explain of the instrument's variance. On simulated tripods the right offset
-# explains 0.995 or more; unrelated motions, with some twenty moves, reach up to 0.6 by chance.
+# Least share of the instrument's variance that the scales must explain. On simulated tripods the right offset explains
+# 0.995 or more; unrelated motions, with some twenty moves, reach up to 0.6 by chance.
 LEAST_AGREEMENT = 0.9
-# What any other offset must leave unexplained: more than this share of the variance (between samples, linear
-# interpolation alone may miss a tenth of it), and more than this many times what the best one leaves.
+# Least unexplained variance of any other offset: this share of the variance (linear interpolation alone may miss a
+# tenth of it between samples), and this multiple of the best one's.
 ALIKE = 0.01
 CLEARLY_WORSE = 2.0
-# Most steps of the common grid of time, most candidates.
+# Limits: steps of the common grid of time, candidates,
 _MOST_STEPS = 2**18
 _CANDIDATES = 8
-# Of the shorter of the two, on that grid.
+# and fewest steps of the shorter recording on that grid.
 _FEWEST_STEPS = 3
 # Offsets in one scan of the refinement.
 _SCAN = 201
@@ -112,7 +112,7 @@ def estimate_offset(time_s: FloatArray, scale_mm: FloatArray, track: Track) -> C
 
 
 def evaluate_offset(time_s: FloatArray, scale_mm: FloatArray, track: Track, offset_s: float) -> ClockOffset:
-    """An offset that a person gave, with the agreement that it reaches; nothing is refused."""
+    """A given offset with its agreement; never refused."""
     return ClockOffset(offset_s, np.nan, SharedMotion(time_s, scale_mm, track).agreement(offset_s))
 
 
@@ -131,7 +131,7 @@ def agreement_curve(time_s: FloatArray, scale_mm: FloatArray, track: Track) -> A
 
 
 def _window_s(motion: SharedMotion) -> float:
-    """How far from a candidate its maximum may be; others are farther away."""
+    """Largest distance (s) of a maximum from its candidate; others are farther away."""
     return max(2.0 * motion.period_s, 5.0 * motion.track.period_s, 2.0 * _decorrelation_time_s(motion.track))
 
 
@@ -228,10 +228,10 @@ def _refine(motion: SharedMotion, start_s: float, window_s: float) -> tuple[floa
 
 
 def _indistinguishable_range_s(motion: SharedMotion, offset_s: float, window_s: float) -> tuple[float, float]:
-    """(earlier, later) how far the offset may move before the rows' positions change by more than can be seen."""
+    """(earlier, later) shift of the offset (s) at which the change of the rows' positions becomes significant."""
     rows = motion.covered(offset_s - window_s, offset_s + window_s)
     position_mm = motion.track.position_at(motion.time_s[rows] - offset_s)
-    # three standard errors of what the polynomial leaves over (it is no noise), or two of the instrument's noise
+    # three standard errors of the polynomial's residual (which is no noise), or two of the instrument's noise
     variance_mm2 = (1.0 - motion.agreement(offset_s)) * np.mean(np.var(position_mm, axis=0))
     misfit_mm = np.sqrt(variance_mm2 / len(position_mm))
     limit_mm = max(3.0 * float(misfit_mm), 2.0 * motion.track.noise_mm, 1e-4)

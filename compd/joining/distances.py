@@ -1,4 +1,4 @@
-r"""Distances between points, the same in every frame: how well an instrument's points fit a machine's places.
+r"""Distances between points, equal in every frame: how well an instrument's points fit a machine's places.
 
 Where the instrument stands and how it is turned is not known before the points are joined. The distances
 :math:`|q_j - q_l|` between its points do not depend on it, and must be those between the places
@@ -16,22 +16,22 @@ from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray, IntArray, rms
 
-# What distances may be wrong by, rms. compd's library takes 0.1 mm for the most that machining and assembly leave in
-# one joint (`base_joint`, `platform_joint`), and 1 mm for what is left of two frames laid over one another
-# (`reference`): a machine that is wrong by more has another geometry than its configuration, or other points.
+# Largest rms error (mm) of distances. compd's library has 0.1 mm as the limit for one joint after machining and
+# assembly (`base_joint`, `platform_joint`), and 1 mm for the rest of two registered frames (`reference`). A larger
+# error means another geometry than that of the configuration, or other points.
 LARGEST_RMS_MM = 1.0
-# And as a share of the distances' own rms: among places this near to each other, any points would fit.
+# The same as a share of the distances' own rms: any points would fit among places this near to each other.
 LARGEST_SHARE = 0.05
-# Least rms of the points across the line that fits them best, as a share of that along it: less fixes no frame.
+# Least rms of the points across their best line, as a share of that along it: less fixes no frame.
 LEAST_WIDTH = 0.01
-# Points three or fewer are compared with all others; of many, those at these distances in order are enough.
+# Up to this many points all pairs are compared; of more points, the pairs at these distances in order.
 _ALL_PAIRS = 200
 _LAGS = (1, 2, 3, 5, 8, 13, 21, 34, 55, 89, 144, 233, 377)
 
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """What lays the instrument's points over the machine's: turned (d, d), then moved by moved_mm (d,)."""
+    """Registration of the instrument's points to the machine's: turned (d, d), then moved by moved_mm (d,)."""
 
     turned: FloatArray
     moved_mm: FloatArray
@@ -74,14 +74,14 @@ def separation_mm(first_mm: FloatArray, second_mm: FloatArray) -> FloatArray:
 
 
 def distances_rms_mm(expected_mm: FloatArray, measured_mm: FloatArray) -> float:
-    """Root mean square of what the distances between points (N, d) differ by; nan of fewer than two."""
+    """Root mean square of the differences of distances between points (N, d); nan for fewer than two."""
     first, second = pairs_of(len(expected_mm))
     expected = separation_mm(expected_mm[first], expected_mm[second])
     return rms(separation_mm(measured_mm[first], measured_mm[second]) - expected)
 
 
 def largest_rms_mm(expected_mm: FloatArray) -> float:
-    """What the rms of the distances between these points (N, d) must not exceed."""
+    """Limit of the rms of the distances between these points (N, d)."""
     first, second = pairs_of(len(expected_mm))
     spread_mm = rms(separation_mm(expected_mm[first], expected_mm[second]))
     return min(LARGEST_RMS_MM, LARGEST_SHARE * spread_mm)

@@ -1,4 +1,4 @@
-"""Where the machine stood still: the dwells of a recording of gauges, each with the mean of every column."""
+"""Dwells of a recording of gauges: rest of the machine, each with the mean of every column."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from compd.columns import ID_COLUMNS, approach_columns
 from compd.errors import Problem, RecordingError
 from compd.recording import Recording
 
-# The scales of a machine at rest stay within this, or within what their own noise can imitate.
+# Largest motion (mm) of the scales of a machine at rest, unless their own noise imitates more.
 STILL_MM = 0.001
 NOISE_SIGMAS = 6.0
-# More is motion, however noisy the scales are: `shared_motion.MOTION_MM` for a recording without an instrument.
+# Limit (mm) above which any change is motion, even for noisy scales: `shared_motion.MOTION_MM` for a recording without
+# an instrument.
 LARGEST_LIMIT_MM = 0.01
-# Shorter than a measurement takes: a machine that reverses also stands still for a moment.
+# Least rows and duration (s) of a dwell, below those of a measurement: a machine that reverses also stands still for a
+# moment.
 LEAST_ROWS = 3
 LEAST_S = 1.0
-# Rows that may be missing or wrong in the middle of a dwell.
+# Most missing or wrong rows within a dwell.
 _MOST_GAP_ROWS = 2
 # The quarter quantile of the absolute value of a standard normal variable.
 _QUARTER = 0.3186
@@ -174,7 +176,7 @@ def _trimmed(rows: IntArray, scale_mm: FloatArray, limit_mm: FloatArray) -> IntA
 
 
 def _limits_mm(scale_mm: FloatArray) -> FloatArray:
-    """(n,) how far each scale may be from its mean at rest.
+    """(n,) largest deviation (mm) of each scale from its mean at rest.
 
     The noise is that of each row against the mean of its neighbours, whose variance is 3/2 sigma^2 at rest. The lower
     quartile of its absolute value is of rows at rest where a quarter of all rows or more are.

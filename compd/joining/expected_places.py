@@ -1,4 +1,4 @@
-"""Where the machine's kinematics, without any effect, expects the tip and the links in each dwell."""
+"""Tip and links in each dwell by the machine's kinematics without effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording of gauges and an instrument's export put together as a person asks for it: what `compd join` does."""
+"""Joins a recording of gauges and an instrument's export by the options of `compd join`."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from compd.recording import read_recording
 
 JoinBy = Literal["time", "order", "name", "distance"]
 JOIN_BY: tuple[JoinBy, ...] = get_args(JoinBy)
-# Samples further apart in time and place are points, each of its own, and no track of a target.
+# Samples further apart in time (s) and place are single points, no track of a target.
 _TRACK_PERIOD_S = 1.0
 
 
 @dataclass(frozen=True)
 class JoinOptions:
-    """What a person says of a join.
+    """A person's options for a join.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class JoinOptions:
 
 
 def choose_by(by: JoinBy | None, export: InstrumentExport) -> JoinBy:
-    """What was chosen; without a choice the time, of an export that is a track in time.
+    """The chosen way of joining; by default the time, for an export that is a track in time.
 
     Raises RecordingError where that is not clear: an export without times, or of single points.
     """
@@ -72,7 +72,7 @@ def choose_by(by: JoinBy | None, export: InstrumentExport) -> JoinBy:
 
 
 def unfit_option(by: JoinBy, options: JoinOptions) -> str:
-    """The option that does not go with what puts rows together, as it is written; "" where all do."""
+    """The option that contradicts the way of joining, as on the command line; "" if there is none."""
     if by != "time" and options.moving:
         return "--moving"
     if by != "time" and options.offset_s is not None:
@@ -81,7 +81,7 @@ def unfit_option(by: JoinBy, options: JoinOptions) -> str:
 
 
 def match_export(gauges: Path, export: InstrumentExport, options: JoinOptions) -> JoinResult | RestJoin:
-    """What `compd join` writes, before it is written.
+    """The result of `compd join` before it is written.
 
     gauges : a recording of gauges alone, NAME.csv or NAME.parquet.
     Raises RecordingError with every reason why the two cannot be told to belong together, or an option is not fit.

@@ -15,10 +15,10 @@ from compd.joining.by_time import Instrument
 from compd.joining.dwells import Dwell, dwell_columns
 from compd.recording import Recording, sidecar_contents
 
-# Rows of repeats in a dwell of one row are this far apart, or less where the next dwell is near.
+# Interval (s) of the rows of repeats in a dwell of one row; shorter if the next dwell is near.
 _REPEATS_EVERY_S = 1.0
-# Without ids of points, dwells nearer to each other than this are at one nominal place: a corrected target moves by
-# some 0.01 mm when it is visited anew.
+# Largest distance (mm) of dwells at one nominal place, without ids of points: a corrected target moves by some 0.01 mm
+# at each visit.
 SAME_PLACE_MM = 2 * REPEAT_MM
 
 

@@ -1,4 +1,4 @@
-"""Names of points that are at another place than their dwell, and lines and names as a message lists them."""
+"""Names of points away from their dwell, and lines and names as listed in a message."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from compd.instruments import InstrumentExport
 from compd.joining.by_name import NameCheck
 from compd.joining.dwells import Dwell
 
-# Names and lines that a message lists.
+# Most names and lines listed in a message.
 _SHOWN = 8
 
 
 def name_problems(
     check: NameCheck, dwells: Sequence[Dwell], export: InstrumentExport, dwell: IntArray
 ) -> list[Problem]:
-    """Every name that is at another place than its point; two that are at each other's are named together."""
+    """Every name away from its point; two swapped names form one problem."""
     assert export.name is not None
     if check.why or not len(check.wrong):
         return [

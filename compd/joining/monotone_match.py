@@ -8,12 +8,12 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 
-# What is lost of the 1 that a point at its dwell counts for: where it is a further one at the same dwell, and where
-# dwells before it have no point. So the next dwell at the same place is a better reading of a second point than the
-# same dwell, and that a better one than a later visit.
+# Loss from the 1 that a point at its dwell counts for: for a further point at the same dwell, and for preceding dwells
+# without a point. So the next dwell at the same place is a better reading of a second point than the same dwell, and
+# that a better one than a later visit.
 REPEAT_LOSS = 0.5
 GAP_LOSS = 0.9
-# A point whose best other dwell costs less than this in all is one whose dwell cannot be told.
+# Least cost of a point's best other dwell; below it the point's dwell is ambiguous.
 CLEAR_MARGIN = 0.3
 
 

@@ -1,4 +1,4 @@
-"""In which dwell each row of a plan was measured: by where the plan sends the tip, in the plan's order."""
+"""The dwell of each row of a plan, by the plan's places and order."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from compd.tables import ProblemList, read_table
 
 
 def read_plan_points(path: Path) -> FloatArray:
-    """(K, 3) where the rows of a plan send the tip, in {M}, mm. Raises RecordingError where it cannot be read."""
+    """(K, 3) places of a plan's rows in {M}, mm. Raises RecordingError for an unreadable plan."""
     problems = ProblemList(path)
     table = read_table(path, problems, lambda cells: "time_s" in cells, ("purpose",))
     if table is None:
@@ -32,7 +32,7 @@ def read_plan_points(path: Path) -> FloatArray:
 
 
 def dwell_of_plan_rows(expected_mm: FloatArray, plan_mm: FloatArray, path: Path) -> IntArray:
-    """(K,) number of the dwell, from 0, in which each row of a plan was measured; -1 where that is not clear.
+    """(K,) number of the dwell, from 0, of each row of a plan; -1 where ambiguous.
 
     expected_mm : (S, 3) places of the dwells in {M}, in the order of time. plan_mm : (K, 3) of the plan's rows, in the
         order of measuring; rows at one place, such as those with different loads, may share a dwell.

@@ -10,9 +10,9 @@ from compd.arrays import BoolArray, FloatArray
 from compd.errors import Problem, RecordingError
 from compd.instruments import Track
 
-# Both must move by more than this for a pattern to be seen; ten times what counts as a reversal.
+# Least motion (mm) of both for a visible pattern; ten times that of a reversal.
 MOTION_MM = 0.01
-# Independent places per term of the polynomial: in the whole recording, and in the part that overlaps.
+# Least independent places per term of the polynomial: in the whole recording, and in the overlapping part.
 _PLACES_PER_TERM = 5
 _LEAST_PLACES_PER_TERM = 2
 # Most rows in the regression.
@@ -20,7 +20,7 @@ _MOST_ROWS = 2000
 
 
 class SharedMotion:
-    """The motion as the scales and as the instrument recorded it, thinned where there are more rows than needed.
+    """The motion as recorded by the scales and by the instrument, thinned to the rows needed.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class SharedMotion:
         self.period_s = float(np.median(np.diff(self.time_s))) if len(self.time_s) > 1 else 0.0
 
     def check(self) -> None:
-        """Raise RecordingError where there is too little motion for a pattern."""
+        """Raise RecordingError if there is too little motion for a pattern."""
         for what, values in (("the machine", self.all_scale_mm), ("the instrument", self.track.position_mm)):
             moved_mm = float(np.ptp(values, axis=0).max()) if len(values) else 0.0
             if moved_mm < MOTION_MM:

@@ -1,4 +1,4 @@
-"""What a join has put together, in lines for a person."""
+"""Summary of a join in lines for a person."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from compd.joining.by_time import JoinResult
 
 
 def summary_lines(joined: JoinResult | RestJoin) -> list[str]:
-    """How the rows were put together, how sure that is, and what has no row or no reference."""
+    """The way of joining, its certainty, and the rows and points left over."""
     return _by_time(joined) if isinstance(joined, JoinResult) else _at_rest(joined)
 
 

@@ -89,7 +89,7 @@ class MqttSubscriber:
         self._client.on_connect = self._connected
         self._client.on_disconnect = self._disconnected
         self._client.on_subscribe = self._subscribed
-        self._client.on_message = self._heard
+        self._client.on_message = self._received
         self._client.connect_timeout = settings.timeout_s
         try:
             self._log_in(settings)
@@ -225,5 +225,5 @@ class MqttSubscriber:
     ) -> None:
         self._granted[number] = codes
 
-    def _heard(self, _client: Client, _data: Any, message: MQTTMessage) -> None:
+    def _received(self, _client: Client, _data: Any, message: MQTTMessage) -> None:
         self._came.append(Message(message.topic, message.payload, self._arrival(message.retain)))

@@ -53,7 +53,7 @@ class StreamLine:
         self._gap_s = gap_s
         self._clock = clock
         self._echo = echo
-        self._next_line_s = math.nan  # before it the next line of a device that sends unasked is not sampled, s
+        self._next_line_s = math.nan  # earliest sampling time of the next unsolicited line, s
         self._looks_s = (-math.inf, -math.inf)  # when the last two looks for bytes began
         self._left_s = -math.inf  # when the last bit of the last request will have left
         self._request = b""
@@ -130,7 +130,7 @@ class StreamLine:
     def next_line(
         self, terminator: bytes, limit: int, timeout_s: float | None = None, gap_timeout_s: float | None = None
     ) -> tuple[bytes, float]:
-        """The next line of a device that sends unasked, without `terminator`, and its `time_s`: see `ByteLine`.
+        """The next unsolicited line without `terminator`, and its `time_s`; see `ByteLine`.
 
         Raises LineFault: MISMATCH beyond `limit` bytes, TIMEOUT, INCOMPLETE, LINE_LOST.
         """

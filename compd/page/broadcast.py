@@ -1,4 +1,4 @@
-"""What every browser gets: live events twenty times a second and slow ones once, made once for all of them."""
+"""Events for all browsers: live ones twenty times a second, slow ones once a second, each made once."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Broadcast:
         self._ended = False
 
     async def run(self) -> None:
-        """Make events, until cancelled."""
+        """Make events until cancelled."""
         loop = asyncio.get_running_loop()
         due_s = slow_due_s = loop.time()
         while True:
@@ -62,7 +62,7 @@ class Broadcast:
             await asyncio.sleep(due_s - loop.time())
 
     async def make(self, unix_s: float, slow: bool) -> None:
-        """The events of now, `unix_s` (s); the slow one too where it is due."""
+        """The events at `unix_s` (s); includes the slow one if it is due."""
         self._note_machine()
         self._model_effects.note(self._link.budget, self._link.models)
         live = self._live_event(unix_s)
@@ -84,7 +84,7 @@ class Broadcast:
         self._ended = True
 
     async def events(self, browser: Browser) -> AsyncIterator[bytes]:
-        """The events of one browser, until it goes. Each is the newest: a browser that is slow gets fewer."""
+        """The events of one browser until it disconnects. Each is the newest; a slow browser gets fewer."""
         try:
             hello = {"id": browser.id, "role": browser.token.role, "machine": self._machine}
             yield encoded("hello", plain(hello))
@@ -113,7 +113,7 @@ class Broadcast:
         self._faults = FaultCounts()
 
     def _live_event(self, unix_s: float) -> Event:
-        """The newest of everything that moves. `made`: s on a monotonic clock, which tells how late the event is.
+        """The newest values of everything that moves. `made`: monotonic time (s), which shows the event's delay.
 
         unix_s : now, s.
         """
@@ -130,7 +130,7 @@ class Broadcast:
         return event
 
     def _slow_event(self) -> Event:
-        """Status, models and what they do, counts of faults, browsers and the recording that runs."""
+        """Status, models and their effects, counts of faults, browsers and the running recording."""
         if self._link.status is not None:
             self._faults.note(time.time(), self._link.status)
         running = self._recordings.running
@@ -146,7 +146,7 @@ class Broadcast:
 
 
 def gauges(readings: Event, columns: list[dict[str, Any]], status: Event | None = None) -> list[dict[str, Any]]:
-    """What each wired channel shows in the cycle of a READINGS message, in the order of MACHINE's wiring.
+    """Values of each wired channel in the cycle of a READINGS message, in the order of MACHINE's wiring.
 
     `value` : a length in mm since machine zero, or another quantity in its unit; absent where there is none, or no
     machine zero to count from.  `age_s` : of a value.  `fault` : why there is none, or why it must not be used.
@@ -184,5 +184,5 @@ def plain(event: Event) -> bytes:
 
 
 def encoded(name: str, data: bytes) -> bytes:
-    """An event as it is sent (server-sent events, WHATWG HTML, section 9.2); `data`: one line."""
+    """An encoded event (server-sent events, WHATWG HTML, section 9.2); `data`: one line."""
     return b"event: " + name.encode() + b"\ndata: " + data + b"\n\n"

@@ -1,4 +1,4 @@
-"""The browsers that look at the page: who they are, and which of them is armed, so that its orders are followed."""
+"""The connected browsers and their users, and which of them is armed to give orders."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from compd.clock import Clock
 from compd.page.guard import Token
 
-# An armed browser stays so for this long, s, and no longer than its connection.
+# Duration (s) of arming; it ends with the connection at the latest.
 ARMED_S = 60.0
 
 
@@ -28,31 +28,31 @@ class Browser:
 
 
 class Browsers:
-    """All that are connected."""
+    """All connected browsers."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._connected: dict[str, Browser] = {}
 
     def connect(self, token: Token, address: str) -> Browser:
-        """A browser has come."""
+        """Add a browser."""
         browser = Browser(token, address, self._clock.monotonic())
         self._connected[browser.id] = browser
         return browser
 
     def disconnect(self, browser: Browser) -> None:
-        """It has gone; it is not armed any more."""
+        """Remove a browser, and disarm it."""
         self._connected.pop(browser.id, None)
 
     def why_not(self, id: str, token: Token) -> str:
-        """Why who asks with this token cannot arm the browser of this id, nor end it; "" where it can."""
+        """Reason why this token may neither arm the browser of this id nor end it; "" if it may."""
         browser = self._connected.get(id)
         if browser is None:
             return "this browser is not connected"
         return "" if browser.token == token else "this browser is connected with another token"
 
     def arm(self, id: str, token: Token) -> Browser | None:
-        """Arm the browser for `ARMED_S`; None where it is not connected with this token, or may look only."""
+        """Arm the browser for `ARMED_S`; None if it is connected with another token or may only look."""
         if self.why_not(id, token) or token.role != "operate":
             return None
         browser = self._connected[id]
@@ -60,14 +60,14 @@ class Browsers:
         return browser
 
     def disarm(self, id: str, token: Token) -> bool:
-        """End it at once; False where the browser is not connected with this token."""
+        """End it at once; False if the browser is connected with another token."""
         if self.why_not(id, token):
             return False
         self._connected[id].armed_until_s = 0.0
         return True
 
     def armed(self, id: str, token: Token) -> Browser | None:
-        """The browser of this id, if it is connected with this token, and armed."""
+        """The browser of this id if it is armed and connected with this token."""
         browser = self._connected.get(id)
         return None if browser is None or self.why_not(id, token) or not self._is_armed(browser) else browser
 
@@ -75,7 +75,7 @@ class Browsers:
         return browser.armed_until_s > self._clock.monotonic()
 
     def summary(self) -> list[dict[str, object]]:
-        """Everybody, the longest connected first; the ids stay here."""
+        """All browsers without their ids, the longest connected first."""
         now_s = self._clock.monotonic()
         return [
             {

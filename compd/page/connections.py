@@ -1,4 +1,4 @@
-"""How many connections the page's server keeps, and which it closes for a newcomer.
+"""Limits on the connections of the page's server, and which one is closed for a new one.
 
 Whoever reaches the port may connect, so that connections without a token are few, and the oldest of them goes when one
 more comes: nobody can keep a person out. Each token has a share of the others.
@@ -12,24 +12,24 @@ from typing import Protocol
 
 from compd.page.counted_log import CountedLog
 
-# The process has that many descriptors where the system permits it: more than its connections, files and pipes need.
+# Descriptors that the process asks the system for: more than its connections, files and pipes need.
 WANTED_DESCRIPTORS = 4096
 
 
 class Connection(Protocol):
-    """A connection as this module needs it."""
+    """The part of a connection that this module uses."""
 
     @property
     def idle(self) -> bool:
-        """Whether no request is being answered."""
+        """Whether the connection is idle: no request is being answered."""
 
     def drop(self) -> None:
-        """Close it at once."""
+        """Close the connection at once."""
 
 
 @dataclass(frozen=True)
 class ConnectionLimits:
-    """unknown : connections that have shown no token. of_token : of one token. known : of all tokens."""
+    """unknown : most connections without a token. of_token : most of one token. known : most of all tokens."""
 
     unknown: int = 64
     of_token: int = 128
@@ -37,28 +37,28 @@ class ConnectionLimits:
 
     @staticmethod
     def for_descriptors(count: int) -> ConnectionLimits:
-        """At most half of the process's descriptors, `count`; the rest is for files, pipes and connections that go."""
+        """Limits that use at most half of `count` descriptors; the rest is for files, pipes and closing connections."""
         full = ConnectionLimits()
         known = min(full.known, 3 * count // 8)
         return ConnectionLimits(min(full.unknown, count // 8), min(full.of_token, max(known // 4, 1)), known)
 
 
 class Connections:
-    """All that are open; used by the event loop's thread alone."""
+    """All open connections; used by the event loop's thread alone."""
 
     def __init__(self, limits: ConnectionLimits, log: CountedLog) -> None:
         self._limits = limits
         self._log = log
-        # in the order in which they came
+        # in order of arrival
         self._unknown: dict[Connection, None] = {}
         self._known: dict[str, dict[Connection, None]] = {}
 
     def count(self) -> tuple[int, int]:
-        """Without a token, and with one."""
+        """Number of connections without a token, and with one."""
         return len(self._unknown), sum(map(len, self._known.values()))
 
     def came(self, connection: Connection) -> None:
-        """A connection is new; where there are too many without a token, the oldest is closed."""
+        """Add a new connection; close the oldest one without a token if there are too many."""
         self._unknown[connection] = None
         if len(self._unknown) > self._limits.unknown:
             oldest = next(iter(self._unknown))
@@ -66,7 +66,7 @@ class Connections:
             self.closed(oldest, "closed_for_a_newcomer")
 
     def admit(self, connection: Connection, name: str) -> bool:
-        """The connection has shown the token of this name. False where there is no place for it.
+        """The connection has shown the token of this name. False if the limit is reached.
 
         A place is made by closing the oldest that is idle: of the same token where it has its share already, else of
         the token that has most, which loses one that is not idle, too.
@@ -93,7 +93,7 @@ class Connections:
         return True
 
     def went(self, connection: Connection) -> None:
-        """It is closed."""
+        """Note that a connection is closed."""
         self._unknown.pop(connection, None)
         for name, own in list(self._known.items()):
             own.pop(connection, None)
@@ -101,7 +101,7 @@ class Connections:
                 del self._known[name]
 
     def closed(self, connection: Connection, why: str) -> None:
-        """Close it, and count it in the log."""
+        """Close a connection, and count it in the log."""
         self._log.note(why)
         connection.drop()
 
@@ -115,7 +115,7 @@ def _oldest_idle(connections: dict[Connection, None]) -> Connection | None:
 
 
 def raised_descriptor_limit() -> int:
-    """Let the process open WANTED_DESCRIPTORS files, or as many as it may; how many it may open now."""
+    """Raise the process's limit of open files to WANTED_DESCRIPTORS or the hard limit; return the new limit."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED_DESCRIPTORS if hard == resource.RLIM_INFINITY else min(WANTED_DESCRIPTORS, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:

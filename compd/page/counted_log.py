@@ -1,4 +1,4 @@
-"""A line of log a minute about what anybody on the network can cause: how often, instead of each time."""
+"""Summary log, one line a minute, of events that any host on the network can cause: counts instead of single lines."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class CountedLog:
         self._next_s = 0.0
 
     def note(self, kind: str) -> None:
-        """It has happened once more. kind : a key of the log's line."""
+        """Count one more event. kind : a key of the log's line."""
         self._counts[kind] += 1
         if self._due:
             return

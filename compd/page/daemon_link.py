@@ -1,4 +1,4 @@
-"""The page's connection to the daemon: the newest message of each class, and whether the daemon is there at all.
+"""The page's connection to the daemon: the newest message of each class, and whether the daemon is reachable.
 
 One connection watches READINGS, another asks for STATUS, MODEL and BUDGET. Both are made again by themselves; meanwhile
 `connected` is False and there are no messages, so that nobody shows what was.
@@ -19,7 +19,7 @@ Message = dict[str, Any]
 READINGS_HZ = 20.0
 BUDGET_EVERY_S = 0.2
 STATUS_EVERY_S = 1.0
-# Without a message for so long, s, the daemon is not there: it sends one in every cycle, whatever its state.
+# Silence (s) after which the daemon counts as gone: it sends a message in every cycle, in every state.
 SILENT_AFTER_S = 2.0
 _AGAIN_AFTER_S = 1.0
 _LONGEST_LINE_BYTES = 4 * 1024 * 1024
@@ -52,7 +52,7 @@ class DaemonLink:
     news: asyncio.Condition = field(default_factory=asyncio.Condition)
 
     async def run(self) -> None:
-        """Keep the link, until cancelled."""
+        """Keep the link until cancelled."""
         while True:
             try:
                 await self._serve()
@@ -69,7 +69,7 @@ class DaemonLink:
         return str(error) or type(error).__name__
 
     async def _serve(self) -> None:
-        """Take messages until the connection ends."""
+        """Receive messages until the connection ends."""
         async with DaemonConnection(self.path) as stream, DaemonConnection(self.path) as asked:
             self.machine = await asked.ask({"class": "MACHINE"})
             watching = await stream.ask({"class": "WATCH", "what": "readings", "rate_hz": READINGS_HZ})
@@ -97,7 +97,7 @@ class DaemonLink:
         while True:
             self.budget = await asked.ask({"class": "BUDGET"})
             if loop.time() >= status_due_s:
-                # first the models: who sees in STATUS that they have changed finds them here
+                # first the models: a reader of the change in STATUS finds them here
                 self.models = await asked.ask({"class": "MODEL"})
                 self.status = await asked.ask({"class": "STATUS"})
                 status_due_s = loop.time() + STATUS_EVERY_S
@@ -113,7 +113,7 @@ class DaemonLink:
 
 
 class DaemonConnection:
-    """Lines of JSON to and from the daemon."""
+    """JSON lines to and from the daemon."""
 
     def __init__(self, path: str) -> None:
         self._path = path
@@ -122,7 +122,7 @@ class DaemonConnection:
         self._reader, self._writer = await asyncio.open_unix_connection(self._path, limit=_LONGEST_LINE_BYTES)
         try:
             _agreed(await self.read(), "the connection")  # the greeting
-        except BaseException:  # a cancelled task, too, leaves no open connection
+        except BaseException:  # a cancelled task closes its connection, too
             await self._close()
             raise
         return self
@@ -144,7 +144,7 @@ class DaemonConnection:
         return message
 
     async def ask(self, request: Message) -> Message:
-        """The answer to a request. Raises ValueError where the daemon refuses it."""
+        """The answer to a request. Raises ValueError if the daemon refuses it."""
         self._writer.write(orjson.dumps(request) + b"\n")
         async with asyncio.timeout(SILENT_AFTER_S):
             answer = await self.read()

@@ -1,4 +1,4 @@
-"""The past as a whole: live events as they were sent, ten a second of the last minute and one a second of the hour.
+"""History of live events as they were sent: ten a second for the last minute, one a second for the hour.
 
 The tables of the history are for charts. Here is the rest of a cycle, which a page that is frozen or scrubbed shows:
 the machine's pose, what the corrections and the tip are made of, the shadow, every gauge. STATUS (timing of the loop,
@@ -15,7 +15,7 @@ from itertools import islice
 from compd.page.cadence import Cadence
 from compd.page.history import COARSE_HZ, COARSE_S, FINE_HZ, FINE_S
 
-# The quickest: a third of the bytes at a tenth of a millisecond.
+# The fastest level: a third of the bytes in a tenth of a millisecond.
 _LEVEL = 1
 
 
@@ -41,13 +41,13 @@ class _Kept:
 
 
 class Moments:
-    """Events of the last hour by their time; used by the event loop's thread alone."""
+    """Events of the last hour by time; used by the event loop's thread alone."""
 
     def __init__(self) -> None:
         self._kept = (_Kept(FINE_S, FINE_HZ), _Kept(COARSE_S, COARSE_HZ))
 
     def note(self, time_s: float, event: bytes) -> None:
-        """Keep the event (JSON) of `time_s` (Unix, s) where one is due."""
+        """Keep the event (JSON) of `time_s` (Unix, s) if one is due."""
         due = [kept for kept in self._kept if kept.cadence.is_due(time_s)]
         if due:
             deflated = zlib.compress(event, _LEVEL)
@@ -55,11 +55,11 @@ class Moments:
                 kept.note(time_s, deflated)
 
     def nearest(self, time_s: float) -> bytes | None:
-        """The event that is nearest to `time_s`, as it was noted; None before the first."""
+        """The stored event nearest to `time_s`; None before the first."""
         moments = [moment for moment in (kept.nearest(time_s) for kept in self._kept) if moment is not None]
         return zlib.decompress(min(moments, key=lambda moment: abs(moment[0] - time_s))[1]) if moments else None
 
     @property
     def size_bytes(self) -> int:
-        """Of all that is kept."""
+        """Size of all stored events."""
         return sum(len(event) for kept in self._kept for event in kept.events)

@@ -1,4 +1,4 @@
-"""How often each gauge has failed, in all and in the last hour, from the counts in STATUS."""
+"""Faults of each gauge in all and in the last hour, from the counts in STATUS."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any
 Message = Mapping[str, Any]
 
 HOUR_S = 3600.0
-# Counts are kept so often, s: the hour is as long as it says within this.
+# Interval (s) of stored counts, and thus the accuracy of the hour.
 KEPT_EVERY_S = 60.0
 
 
 class FaultCounts:
-    """Counts of one daemon, as long as the page has seen them; begun anew when a count has fallen, at another start."""
+    """Counts of one daemon since the page has seen them; reset when a count falls, which shows a new start."""
 
     def __init__(self) -> None:
         self._kept: deque[tuple[float, dict[str, int]]] = deque(maxlen=round(HOUR_S / KEPT_EVERY_S) + 1)
         self._newest: dict[str, int] = {}
 
     def note(self, time_s: float, status: Message) -> None:
-        """Take the counts of a STATUS that came at `time_s` (Unix, s)."""
+        """Take the counts of a STATUS received at `time_s` (Unix, s)."""
         lines = status["lines"].values()
         counts = {name: sum(gauge["faults"].values()) for line in lines for name, gauge in line["gauges"].items()}
         if any(counts.get(name, 0) < count for name, count in self._newest.items()):

@@ -1,4 +1,4 @@
-"""Who may use the page: a token opens it, a cookie keeps it open, and a request from another site is refused.
+"""Access to the page: a token opens it, a cookie keeps it open, requests from other sites are refused.
 
 On this computer the token is made anew at every start and stands in the address that `compd page` prints. For other
 computers tokens are kept in a file, each with a name and a role, as SHA-256. A foreign site cannot use the browser of a
@@ -31,23 +31,24 @@ from compd.page.wrong_tokens import WrongTokens
 
 Role = Literal["view", "operate"]
 
-# Followed by the port: a browser sends a cookie to every port of a host.
+# The port follows: a browser sends a cookie to every port of a host.
 COOKIE = "compd_page_"
-# Everything comes from this server; styles of elements are set by scripts through the DOM, which this allows. An answer
-# that brings a policy of its own keeps it.
+# Everything comes from this server; scripts may set styles of elements through the DOM. An answer with a policy of its
+# own keeps it.
 CONTENT_SECURITY_POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
 _HEADERS = {
     "Content-Security-Policy": CONTENT_SECURITY_POLICY,
     "X-Content-Type-Options": "nosniff",
-    # "no-referrer" would take the origin from a form that is sent without a script
+    # "no-referrer" would remove the origin from a form submitted without a script
     "Referrer-Policy": "same-origin",
     "Cache-Control": "no-store",
-    # Another port of this computer is another origin: its pages load nothing from here, and have no hold of a window.
+    # Another port of this computer is another origin: its pages may neither load from here nor keep a handle of a
+    # window.
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
 }
 LEAVE_PATH = "/leave"
-# Browsers send some twenty.
+# Most headers of a request; browsers send some twenty.
 MOST_HEADERS = 64
 _OWN_PATH = re.compile(r"(/[A-Za-z0-9_.-]+)*/?")
 _NEEDS_TOKEN = "This page needs the address that `compd page` printed, with its token, or a token of your own."
@@ -55,7 +56,7 @@ _NEEDS_TOKEN = "This page needs the address that `compd page` printed, with its 
 
 @dataclass(frozen=True)
 class Token:
-    """A token as it is kept. name : of the person or screen that has it. sha256 : of the token, hexadecimal."""
+    """A stored token. name : of its person or screen. sha256 : of the token, hexadecimal."""
 
     name: str
     role: Role
@@ -68,12 +69,12 @@ def hashed(token: str) -> str:
 
 
 def new_token() -> str:
-    """A token that cannot be guessed."""
+    """A new random token."""
     return secrets.token_urlsafe(24)
 
 
 class Guard:
-    """ASGI middleware: lets through who has a token, and adds the headers that bind the browser to this server."""
+    """ASGI middleware: admits requests with a token, and adds the headers that bind the browser to this server."""
 
     def __init__(
         self, app: ASGIApp, tokens: Sequence[Token], origins: Sequence[str], port: int, clock: Clock | None = None
@@ -95,13 +96,13 @@ class Guard:
         try:
             refusal = self._foreign(request) or await self._of_token(request) or self._without_token(request)
             if refusal is not None:
-                refusal.headers["Connection"] = "close"  # what else comes on it is not read
+                refusal.headers["Connection"] = "close"  # further messages are ignored
             await (refusal or self._app)(scope, receive, _with_headers(send))
         except ClientDisconnect:
-            return  # in the middle of what it sent: there is nobody to answer
+            return  # it left while sending: an answer has no receiver
 
     def _foreign(self, connection: HTTPConnection) -> Response | None:
-        """Why a request is not of this server's own pages; None where it is."""
+        """Reason why a request is from another site; None for one of this server's own pages."""
         headers: Headers = connection.headers
         if len(headers) > MOST_HEADERS:
             return PlainTextResponse(f"a request has {MOST_HEADERS} headers at most", 431)
@@ -116,7 +117,7 @@ class Guard:
         return None
 
     async def _of_token(self, request: Request) -> Response | None:
-        """The answer to who shows a token, or lets it go; None for every other request."""
+        """The answer to a login or logout; None for every other request."""
         path, posts = request.url.path, request.method == "POST"
         if posts and path == LEAVE_PATH:
             response = RedirectResponse("/", 303)
@@ -141,7 +142,7 @@ class Guard:
         return response
 
     def _without_token(self, connection: HTTPConnection) -> Response | None:
-        """Why a request is not followed; None where it is. The scope then has the token's name and role."""
+        """Reason of a refusal; None for an accepted request, whose scope then has the token's name and role."""
         token = self._known(connection.cookies.get(self._cookie, ""))
         if token is None:
             looks = connection.scope["method"] in ("GET", "HEAD")
@@ -159,7 +160,7 @@ class Guard:
         return f"https://{connection.headers.get('host', '')}" in self._origins
 
     def _known(self, token_text: str) -> Token | None:
-        """The token of that text; each is compared in the same time."""
+        """The token of that text; each comparison takes the same time."""
         digest = hashed(token_text)
         known = [token for token in self._tokens if hmac.compare_digest(token.sha256, digest)]
         return known[0] if known else None
@@ -174,7 +175,7 @@ def _is_loaded_elsewhere(headers: Headers, looks: bool) -> bool:
 
 
 def _own_path(path: str) -> str:
-    """A path to which a browser is sent; "/" for what a browser might take for another server's address."""
+    """The path to redirect a browser to; "/" for one that a browser might take for another server's address."""
     return path if _OWN_PATH.fullmatch(path) else "/"
 
 

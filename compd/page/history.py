@@ -1,4 +1,4 @@
-"""The last hour of the machine, so that a page that opens now shows what has been."""
+"""The last hour of the machine, shown to a page that opens now."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from compd.setpoint_states import state_named
 
 Message = Mapping[str, Any]
 
-# One row a second of an hour, and ten of the last minute.
+# Rates (Hz) and durations (s): one row a second for an hour, ten for the last minute.
 COARSE_S, COARSE_HZ = 3600.0, 1.0
 FINE_S, FINE_HZ = 60.0, 10.0
-# In the place of a state's code.
+# Stands for a state's code.
 UNKNOWN_STATE = -1.0
 
 
@@ -34,11 +34,11 @@ class Ring:
         self._count = 0
 
     def is_due(self, time_s: float) -> bool:
-        """Whether a row is wanted at `time_s` (s)."""
+        """Whether a row is due at `time_s` (s)."""
         return self._cadence.is_due(time_s)
 
     def put(self, time_s: float, row: Sequence[float]) -> None:
-        """Put a row of `time_s` (s) in the place of the oldest."""
+        """Replace the oldest row by one of `time_s` (s)."""
         self._cadence.kept(time_s)
         place = self._count % len(self._times_s)
         self._times_s[place], self._rows[place] = time_s, row
@@ -52,7 +52,7 @@ class Ring:
 
 
 class History:
-    """Numbers of the last hour, by the names in `columns`.
+    """Numbers of the last hour by the names in `columns`.
 
     `state` is the state's code; every number is nan while the daemon was not there, and all but the state are while the
     setpoint was not valid.
@@ -69,7 +69,7 @@ class History:
         self._fine = Ring(FINE_S, FINE_HZ, len(self.columns))
 
     def note(self, time_s: float, setpoint: Message | None, budget: Message | None) -> None:
-        """Take a row at `time_s` (s) where one is due; `setpoint` is None while the daemon is not there."""
+        """Take a row at `time_s` (s) if one is due; `setpoint` is None while the daemon is unreachable."""
         due = [ring for ring in (self._coarse, self._fine) if ring.is_due(time_s)]
         if due:
             row = self._row(setpoint, budget)
@@ -95,14 +95,14 @@ class History:
 
 
 class Traces:
-    """What each wired channel showed, once a second of the last hour."""
+    """Values of each wired channel in the last hour, one a second."""
 
     def __init__(self, channels: int) -> None:
         # a length of 500 mm to a nanometre
         self._ring = Ring(COARSE_S, COARSE_HZ, channels, np.float64)
 
     def note(self, time_s: float, gauges: Sequence[Message]) -> None:
-        """Take the gauges of a live event at `time_s` (Unix, s); empty while the daemon is not there."""
+        """Take the gauges of a live event at `time_s` (Unix, s); empty while the daemon is unreachable."""
         if gauges and self._ring.is_due(time_s):
             self._ring.put(time_s, [gauge.get("value", math.nan) for gauge in gauges])
 

@@ -1,4 +1,4 @@
-"""HTTP over one connection, as uvicorn has it, within limits of time and size before and after a token is seen.
+"""HTTP over one connection by uvicorn, with limits of time and size before and after a token is shown.
 
 Each stage of a request has its time, however many bytes come meanwhile: the head, the body, the answer. A connection
 that has shown no token is closed at the end of it, and after its answer.
@@ -20,20 +20,20 @@ from uvicorn.server import ServerState
 
 from compd.page.connections import Connections
 
-# From a connection's begin, or from the end of an answer, to the end of the next request's head.
+# Time limit (s) for a request's head, from the connection's start or the end of the previous answer.
 HEAD_WITHIN_S = 5.0
-# A body, or reading an answer, without a token; and a body that nobody wants.
+# Time limit (s) for a body or an answer without a token, and for an ignored body.
 UNKNOWN_WITHIN_S = 5.0
-# A body with a token: an instrument's export over a slow wireless network.
+# Time limit (s) for a body with a token: an instrument's export over a slow wireless network.
 BODY_WITHIN_S = 600.0
-# What is still to be sent when the server has closed its end.
+# Time limit (s) for sending the rest after the server has closed its end.
 FLUSH_WITHIN_S = 60.0
-# Of a request's head.
+# Largest head (bytes) of a request.
 LARGEST_HEAD_BYTES = 16 * 1024
-# Connections that are taken in one turn of the event loop. It is much smaller than the number without a token that are
-# kept, so that a newcomer has had its turns to show one before so many others have come.
+# Connections accepted in one turn of the event loop: far fewer than are kept without a token, so that a new one has its
+# turns to show one before as many others arrive.
 ACCEPTED_AT_ONCE = 8
-# Connections that wait in the system meanwhile, listen(2).
+# Connections that wait in the system meanwhile: backlog of listen(2).
 WAITING = 1024
 _STATE_KEY = "connection"
 # struct linger of socket(7): on, 0 s.
@@ -41,7 +41,7 @@ _NO_LINGER = struct.pack("ii", 1, 0)
 
 
 class Stage(Enum):
-    """What a connection is waiting for."""
+    """Stage of a connection: the event that it waits for."""
 
     HEAD = auto()
     BODY = auto()
@@ -63,24 +63,24 @@ class LimitedProtocol(H11Protocol):
     ) -> None:
         super().__init__(config, server_state, {**app_state, _STATE_KEY: self}, _loop)
         self._all = all_connections
-        self._known = self._heard = False
+        self._known = self._received = False
         self._watched: tuple[object, ...] = ()
         self._deadline: asyncio.TimerHandle | None = None
 
     @staticmethod
     def of(scope: Scope) -> LimitedProtocol | None:
-        """The connection of a request; None where another server took it."""
+        """The connection of a request; None for one of another server."""
         connection: LimitedProtocol | None = scope.get("state", {}).get(_STATE_KEY)
         return connection
 
     def admit(self, name: str) -> bool:
-        """A request has shown the token of this name; False where there is no place for one more connection with it."""
+        """A request has shown the token of this name; False if its limit of connections is reached."""
         self._known = self._all.admit(self, name)
         self._watch()
         return self._known
 
     def note(self, what: str) -> None:
-        """Count in the log what a request did."""
+        """Count an event of a request in the log."""
         self._all.note(what)
 
     @property
@@ -89,38 +89,38 @@ class LimitedProtocol(H11Protocol):
         return self.cycle is None or self.cycle.response_complete
 
     def drop(self) -> None:
-        """Close the connection at once; what is still to be sent is lost, in the system's buffers, too."""
+        """Close the connection at once; unsent data is lost, including that in the system's buffers."""
         own = self.transport.get_extra_info("socket")
         if own.fileno() >= 0:
             own.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
         self.transport.abort()
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """As of asyncio.Protocol."""
+        """As asyncio.Protocol."""
         super().connection_made(transport)
         self._watch()
         self._all.came(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """As of asyncio.Protocol."""
+        """As asyncio.Protocol."""
         self._all.went(self)
         if self._deadline is not None:
             self._deadline.cancel()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """As of asyncio.Protocol."""
-        self._heard = True
+        """As asyncio.Protocol."""
+        self._received = True
         super().data_received(data)
         self._watch()
 
     def on_response_complete(self) -> None:
-        """The whole answer is on its way."""
+        """The whole answer has been handed over for sending."""
         super().on_response_complete()
         self._watch()
 
     def send_400_response(self, msg: str) -> None:
-        """What came is no HTTP, or its head is too large. Where an answer has begun, the connection just ends."""
+        """The received data is no HTTP, or its head is too large. The connection just ends if an answer has begun."""
         self._all.note("no_http")
         if self.idle and self.conn.our_state is h11.IDLE:
             super().send_400_response(msg)
@@ -135,7 +135,7 @@ class LimitedProtocol(H11Protocol):
         return Stage.HEAD if self.conn.their_state is h11.IDLE else Stage.ANSWER
 
     def _watch(self) -> None:
-        """Give a stage that has begun its time; bytes that come in a stage do not make it longer."""
+        """Start the time limit of a stage; bytes received in the stage do not extend it."""
         watched = (self._stage(), self._known, id(self.cycle))
         if watched == self._watched:
             return
@@ -154,9 +154,9 @@ class LimitedProtocol(H11Protocol):
 
     def _late(self) -> None:
         if self._known and self._stage() is Stage.HEAD:
-            self.transport.close()  # the end of an answer may still be on its way
+            self.transport.close()  # the end of an answer may still be in transit
             self._watch()
-        elif self._heard:
+        elif self._received:
             self._all.closed(self, "too_slow")
         else:
-            self.drop()  # browsers connect in advance, and may need it never
+            self.drop()  # browsers connect in advance, and may never use the connection

@@ -1,4 +1,4 @@
-"""The page's log of changes: who asked for what, and what came of it, one event for each request."""
+"""The page's log of changes: person, request and result, one event for each request."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from compd.page.requests import CHANGE, KEYS, asked_by, one_line
 
-# Of a request's JSON object, what tells its subject. The id of a connection is not among them: it is a secret.
+# Keys of a request's JSON object that name its subject. The id of a connection is excluded: it is a secret.
 _SUBJECT = (
     *("arm", "subject", "name", "burst_s", "stop", "kind", "effect", "recording", "export", "plan", "delete"),
     *("replace", "reason"),
@@ -23,7 +23,7 @@ _log = structlog.get_logger()
 
 
 class Logbook:
-    """ASGI middleware behind the guard: logs every request that asks for a change, followed or refused."""
+    """ASGI middleware behind the guard: logs every request for a change, accepted or refused."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -51,7 +51,7 @@ class Logbook:
 
 
 def _subject(scope: Scope) -> str:
-    """What the request is about, in one line."""
+    """The subject of the request in one line."""
     keys: Mapping[str, Any] = scope.get(KEYS, {})
     said = [f"{key} {keys[key]}" for key in _SUBJECT if keys.get(key) not in (None, "")]
     if isinstance(rows := keys.get("rows"), list):
@@ -64,7 +64,7 @@ def _subject(scope: Scope) -> str:
 
 
 def _refusal(status: int, body: bytes) -> str:
-    """Status and reason of a request that was not followed."""
+    """Status and reason of a refused request."""
     try:
         reason = json.loads(body)["reason"]
     except (ValueError, LookupError, TypeError):

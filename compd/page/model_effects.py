@@ -1,4 +1,4 @@
-"""By how much models move the tip: what the applied one takes out, and what the shadow would take out beyond it."""
+"""Tip displacement by models: the correction of the applied one, and the additional one of the shadow."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from compd.arrays import FloatArray
 Message = Mapping[str, Any]
 
 SPAN_S = 60.0
-# Gauges at joints and frame see these errors: they are corrected without a model of effects.
+# Sources measured by gauges at joints and frame: they are corrected without a model of effects.
 _WITHOUT_EFFECTS = ("joints", "frame")
 
 
 class ModelEffects:
-    """Root mean squares over the last minute, or since the models that run have changed.
+    """Root mean squares over the last minute, or since the running models changed.
 
     Every number is of models alone: live, no reference says where the tip is.
     """
@@ -29,13 +29,13 @@ class ModelEffects:
         self._rows: deque[tuple[float, FloatArray, FloatArray]] = deque()
 
     def note(self, budget: Message | None, models: Message | None) -> None:
-        """Take the newest BUDGET, once; `models`: the newest MODEL. None while the daemon is not there."""
+        """Take the newest BUDGET once; `models`: the newest MODEL. None while the daemon is unreachable."""
         if models != self._models:
             self._models = models
             self._rows.clear()
         elif budget is not None and budget is not self._last_budget and models is not None and "tip_um" in budget:
             self._put(budget)
-        # a budget that came before the change of models may be of those before
+        # a budget from before the change of models may describe the previous ones
         self._last_budget = budget
 
     def _put(self, budget: Message) -> None:
@@ -58,7 +58,7 @@ class ModelEffects:
 
 
 def _rms(rows_um: tuple[FloatArray, ...]) -> list[float] | None:
-    """Of each axis; None where no row has numbers."""
+    """Root mean square of each axis; None without numbers."""
     rows = np.array(rows_um)
     rows = rows[np.isfinite(rows).all(axis=1)]
     return np.sqrt(np.mean(rows**2, axis=0)).round(4).tolist() if len(rows) else None

@@ -1,4 +1,4 @@
-"""The model files that the page offers: those in one directory. What the daemon runs with is shown beside them.
+"""The model files in one directory, offered by the page together with the daemon's current models.
 
 A browser names one by its place in this list, and the page opens that file, where it is a regular file and no link. No
 path from a browser is opened, nor one that the daemon tells: what a model is called there, some client has said.
@@ -16,22 +16,22 @@ from compd.configuration import LARGEST_BYTES
 from compd.files import open_regular, read_descriptor
 from compd.page.recordings import is_own
 
-# As `compd effect add --model my.model.yaml` writes them; copies beside recordings end otherwise.
+# Suffix of files written by `compd effect add --model my.model.yaml`; copies beside recordings have another one.
 PATTERN = "*model.yaml"
-# More than anybody reads, and less than a directory that somebody filled.
+# Most files in the list: more than a person reads, and a limit for an overfull directory.
 MOST = 200
 
 Message = Mapping[str, Any]
 
 
 class ModelFiles:
-    """Those in `directory`, of the daemon's computer; None where the page was not told one."""
+    """Files in `directory` on the daemon's computer; None if the page has no such directory."""
 
     def __init__(self, directory: Path | None) -> None:
         self.directory = directory
 
     def listed(self, models: Message | None) -> list[dict[str, Any]]:
-        """Each as `name`, `changed`, `offered` and `runs`: "applied", "shadow", both, or nothing.
+        """Each file as `name`, `changed`, `offered` and `runs` ("applied", "shadow", both or neither).
 
         models : the message MODEL. What runs and is not in the directory is listed and not offered.
         """
@@ -51,7 +51,7 @@ class ModelFiles:
         ]
 
     def path_of(self, name: str) -> Path | None:
-        """The path of a name that is offered; None for anything else."""
+        """The path of an offered name; None for any other."""
         return next((path for path in self._in_directory() if path.name == name), None)
 
     def _in_directory(self) -> list[Path]:
@@ -61,12 +61,12 @@ class ModelFiles:
 
 
 def opened(path: Path) -> int:
-    """A descriptor of an offered file. Raises OSError, also where a link has taken the file's place."""
+    """A descriptor of an offered file. Raises OSError, also for a link in its place."""
     return open_regular(path, follow_link=False)
 
 
 def hash_of_file(path: Path) -> str:
-    """Hash of an offered file as the daemon tells it. Raises OSError."""
+    """Hash of an offered file, as in the daemon's messages. Raises OSError."""
     return hashlib.sha256(read_descriptor(opened(path), LARGEST_BYTES)).hexdigest()[:16]
 
 
@@ -81,7 +81,7 @@ def _runs(path: Path, models: Message | None) -> list[str]:
 
 
 def _changed(path: Path) -> str | None:
-    """None where the file is gone."""
+    """None if the file is gone."""
     try:
         return datetime.fromtimestamp(path.stat().st_mtime, UTC).isoformat(timespec="seconds")
     except OSError:

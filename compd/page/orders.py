@@ -1,4 +1,4 @@
-"""What a person may order from the page: what each order will do, in numbers, and doing it.
+"""Orders that a person may give from the page: their consequence in numbers, and their execution.
 
 An order is shown first: its consequence for this machine now, and the command line that does the same. It is done for
 a browser that is armed.
@@ -22,9 +22,9 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.model_files import ModelFiles, hash_of_file, opened
 from compd.units import UM_PER_MM
 
-# Reading a model file takes a second; an effect of a person's own may import what it likes.
+# Timeout (s) of an order; reading a model file takes a second, and an effect of one's own may import any library.
 _TIMEOUT_S = 30.0
-# Of a model, as the daemon tells it.
+# Length of a model's hash in the daemon's messages.
 _HASH = re.compile("[0-9a-f]{16}")
 _NO_HASH = "the model that runs as a shadow is adopted, and named by its hash"
 _NOT_OFFERED = "this is none of the model files in the list"
@@ -33,7 +33,7 @@ _NAME_IT = "choose one of them; another one is given on the command line"
 
 @dataclass(frozen=True)
 class Consequence:
-    """What an order will do. possible : whether it can be given now. text : in words and numbers. command : the same
+    """Consequence of an order. possible : whether it can be given now. text : in words and numbers. command : the same
     as a command line. subject : of the order that does exactly this; "" is that which was asked for."""
 
     possible: bool
@@ -43,7 +43,7 @@ class Consequence:
 
 
 class Orders:
-    """The orders by name: each has a consequence, and is done."""
+    """The orders by name, each with its consequence and its execution."""
 
     def __init__(self, link: DaemonLink, files: ModelFiles | None = None) -> None:
         self._link = link
@@ -67,13 +67,13 @@ class Orders:
         return name in self._calls
 
     def consequence(self, name: str, subject: str) -> Consequence:
-        """Of the order `name` for a gauge (`accept`) or a listed model file (`shadow`, `adopt`)."""
+        """Consequence of the order `name` for a gauge (`accept`) or a listed model file (`shadow`, `adopt`)."""
         if not self._link.connected:
             return Consequence(False, f"The daemon is not there: {self._link.reason}.", "")
         return self._consequences[name](subject)
 
     async def do(self, name: str, subject: str, by: str) -> Mapping[str, Any]:
-        """Give the order to the daemon; its answer.
+        """Give the order to the daemon; return its answer.
 
 
         subject : of `adopt` the hash of the shadow, as its consequence says it. by : for whom, for the daemon's log.
@@ -90,7 +90,7 @@ class Orders:
             return self._calls[name](client, subject)
 
     def _accept_gauges(self, client: Client, subject: str) -> Mapping[str, Any]:
-        """Raises DaemonError for those that are not believed after it either: the order is not done."""
+        """Raises DaemonError for gauges that stay distrusted: the order is not done."""
         answer = client.accept(subject)
         if refused := answer.get("not_believed"):
             raise DaemonError(
@@ -112,7 +112,7 @@ class Orders:
             os.close(descriptor)
 
     def _path(self, subject: str) -> Path:
-        """Of an offered model file. Raises DaemonError for any other name."""
+        """Path of an offered model file. Raises DaemonError for any other name."""
         if (path := self._files.path_of(subject)) is None:
             raise DaemonError(Problem(where="page", what=_NOT_OFFERED, value=subject, next_step=_NAME_IT))
         return path
@@ -172,7 +172,7 @@ class Orders:
         return Consequence(True, text, command, hash_)
 
     def _is_another(self, subject: str, file: str, hash_: str) -> str:
-        """Why `subject` is not the model that runs as a shadow, called `file`, with this hash; "" where it is.
+        """Reason why `subject` is not the shadow model, called `file`, with this hash; "" if it is.
 
         Only of the shadow it has been seen what it does.
         """

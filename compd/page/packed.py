@@ -1,4 +1,4 @@
-"""Arrays on their way to a browser: a line of JSON, then the numbers as they lie in memory."""
+"""Binary arrays for a browser: a line of JSON, then the raw numbers."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from typing import TextIO
 
 import segno
 
-# Light modules around the code, ISO/IEC 18004.
+# Width of the quiet zone around the code, in modules (ISO/IEC 18004).
 _BORDER = 4
 _SCALE = 4
 
@@ -18,7 +18,7 @@ def print_qr_code(text: str, out: TextIO) -> None:
 
 
 def svg_qr_code(text: str) -> bytes:
-    """It as an SVG document, dark on white whatever is behind it."""
+    """The code as an SVG document, dark on white on any background."""
     out = io.BytesIO()
     segno.make_qr(text).save(out, kind="svg", scale=_SCALE, border=_BORDER, light="#fff", dark="#000", title="QR code")
     return out.getvalue()

@@ -1,4 +1,4 @@
-"""By which configuration a recording is read: the page's own, where it is of the recording's machine."""
+"""The configuration for reading a recording: the page's own if it describes the recording's machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from compd.recording import read_sidecar
 
 
 def machine_of(recording: Path, machine: Path | None) -> Path | None:
-    """`machine` where the recording is of it; None for the shipped one that the recording names."""
+    """`machine` if the recording is of it; None for the shipped one that the recording names."""
     if machine is None:
         return None
     sidecar = read_sidecar(recording.with_suffix(".yaml"), [])

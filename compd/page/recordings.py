@@ -1,4 +1,4 @@
-"""Recordings of this machine: those in a directory, and `compd record` started and ended from the page."""
+"""Recordings of this machine: the files in a directory, and `compd record` controlled from the page."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from compd.live.record import CYCLES_SUFFIX, MODEL_MARK
 from compd.recording import ARROW
 from compd.table_file import SUFFIXES
 
-# Of a recording: letters and digits, so that it is a file's name on every system and never a path.
+# Name of a recording: letters and digits, a valid file name on every system, never a path.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
-# What belongs to a recording, and is downloaded with its table, beside `CYCLES_SUFFIX` and copies of models.
+# Further files of a recording, downloaded with its table besides `CYCLES_SUFFIX` and copies of models.
 SIDECAR = ".yaml"
 _END_WITHIN_S = 10.0
 _PIECE_BYTES = 1 << 16
@@ -29,7 +29,7 @@ _PIECE_BYTES = 1 << 16
 
 @dataclass
 class Running:
-    """A `compd record` that runs. started_s : Unix time."""
+    """A running `compd record`. started_s : Unix time."""
 
     name: str
     command: str
@@ -38,14 +38,14 @@ class Running:
 
 
 class Recordings:
-    """Those in `directory`; used by the event loop's thread alone."""
+    """The recordings in `directory`; used by the event loop's thread alone."""
 
     def __init__(self, directory: Path, socket: str) -> None:
         self.directory = directory
         self._socket = socket
         self.running: Running | None = None
         self.last_words = ""
-        self._starting = asyncio.Lock()  # two browsers may ask at once
+        self._starting = asyncio.Lock()  # two browsers may start one at once
 
     def listed(self) -> list[dict[str, Any]]:
         """Every part of every recording, the newest first."""
@@ -53,7 +53,7 @@ class Recordings:
         for path in recording_tables(self.directory).values():
             try:
                 stat = path.stat()
-            except FileNotFoundError:  # somebody has just removed it
+            except FileNotFoundError:  # removed meanwhile
                 continue
             parts.append(
                 {
@@ -72,7 +72,7 @@ class Recordings:
         return words if burst_s is None else [*words, "--burst", f"{burst_s:g}"]
 
     async def start(self, name: str, burst_s: float | None) -> str:
-        """Record; why not, or "" where it has begun."""
+        """Start recording; return the reason of a failure, or ""."""
         if not NAME.fullmatch(name):
             return "a name has letters, digits, - and _, at most 64 of them"
         async with self._starting:
@@ -87,7 +87,7 @@ class Recordings:
         words = self.command(name, burst_s)
         process = await asyncio.create_subprocess_exec(
             sys.executable,
-            "-P",  # nothing is imported from the working directory
+            "-P",  # keeps the working directory out of the import path
             "-m",
             *words,
             stdin=asyncio.subprocess.DEVNULL,
@@ -100,14 +100,14 @@ class Recordings:
         return ""
 
     async def stop(self) -> None:
-        """End the recording, as Ctrl-C does, and wait until its files are whole."""
+        """End the recording as Ctrl-C does, and wait until its files are complete."""
         if (running := self.running) is not None:
             running.process.send_signal(signal.SIGINT)
             async with asyncio.timeout(_END_WITHIN_S):
                 await self._watching
 
     def archive(self, name: str) -> Iterator[bytes] | None:
-        """A part with its sidecar and what a replay needs, as pieces of a zip file; None where there is no such part.
+        """A part with its sidecar and the files of a replay, as pieces of a zip file; None for an unknown part.
 
         It is made in a temporary file: a recording may be larger than the memory.
         """
@@ -129,7 +129,7 @@ class Recordings:
 
 
 def recording_tables(directory: Path) -> dict[str, Path]:
-    """Name -> table of every recording in the directory; where there are CSV and Parquet of one name, CSV."""
+    """Name -> table of every recording in the directory; CSV takes precedence over Parquet of the same name."""
     paths = [path for suffix in reversed(SUFFIXES) for path in directory.glob(f"*{suffix}") if is_own(path)]
     return {path.stem: path for path in paths}
 
@@ -145,5 +145,5 @@ def _zipped(paths: Sequence[Path]) -> Iterator[bytes]:
 
 
 def is_own(path: Path) -> bool:
-    """Whether it is a file of the directory itself: a link leads anywhere."""
+    """Whether it is a regular file of the directory, since a link may lead anywhere."""
     return path.is_file() and not path.is_symlink()

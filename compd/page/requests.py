@@ -1,4 +1,4 @@
-"""What requests to the page have in common: a JSON object as the body, who asks, what is logged, and the answers."""
+"""Common parts of requests to the page: the JSON body, the person, the log and the answers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from compd.text import nan_to_null
 LONGEST_BODY_BYTES = 8192
 LOOKS_ONLY = "this browser may look only"
 LONGEST_LINE = 200
-# Of a person's name in a line, so that role and address follow it.
+# Most characters of a person's name in a log line, which leaves room for role and address.
 _LONGEST_NAME = 100
 # Keys of a request's scope: its JSON object, and whether it asks for a change, which is logged.
 KEYS, CHANGE = "keys", "change"
@@ -40,18 +40,18 @@ async def keys_of(request: Request, longest_bytes: int = LONGEST_BODY_BYTES) -> 
 
 
 def note_change(request: Request) -> None:
-    """Have the page's log tell who made this request, and what came of it: it asks for a change, allowed or not."""
+    """Mark a request as one for a change, allowed or not: the page's log has its person and its result."""
     request.scope[CHANGE] = True
 
 
 def may_change(request: Request) -> bool:
-    """Whether the browser's token allows to write files; the page's log tells of the request, see `note_change`."""
+    """Whether the browser's token may write files; the request is logged, see `note_change`."""
     note_change(request)
     return bool(request.scope["token"].role == "operate")
 
 
 def asked_by(scope: Scope) -> str:
-    """For whom a request is made, in one line: "anna (operate) from 10.0.0.5"."""
+    """The person behind a request in one line: "anna (operate) from 10.0.0.5"."""
     token, client = scope["token"], scope.get("client")
     return one_line(f"{token.name[:_LONGEST_NAME]} ({token.role}) from {client[0] if client else 'an unknown address'}")
 
@@ -62,12 +62,12 @@ def one_line(text: str) -> str:
 
 
 def answer(data: Any) -> Response:
-    """Plain data as JSON: null for what is not finite, and in ASCII, as what a person typed need not be encodable."""
+    """Plain data as ASCII JSON, since typed text may not be encodable; null for non-finite numbers."""
     return Response(json.dumps(nan_to_null(data)), media_type="application/json")
 
 
 def refused(reason: str, code: int, value: str = "") -> Response:
-    """Why a request is not followed, with the status `code`."""
+    """The answer to a refused request: the reason, with the status `code`."""
     response = answer({"reason": reason, "value": value})
     response.status_code = code
     return response

@@ -21,7 +21,7 @@ from compd.page.limited_protocol import ACCEPTED_AT_ONCE, LARGEST_HEAD_BYTES, WA
 from compd.page.recordings import Recordings
 from compd.page.server import Server
 
-# Bytes that the system keeps for a browser that does not read: a few seconds of events, and no minute of old ones.
+# Bytes that the system buffers for a browser that does not read: a few seconds of events.
 SEND_BUFFER_BYTES = 32 * 1024
 LOOPBACK_NAMES = ("127.0.0.1", "localhost")
 _HTTP_PORT = 80
@@ -58,13 +58,13 @@ def run_page(
     guarded = Guard(server.app(), tokens, origins, port)
     log = CountedLog()
     config = limited_config(guarded, Connections(ConnectionLimits.for_descriptors(raised_descriptor_limit()), log))
-    config.proxy_headers = behind is not None  # nobody else says for whom a request is made
+    config.proxy_headers = behind is not None  # no proxy names the client of a request
     started(origins[0])
     _Uvicorn(config, server.end, log).run(sockets=[listener])
 
 
 def limited_config(app: Guard, connections: Connections) -> uvicorn.Config:
-    """Of a server with these connections. It logs errors only: anybody can send what is no HTTP."""
+    """Settings of a server with these connections. It logs errors only: any host can send data that is no HTTP."""
     return uvicorn.Config(
         app,
         loop="asyncio",
@@ -82,7 +82,7 @@ def limited_config(app: Guard, connections: Connections) -> uvicorn.Config:
 
 
 def origin(host: str, port: int) -> str:
-    """As a browser writes it (RFC 6454, section 6.1): IPv6 in brackets, without the port that goes without saying."""
+    """Origin as a browser writes it (RFC 6454, section 6.1): IPv6 in brackets, without the default port."""
     name = f"[{host}]" if ":" in host else host
     return f"http://{name}" + (f":{port}" if port != _HTTP_PORT else "")
 
@@ -100,17 +100,17 @@ class _Uvicorn(uvicorn.Server):
         asyncio.get_running_loop().set_exception_handler(self._loop_failed)
         await super().startup(sockets)
         for listener in sockets or []:
-            listener.listen(WAITING)  # asyncio has one number for those who wait, and those who are taken at once
+            listener.listen(WAITING)  # asyncio has one number for waiting connections and for those accepted at once
 
     def _loop_failed(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Something in the event loop failed. asyncio tries again where no connection could be taken."""
+        """Handle an error in the event loop. asyncio tries again if no connection could be accepted."""
         if "accept" in context.get("message", "") and isinstance(context.get("exception"), OSError):
             self._log.note("not_accepted")
         else:
             loop.default_exception_handler(context)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """At SIGTERM or SIGINT."""
+        """Handle SIGTERM or SIGINT."""
         self._end()
         super().handle_exit(sig, frame)
 

@@ -1,4 +1,4 @@
-"""What the page draws of the machine: points in {M}, and how far the errors have moved them."""
+"""Geometry for the page's picture of the machine: points in {M} and their displacements by errors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Message = Mapping[str, Any]
 
 
 def scene(machine: Message, setpoint: Message, budget: Message | None) -> dict[str, Any] | None:
-    """Points of the machine in {M}, mm, and displacements, um; None while the setpoint or the budget has none.
+    """Points of the machine in {M} (mm) and displacements (um); None if the setpoint or the budget lacks them.
 
     The ghost is the machine as the scales alone have it: its supports where they were at machine zero, its tip where it
     was taken for. Displacements go from the ghost to the machine.
@@ -30,5 +30,5 @@ def scene(machine: Message, setpoint: Message, budget: Message | None) -> dict[s
 
 
 def moved_um(budget: Message) -> list[float]:
-    """What all causes together have moved the tip by, in x, y, z, um."""
+    """Displacement of the tip by all causes together in x, y, z (um)."""
     return [sum(axis) for axis in zip(*budget["tip_um"].values(), strict=True)]

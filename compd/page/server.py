@@ -1,4 +1,4 @@
-"""The routes of the page: static files, one stream of events to each browser, the last hour, orders and recordings."""
+"""Routes of the page: static files, one event stream for each browser, the last hour, orders and recordings."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ from compd.page.workbench.routes import WorkbenchRoutes
 from compd.page.workers.workers import Workers
 
 STATIC = Path(__file__).parent / "static"
-# At 1 kHz an hour is some gigabytes.
+# Longest burst (s): an hour at 1 kHz takes some gigabytes.
 LONGEST_BURST_S = 3600.0
-# Of the page's button.
+# Duration (s) of a burst by the page's button.
 BURST_S = 5.0
 _CANCEL_EVERY_S = 0.5
 
@@ -125,12 +125,12 @@ class Server:
         return Response(packed(self._broadcast.history), media_type="application/octet-stream")
 
     async def _moment(self, request: Request) -> Response:
-        """The event that is nearest to `unix_s`, as it was."""
+        """The stored event nearest to `unix_s`."""
         event = self._broadcast.moments.nearest(_unix_s(request))
         return refused("nothing is kept yet", 404) if event is None else Response(event, media_type="application/json")
 
     async def _traces(self, request: Request) -> Response:
-        """What the gauges showed in the minute before `unix_s`."""
+        """Values of the gauges in the minute before `unix_s`."""
         return JSONResponse(self._broadcast.traces.minute(_unix_s(request)))
 
     async def _arm(self, request: Request) -> Response:
@@ -209,7 +209,7 @@ class Server:
 
 
 def _unix_s(request: Request) -> float:
-    """Unix time, s, that a request names. Raises HTTPException (400) for anything else."""
+    """Unix time (s) of a request. Raises HTTPException (400) for anything else."""
     try:
         unix_s = float(request.query_params.get("unix_s", ""))
     except ValueError:

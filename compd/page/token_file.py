@@ -43,7 +43,7 @@ def read_tokens(path: Path) -> list[Token]:
         data, _ = parse_yaml(text, path, TOKENS, dumped=True)
         return _File.model_validate(data).tokens
     except ConfigurationError as error:
-        # of this file nothing is quoted, nor any key
+        # messages quote nothing of this file, not even a key
         line = error.problems[0].where.removeprefix(f"{path}").partition(" ")[0]
         raise _problem(f"{path}{line}", f"is not {TOKENS.name}", _MADE_BY) from None
     except ValidationError as error:
@@ -53,7 +53,7 @@ def read_tokens(path: Path) -> list[Token]:
 
 
 def add_token(path: Path, role_and_name: str) -> str:
-    """A new token, "view:NAME" or "operate:NAME", whose hash is then in the file; the token itself is nowhere else.
+    """A new token for "view:NAME" or "operate:NAME". Only its hash is stored in the file.
 
     Raises ConfigurationError for another role, or a name that has one already.
     """
@@ -69,7 +69,9 @@ def add_token(path: Path, role_and_name: str) -> str:
     beside = path.with_name(path.name + ".new")
     descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-        if os.geteuid() == 0 and path.exists():  # an administrator adds one: the page's user goes on reading the file
+        if (
+            os.geteuid() == 0 and path.exists()
+        ):  # an administrator adds one; the file stays readable for the page's user
             owner = path.stat()
             os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
         file.write(text)

@@ -9,24 +9,24 @@ from urllib.parse import parse_qs
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
-# Where it is sent.
+# Path of the form's target.
 FORM_PATH = "/token"
-# What it is made of; whoever asks has it, without a token.
+# Static files of the form, served without a token.
 FORM_FILES = ("/static/page.css", "/static/token.css", "/static/icon.svg")
-# A token has 32 characters.
+# Most bytes of the form; a token has 32 characters.
 LONGEST_FORM_BYTES = 512
 _PAGE = Path(__file__).parent / "static" / "token.html"
 _PROBLEM = "<!-- problem -->"
 
 
 def token_form(problem: str = "", status: int = 403) -> Response:
-    """The form. problem : why the token before was not taken."""
+    """The form. problem : reason why the previous token was refused."""
     said = f'<p id="problem" role="alert">{html.escape(problem)}</p>' if problem else ""
     return HTMLResponse(_PAGE.read_text(encoding="utf-8").replace(_PROBLEM, said), status)
 
 
 async def posted_token(request: Request) -> str | None:
-    """The token that the form brings; None where it is not that form, and it is not read further then.
+    """The token in the form; None for any other body, which is not read further.
 
     Raises ClientDisconnect where the browser goes meanwhile.
     """

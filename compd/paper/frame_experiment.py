@@ -1,4 +1,4 @@
-"""Equations (4) and (5): how far the instantaneous frame is from the exact one, by the size of the change.
+"""Equations (4) and (5): difference of the instantaneous from the exact frame, by the size of the change.
 
 The paper leaves the choice between the two open. Here both solve the same changes of the nine distances: random ones of
 growing size, and those of a simulated warm-up.
@@ -29,10 +29,10 @@ from compd.rotation import compose, rotation_matrix, to_outer
 from compd.simulation import Strengths, World
 from compd.units import UM_PER_MM
 
-# Largest of the nine changes, mm: from a hundredth, an ordinary day, to more than any frame survives.
+# Largest of the nine changes (mm): from a hundredth, an ordinary day, to more than any frame survives.
 SIZES_MM = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 DIRECTIONS = 500
-# Every ten minutes for ten hours after switch-on, as in figure 21.
+# Times of the warm-up: every ten minutes for ten hours after switch-on, as in figure 21.
 WARM_UP_HOURS, EVERY_S = 10.0, 600.0
 # Step of the central differences of the tip by each distance, mm.
 _STEP_MM = 1e-3
@@ -42,7 +42,7 @@ _CALLS, _TURNS = 1000, 15
 
 
 class Difference(NamedTuple):
-    """Instantaneous less exact frame, lengths of the differences; nan where there is no exact solution.
+    """Instantaneous less exact frame, lengths of the differences; nan without an exact solution.
 
     displacement_mm : (...), of the origin of {B}.  rotation_rad : (...), of {B}.
     tip_mm : (...), of the tip with links as long as at machine zero; with the tool on the plate of the touched place.
@@ -62,7 +62,7 @@ class Cost:
 
     @property
     def ratio(self) -> float:
-        """How many times as much the exact way costs."""
+        """Ratio of the costs, exact over instantaneous."""
         return self.exact_us / self.instantaneous_us
 
 
@@ -110,7 +110,7 @@ def run_frame_experiment(configuration: Configuration, seed: int) -> FrameResult
 
 
 def difference(model: MachineModel, changes_mm: FloatArray) -> Difference:
-    """How far the instantaneous frame is from the exact one, for changes (..., 9) of the distances."""
+    """Difference of the instantaneous from the exact frame, for changes (..., 9) of the distances."""
     geometry = model.frame
     exact = solve_frame(geometry, model.zero.distances_mm + changes_mm)
     instantaneous = instantaneous_frame(geometry, changes_mm)
@@ -128,13 +128,13 @@ def order(result: FrameResult) -> float:
 
 
 def crossing_mm(result: FrameResult) -> float:
-    """The change, mm, at which the tip's difference in the worst direction reaches the noise of the gauges."""
+    """Change (mm) at which the tip's difference in the worst direction reaches the noise of the gauges."""
     slope, intercept = _line(result)
     return float(np.exp((np.log(result.noise_um / UM_PER_MM) - intercept) / slope))
 
 
 def frame_noise_mm(configuration: Configuration) -> tuple[FloatArray, str]:
-    """Standard deviation (9,) of one reading of each frame gauge, mm, and whose it is, for people.
+    """Standard deviation (9,) of one reading of each frame gauge (mm), and its source in words.
 
     What the configuration, or a driver by its data sheet, states where it is known of all nine, else that of the
     simulated comparators.
@@ -160,7 +160,7 @@ def _line(result: FrameResult) -> tuple[float, float]:
 
 
 def _tip_mm(model: MachineModel, base_joints_M_mm: FloatArray) -> FloatArray:
-    """(..., 3) where the tip is with the base joints (..., n, 3) and the links of machine zero."""
+    """(..., 3) tip for base joints (..., n, 3) and the links of machine zero."""
     zero = model.zero
     pose = forward_kinematics(
         model.mechanism(base_joints_M_mm), zero.link_length_mm, zero.platform_origin_M_mm, zero.rotation_M_P

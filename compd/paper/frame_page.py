@@ -52,7 +52,7 @@ def title(result: FrameResult) -> str:
 
 
 def table_caption() -> str:
-    """What the cells of the table are."""
+    """Explanation of the table's cells."""
     return f"Instantaneous less exact: median and largest of {DIRECTIONS} directions; of the warm-up, over time."
 
 
@@ -67,7 +67,7 @@ def table_rows(result: FrameResult) -> list[tuple[str, ...]]:
 
 
 def sentences(result: FrameResult) -> list[str]:
-    """What the numbers mean, the most important first."""
+    """Conclusions from the numbers, the most important first."""
     return [_order_text(result), _crossing_text(result), _warm_up_text(result), _cost_text(result)]
 
 
@@ -215,7 +215,7 @@ def _cells(difference: Difference) -> list[str]:
 
 
 def _statistics(values: FloatArray, text: Callable[[float], str]) -> str:
-    """Median and largest of the values that are known."""
+    """Median and largest of the known values."""
     known = values[np.isfinite(values)]
     return f"{text(float(np.median(known)))}, {text(float(known.max()))}" if len(known) else "-"
 

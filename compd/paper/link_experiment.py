@@ -27,7 +27,7 @@ TUBE_UM_PER_N = 1 / 30.0
 # Loads on the tip along the link, N: up, down and back to zero, in steps of 10 N.
 LOADS_N = np.concatenate([np.linspace(0, 60, 7), np.linspace(50, -60, 12), np.linspace(-50, 0, 6)])
 LOAD_S = 10.0
-# A lamp beside the link, a few kelvin in two hours.
+# Heat (W) of a lamp beside the link: a few kelvin in two hours.
 LAMP_W = 4.0
 WARM_S, WARM_STEP_S = 7200.0, 240.0
 

@@ -16,7 +16,7 @@ from compd.report import COLOURS, Panel, style_figure
 from compd.simulation import TRACKER, World, ball_plate_mm, probe_ball
 from compd.units import UM_PER_MM
 
-# Time that a person takes per ball; rounds over the whole plate, there and back.
+# Time (s) that a person takes per ball, and rounds over the whole plate, there and back.
 PER_BALL_S = 30.0
 ROUNDS = 2
 

@@ -1,4 +1,4 @@
-"""Result of a reproduced experiment: errors without and with compensation beside what the paper states, and a page."""
+"""Result of a reproduced experiment: errors without and with compensation beside the paper's, and a page."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FOOTER = (
 
 @dataclass(frozen=True)
 class Reduction:
-    """An error without and with compensation, um, and what the paper states about it."""
+    """An error without and with compensation (um), and the paper's statement about it."""
 
     what: str
     without_um: float
@@ -64,7 +64,7 @@ class Reproduction:
         check_page_path(path)
         numbers = Panel(
             "In numbers",
-            "What was measured here, beside what the paper states.",
+            "The errors measured here beside the paper's statements.",
             PageTable(HEAD, [reduction.row for reduction in self.reductions]),
         )
         write_page(path, self.title, self.verdict, [*self.panels, numbers], _FOOTER)

@@ -43,7 +43,7 @@ class BallPlate(NamedTuple):
 
 
 def read_plate(path: Path, problems: list[Problem]) -> BallPlate | None:
-    """Read a plate's file: every cell filled, every ball once. None with something wrong, which goes to `problems`."""
+    """Read a plate's file: every cell filled, every ball once. Faults go to `problems`; None for a faulty file."""
     table_problems = ProblemList(path)
     table = read_table(path, table_problems, lambda cells: "ball" in cells or "x_mm" in cells)
     if table is not None:

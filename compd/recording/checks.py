@@ -1,4 +1,4 @@
-"""Checks of a recording's numbers: rules that they must keep, and limits beyond which a person should look.
+"""Checks of a recording's numbers: rules, and limits beyond which a person should look.
 
 A recording that breaks a rule is refused:
 
@@ -29,7 +29,7 @@ from compd.tables import ProblemList, Table, rows_text, values_text
 
 
 class Limit(NamedTuple):
-    """What values are plausible: outside, the unit is probably not what the column's name says. Not an error.
+    """Plausible values: outside them the unit probably differs from that in the column's name. No error.
 
     names : the columns as people write them. pattern : what matches their names.
     """
@@ -41,7 +41,7 @@ class Limit(NamedTuple):
     why: str
 
 
-# The first that matches a column's name counts.
+# The first match of a column's name counts.
 LIMITS: tuple[Limit, ...] = tuple(
     Limit(names, re.compile(pattern), low, high, why)
     for names, pattern, low, high, why in (
@@ -54,7 +54,7 @@ LIMITS: tuple[Limit, ...] = tuple(
             1000.0,
             "a comparator's range in um",
         ),
-        # room air outside this is not the room where a machine is measured, but may be degrees Fahrenheit
+        # air outside this range is unlikely in a measuring room; it may be in degrees Fahrenheit
         ("temperature_room_degC", r"temperature_room_degC", 0.0, 50.0, "degrees Celsius"),
         (
             "temperature of a part of the machine",
@@ -83,14 +83,14 @@ LIMITS: tuple[Limit, ...] = tuple(
         ),
     )
 )
-# Comparators of +-1 mm resolve 0.01 to 0.1 um; a whole set below that is probably in mm.
+# Least change (um) of a set of comparators: those of +-1 mm resolve 0.01 to 0.1 um, so that less is probably in mm.
 _SMALLEST_JOINT_UM = 0.05
-# Places that differ by more are different to every instrument that is a reference, mm.
+# Distance (mm) of places that every reference instrument tells apart.
 _PLACE_MM = 0.1
 
 
 def limit_of(name: str) -> Limit | None:
-    """What values of the column of this name are plausible; None where nothing is known."""
+    """Plausible values of the column of this name; None if unknown."""
     return next((limit for limit in LIMITS if limit.pattern.fullmatch(name)), None)
 
 
@@ -122,7 +122,7 @@ def check_values(table: Table, problems: ProblemList) -> None:
 
 
 class RowCount:
-    """How many rows have everything, counted block by block."""
+    """Count of complete rows, block by block."""
 
     def __init__(self) -> None:
         self.rows = 0
@@ -146,7 +146,7 @@ class RowCount:
         self._usable += int(usable.sum())
 
     def check(self, problems: ProblemList) -> None:
-        """At least two rows must have everything; otherwise say where they went."""
+        """Require two complete rows; else report the reasons for the missing ones."""
         if self.rows < 2:
             problems.add(
                 "",
@@ -232,7 +232,7 @@ def check_frozen_reference(table: Table, problems: ProblemList) -> None:
 
 
 def _reference_and_place(columns: Iterable[str]) -> list[tuple[list[str], list[str]]]:
-    """Columns of a reference, and those that say where the machine was by itself."""
+    """Columns of a reference, and those of the machine's own position."""
     names = list(columns)
     scales = [name for name in names if re.fullmatch(r"scale_\d+_mm", name)]
     axes = [axis for axis in "xyz" if f"reference_{axis}_mm" in names]
@@ -248,7 +248,7 @@ def _reference_and_place(columns: Iterable[str]) -> list[tuple[list[str], list[s
 
 
 def _different_places(where_mm: FloatArray) -> int:
-    """How many cells of a grid of `_PLACE_MM` these rows (N, d) are in; 1 where all are within one cell's width.
+    """Number of cells of a grid of `_PLACE_MM` with these rows (N, d); 1 if all are within one cell's width.
 
     Rows with an empty cell say nothing of where they are.
     """
@@ -259,7 +259,7 @@ def _different_places(where_mm: FloatArray) -> int:
 
 
 def _check_limits(table: Table, problems: ProblemList) -> None:
-    """Warn of values that are implausible for their unit; the values are used all the same."""
+    """Warn of values that are implausible for their unit; they are used nevertheless."""
     for name, values in table.columns.items():
         if (limit := limit_of(name)) is None:
             continue
@@ -278,13 +278,13 @@ def _check_limits(table: Table, problems: ProblemList) -> None:
 
 
 def largest_joint_um(table: Table) -> float:
-    """The largest number that a joint comparator shows; 0 where none shows any."""
+    """The largest number of a joint comparator; 0 without any."""
     joints = [values for name, values in table.columns.items() if re.fullmatch(r"joint_\d+_um", name)]
     return max((float(np.nanmax(np.abs(values))) for values in joints if not np.isnan(values).all()), default=0.0)
 
 
 def check_joint_unit(largest: float, problems: ProblemList) -> None:
-    """Warn where the joint comparators never move by what they can resolve. largest : of the whole recording, um."""
+    """Warn if the joint comparators never move by their resolution. largest : of the whole recording, um."""
     if 0 < largest < _SMALLEST_JOINT_UM:
         problems.warn(
             "columns joint_<k>_um",

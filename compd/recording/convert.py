@@ -22,9 +22,9 @@ from compd.recording.writer import write_recording_files
 from compd.table_file import CSV, PARQUET, SUFFIXES, row_count, table_blocks, table_path
 from compd.tables import FIRST_ROW, Table
 
-# Columns that may hold text in some recording; a reader knows in which.
+# Columns that may hold text; a reader knows whether they do.
 _ID_COLUMNS = ("point", "ball", "pin")
-# Rows that are text at the same time: a cell takes 60 bytes then.
+# Rows held as text at once: a cell takes 60 bytes then.
 _TEXT_ROWS = 4096
 
 
@@ -62,7 +62,7 @@ def convert_recording(
 
 
 def rows_to_convert(source: Path) -> int:
-    """How many rows `convert_recording` will write, about. Raises RecordingError for a file that cannot be read."""
+    """Approximate number of rows that `convert_recording` will write. Raises RecordingError for an unreadable file."""
     return OpenPart(source).row_count if source.suffix == ARROW else row_count(source)
 
 
@@ -103,7 +103,7 @@ def _problems(source: Path, sidecar: Path, destination: Path, overwrite: bool) -
 
 
 def _parquet(source: Path, destination: Path, rows: _RowsWritten) -> Content:
-    """What writes the source as Parquet."""
+    """The writer of the source as Parquet."""
     if source.suffix == ARROW:
         part = OpenPart(source)
         return lambda file: write_parquet(file, destination, part.schema, _counted(part.batches(), rows))
@@ -120,7 +120,7 @@ def _parquet(source: Path, destination: Path, rows: _RowsWritten) -> Content:
 
 
 def _csv(source: Path, rows: _RowsWritten) -> Content:
-    """What writes the source as CSV."""
+    """The writer of the source as CSV."""
 
     def write(file: BinaryIO) -> None:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="")
@@ -132,7 +132,7 @@ def _csv(source: Path, rows: _RowsWritten) -> Content:
                 rows_as_text = slice(begin, begin + _TEXT_ROWS)
                 writer.writerows(zip(*(_cells(block, name, rows_as_text) for name in block.columns), strict=True))
             rows.add(len(block.row))
-        text.detach()  # flushed, and left open for whoever opened it
+        text.detach()  # flushed, and left open for its opener
 
     return write
 

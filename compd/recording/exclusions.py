@@ -1,4 +1,4 @@
-"""Rows that a person leaves out of a recording, written into its sidecar; all else in the file stays as it is."""
+"""Rows that a person leaves out of a recording, written into its sidecar; the rest of the file stays unchanged."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def exclude_rows(recording: Path, rows: Collection[int], reason: str) -> None:
 
 
 def include_rows(recording: Path, rows: Collection[int]) -> None:
-    """Let rows count again that a person left out; others are not touched.
+    """Let rows that a person left out count again; others stay unchanged.
 
     Raises RecordingError where the sidecar cannot be used.
     """
@@ -134,7 +134,7 @@ def _stretches(rows: Collection[int]) -> list[tuple[int, int]]:
 
 
 def _write(recording: Path, document: CommentedMap, before: str) -> None:
-    """Write the sidecar; as it was where it could not be read afterwards."""
+    """Write the sidecar; restore it if it cannot be read afterwards."""
     path = recording.with_suffix(".yaml")
     text = io.StringIO()
     _yaml().dump(document, text)

@@ -1,4 +1,4 @@
-"""The layout of a recording: which columns it has and which it must have, from their names alone."""
+"""The layout of a recording: its columns and the required ones, from their names alone."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _IN_REFERENCE_UNIT = re.compile(r"(?:reference|model)_(?:[xyz]|link_[1-9]\d*)")
 
 @dataclass(frozen=True)
 class Layout:
-    """Which columns a recording has.
+    """The columns of a recording.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Layout:
 
     @property
     def reference(self) -> tuple[str, ...]:
-        """What follows "reference_", and "model_", in the columns' names: x_mm, rx_rad, link_1_mm."""
+        """Endings after "reference_" and "model_" in the columns' names: x_mm, rx_rad, link_1_mm."""
         return (
             *(f"{axis}_{self.ending}" for axis in self.axes),
             *(f"{axis}_rad" for axis in ATTITUDES if self.attitude),
@@ -81,7 +81,7 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
     approaches = _count(names, "approach", "", external, problems)
     frame = [name for name in FRAME_COLUMNS if name in names]
     if external:
-        # of gauges whose machine is not known nothing can be computed: each is a quantity like any other
+        # without a known machine every gauge is a quantity like any other
         scales, joints, frame = 0, 0, []
     quantity = sidecar.reference.quantity if sidecar and sidecar.reference else None
     if not external:
@@ -113,7 +113,7 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
 
 
 def machine_problems(machine: str, counts: tuple[int, int], configuration: Configuration, where: str) -> list[Problem]:
-    """What contradicts `configuration`: the machine's name, the number of scales, of joint comparators.
+    """Contradictions to `configuration`: the machine's name, the numbers of scales and of joint comparators.
 
     counts : (scales, joint comparators). where : the sidecar, for messages.
     """
@@ -155,7 +155,7 @@ def _numbers(names: Iterable[str], stem: str, unit: str) -> list[int]:
 
 
 def _count(names: Sequence[str], stem: str, unit: str, external: bool, problems: ProblemList) -> int:
-    """How many columns <stem>_1 ... <stem>_n there are; gaps are reported as missing columns.
+    """Number of columns <stem>_1 ... <stem>_n; gaps are reported as missing columns.
 
     An external model needs none of them: with gaps the whole group counts as covariates, and the result is 0.
     """
@@ -169,7 +169,7 @@ def _count(names: Sequence[str], stem: str, unit: str, external: bool, problems:
 
 
 def _names_in_unit(names: Sequence[str], sidecar: Sidecar, problems: ProblemList) -> list[str]:
-    """The names, those of reference and model in the sidecar's unit; it is a problem where they are in another one."""
+    """The names, with reference and model in the sidecar's unit; another unit is a problem."""
     ending = REFERENCE_UNITS[sidecar.unit]
     right = {name: name for name in names}
     for unit, other in REFERENCE_UNITS.items():
@@ -246,7 +246,7 @@ def _check_reference(
 
 
 def _check_distance(names: Sequence[str], radius_mm: float | None, problems: ProblemList) -> None:
-    """The distance is in the column or, the same in every row, in the sidecar; in one of the two."""
+    """Check that the distance is either in the column or, equal in every row, in the sidecar."""
     if radius_mm is None and DISTANCE_COLUMN not in names:
         _add_missing([DISTANCE_COLUMN], names, problems)
     elif radius_mm is not None and DISTANCE_COLUMN in names:
@@ -283,7 +283,7 @@ def _check_model(names: Sequence[str], external: bool, layout: Layout, problems:
 
 
 def _check_folds(names: Sequence[str], sidecar: Sidecar, problems: ProblemList) -> None:
-    """Check that every column of `folds:` is there, and is none of the reference or the model."""
+    """Check that every column of `folds:` exists, and belongs to neither reference nor model."""
     columns = [name for name in names if name != "time_s" and not name.startswith(("reference_", "model_"))]
     unknown = [name for name in sidecar.folds if name not in (TIME, PLACE, *columns)]
     if unknown:

@@ -1,4 +1,4 @@
-"""Merging several recordings of one machine into one: what was measured first, and what was measured next."""
+"""Merging several recordings of one machine into one, in the order of measurement."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from compd.recording.reference import sigma_key
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 
-# Assumed between two recordings where their sidecars do not say when they began.
+# Assumed interval of two recordings whose sidecars lack the start.
 ASSUMED_GAP_S = 3600.0
-# A ball's number means the same in every recording; the other ids are counted by each recording for itself.
+# Ids that every recording counts for itself; a ball's number means the same in every recording.
 _RENUMBERED = tuple(name for name in ID_COLUMNS if name != "ball")
 
 
@@ -62,7 +62,7 @@ def merge_recordings(recordings: Sequence[Recording], path: Path, overwrite: boo
 
 
 def _problems(recordings: Sequence[Recording]) -> list[Problem]:
-    """Everything in which the recordings do not fit together."""
+    """All contradictions between the recordings."""
     first, *others = recordings
     problems = [
         Problem(
@@ -114,7 +114,7 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
 
 
 def _fitted_anew(recording: Recording) -> str:
-    """What of the reference every recording has of its own, with its verb."""
+    """Parts of the reference that are specific to a recording, with their verb."""
     assert recording.reference is not None
     if recording.reference.of_fixed_places:
         return f"the places of the {'pins' if recording.reference.quantity == 'fixed_point' else 'fixed balls'} are"
@@ -141,12 +141,12 @@ def _at_zero_text(recording: Recording) -> str:
 
 
 def _zero_time(recording: Recording) -> str:
-    """When machine zero was taken; "" where the sidecar does not say."""
+    """Time at which machine zero was taken; "" if the sidecar lacks it."""
     return str(recording.sidecar.provenance.get("zero_taken_at", ""))
 
 
 def _start_times_s(recordings: Sequence[Recording]) -> tuple[list[float], bool]:
-    """Merged time at which each recording begins, and whether that is from the sidecars.
+    """Merged time of each recording's start, and whether it is from the sidecars.
 
     It is not where a sidecar does not say when its recording began, or where one began before the one before it ended.
     """
@@ -168,7 +168,7 @@ def _start_times_s(recordings: Sequence[Recording]) -> tuple[list[float], bool]:
 
 
 def _calendar_time_s(recording: Recording) -> float | None:
-    """Seconds of the calendar at which the recording began; None where its sidecar does not say."""
+    """Calendar time (s) of the recording's start; None if its sidecar lacks it."""
     try:
         return datetime.fromisoformat(str(recording.sidecar.provenance.get("started_at"))).timestamp()
     except ValueError:
@@ -176,12 +176,12 @@ def _calendar_time_s(recording: Recording) -> float | None:
 
 
 def _column(recording: Recording, name: str) -> FloatArray:
-    """(N,) the column as in the file; nan where the recording does not have it."""
+    """(N,) the column as in the file; nan if the recording lacks it."""
     return recording.columns.get(name, np.full(recording.rows, np.nan))
 
 
 def _ids(recording: Recording, name: str) -> FloatArray:
-    """(N,) ids, nan where there is none; a recording without sessions is one session beside those of others."""
+    """(N,) ids, nan for none; a recording without sessions is one session beside those of others."""
     if name == "session" and name not in recording.columns:
         return np.zeros(recording.rows)
     return _column(recording, name)
@@ -203,7 +203,7 @@ def _renumber(ids_by_recording: Sequence[FloatArray]) -> FloatArray:
 
 
 def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict[str, Any]:
-    """The merged recording's sidecar: the common reference, excluded rows renumbered, and where every row is from."""
+    """The merged recording's sidecar: the common reference, excluded rows renumbered, and the origin of every row."""
     reference = recordings[0].reference
     reference_contents: dict[str, Any] | None = None
     if reference is not None:

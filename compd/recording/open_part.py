@@ -1,4 +1,4 @@
-"""The open part of a recording as Parquet: NAME.arrow, an Arrow stream that can be read to its last whole batch.
+"""The open part of a recording as Parquet: NAME.arrow, an Arrow stream readable to its last whole batch.
 
 Parquet has its table of contents at the end, so that a file without it cannot be read. Rows that come one by one are
 therefore appended to a stream, and made into Parquet when the part is closed.
@@ -22,7 +22,7 @@ class OpenPartFormat:
     """The bytes of an open part: `head`, then those of one batch of rows after the other."""
 
     def __init__(self, path: Path, names: Sequence[str]) -> None:
-        """path : NAME.arrow. names : of its columns. Raises RecordingError where pyarrow is not installed."""
+        """path : NAME.arrow. names : of its columns. Raises RecordingError if pyarrow is not installed."""
         self._path = path
         self._schema = arrow_schema(path, names)
         self.head = bytes(self._schema.serialize())
@@ -33,17 +33,17 @@ class OpenPartFormat:
 
 
 class OpenPart:
-    """NAME.arrow as it was left: its batches up to the last whole one."""
+    """An interrupted NAME.arrow: its batches up to the last whole one."""
 
     def __init__(self, path: Path) -> None:
-        """Raises RecordingError where pyarrow is not installed, and for a file that cannot be read or is no stream."""
+        """Raises RecordingError if pyarrow is not installed, and for a file that is unreadable or no stream."""
         self._path = path
         self._arrow, _ = arrow_modules(path)
         with self._file() as file:
             self.schema = self._reader(file).schema
 
     def batches(self) -> Iterator[Any]:
-        """The record batches. What a kill has left of the last one is left out."""
+        """The record batches, without an incomplete last one."""
         with self._file() as file:
             reader = self._reader(file)
             while True:

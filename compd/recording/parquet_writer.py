@@ -13,7 +13,7 @@ from compd.recording.sidecar import FORMAT
 from compd.tables import arrow_modules
 from compd.units import unit_of
 
-# Small enough for the memory of whoever reads it in blocks, and large enough to be compressed well.
+# Rows of a row group: few enough for readers in blocks, enough for good compression.
 ROW_GROUP_ROWS = 100_000
 # name -> (N,) numbers, nan or None where nothing was measured, or texts, None where there is none.
 Block = Mapping[str, ArrayLike | Sequence[float | str | None]]

@@ -28,7 +28,7 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
 
 
 def check_against(recording: Recording, configuration: Configuration) -> None:
-    """Raise RecordingError where the recording is of another machine: its name, or its number of gauges."""
+    """Raise RecordingError if the recording is of another machine, by its name or its number of gauges."""
     scales = 0 if recording.scale_mm is None else recording.scale_mm.shape[1]
     joints = 0 if recording.joint_mm is None else recording.joint_mm.shape[1]
     if problems := machine_problems(recording.machine, (scales, joints), configuration, str(recording.sidecar.path)):

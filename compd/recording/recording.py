@@ -23,7 +23,7 @@ BLOCKS = 8
 
 
 class UsableRows(NamedTuple):
-    """Rows that have what is needed.
+    """Complete rows.
 
     mask : (N,) bool.
     left_out : reason -> rows; each row counts once, under the first reason that applies.
@@ -115,12 +115,12 @@ class Recording:
 
     @property
     def reference(self) -> Reference | None:
-        """What the reference is; None for gauges alone."""
+        """The reference; None for gauges alone."""
         return self.sidecar.reference
 
     @property
     def unit(self) -> str:
-        """The unit in which people read the reference and its errors: "um", or what the sidecar names."""
+        """Display unit of the reference and its errors: "um", or that of the sidecar."""
         return self.sidecar.unit
 
     @property
@@ -140,7 +140,7 @@ class Recording:
         return replace(self, **chosen)
 
     def extended_by(self, *later: Recording) -> Recording:
-        """These rows and then those of later parts of the same file, which have the same columns."""
+        """These rows followed by those of later parts of the same file with the same columns."""
         parts = (self, *later)
         joined: dict[str, Any] = {}
         for column in fields(self):
@@ -169,7 +169,7 @@ class Recording:
 
     @property
     def fixed_end(self) -> IntArray | None:
-        """(N,) number of the fixed ball or pin whose place is unknown, -1 where empty; None for other references."""
+        """(N,) number of the fixed ball or pin of unknown place, -1 where empty; None for other references."""
         if self.reference is None or not self.reference.of_fixed_places:
             return None
         if self.reference.quantity == "fixed_point":
@@ -196,11 +196,11 @@ class Recording:
         return np.broadcast_to(np.array(sigma) / UM_PER_MM, (count,)).astype(np.float64)
 
     def exclusions_by_position(self) -> dict[int, str]:
-        """Spreadsheet row -> reason, as the rows are numbered when this recording's N rows alone are written."""
+        """Spreadsheet row -> reason, in the row numbers of a file with this recording's N rows alone."""
         return {int(i) + 2: self.sidecar.excluded[int(self.row[i])] for i in np.flatnonzero(self.excluded)}
 
     def usable(self, needed: Iterable[str]) -> UsableRows:
-        """Rows that nobody excluded and that have a value in every column of `needed` (full names).
+        """Rows without an exclusion and with a value in every column of `needed` (full names).
 
         Raises KeyError for a column that the recording does not have.
         """
@@ -217,7 +217,7 @@ class Recording:
 
     @cached_property
     def fold(self) -> IntArray:
-        """(N,) what cross-validation leaves out as a whole: the session, else eight blocks of time.
+        """(N,) groups that cross-validation leaves out as a whole: the session, else eight blocks of time.
 
         Blocks hold equally many rows as nearly as whole visits allow. Rows with an empty session are -1.
         """

@@ -1,4 +1,4 @@
-"""Making Recordings of a table file's rows: of all at once, or of block after block, with the same checks."""
+"""Makes Recordings from a table file's rows, all at once or block by block, with the same checks."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ from compd.tables import FIRST_ROW, ProblemList, Table, rows_text
 from compd.travel_direction import RowDirections
 from compd.units import UM_PER_MM
 
-# Comparators are converted from um to mm and rounded to a picometre, far below any gauge, so that a reading
-# that was written in decimals comes back as the same number that the gauge delivered.
+# Decimals (mm) of comparators converted from um: a picometre, far below any gauge, so that a reading written in
+# decimals comes back as the gauge's number.
 _PICOMETRES_PER_MM = 1e9
 _HASHED_BYTES = 1 << 20
 
 
 class RecordingBuilder:
-    """Makes Recordings of the tables of one file, and keeps what one block needs of the blocks before it.
+    """Makes Recordings of the tables of one file, and keeps the data that a block needs from earlier ones.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class RecordingBuilder:
     def __init__(
         self, path: Path, configuration: Configuration | None, needs_reference: bool, in_blocks: bool = False
     ) -> None:
-        """Read the sidecar; `build` reports what is wrong with it.
+        """Read the sidecar; `build` reports its faults.
 
         path : the table's file.  in_blocks : the rows come in several tables, and their time must rise.
         configuration, needs_reference : as in `read_recording`.
@@ -123,7 +123,7 @@ class RecordingBuilder:
     def _check_whole(
         self, table: Table, layout: Layout, excluded: BoolArray, problems: ProblemList, last: bool
     ) -> None:
-        """Count what only the whole recording shows; with the last rows, check it."""
+        """Count for the checks of the whole recording, which are made with the last rows."""
         needed = _needed_columns(layout, self._sidecar, table.letters)
         self._largest_joint_um = max(self._largest_joint_um, largest_joint_um(table))
         if last:
@@ -138,7 +138,7 @@ class RecordingBuilder:
         sidecar = self._sidecar
         numbers = np.array(sorted(sidecar.excluded), dtype=np.int64) if sidecar else np.array([], dtype=np.int64)
         absent = numbers[(numbers > self._last_row) & ~np.isin(numbers, table.row)]
-        if not last:  # what is beyond may be in the blocks to come
+        if not last:  # rows beyond may be in later blocks
             absent = absent[absent <= table.row[-1]] if len(table.row) else absent[:0]
         if len(absent) and sidecar is not None:
             last_row = max([self._last_row, *table.row[-1:].tolist()])
@@ -268,7 +268,7 @@ def _names_fixed_ends(sidecar: Sidecar | None) -> bool:
 
 
 def _needed_columns(layout: Layout, sidecar: Sidecar | None, names: Collection[str]) -> list[str]:
-    """Columns without which a row is of no use: time, and the reference with what predicts it."""
+    """Columns that a usable row needs: time, and the reference with the columns that predict it."""
     reference = sidecar.reference if sidecar else None
     reference_columns = [f"reference_{name}" for name in layout.reference]
     if reference is not None and reference.quantity == "ball_plate":

@@ -13,7 +13,7 @@ from compd.units import REFERENCE_UNITS
 
 Quantity = Literal["tool_position", "tool_pose", "link_length", "ball_plate", "distance", "fixed_point"]
 Frame = Literal["machine", "instrument"]
-# Measured from, or at, a place that nobody knows: it is fitted along, so that there is no frame to name.
+# Quantities measured from, or at, an unknown place: it is fitted along, so that no frame is named.
 OF_FIXED_PLACES = ("distance", "fixed_point")
 
 _SIGMA_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
@@ -28,7 +28,7 @@ def sigma_key(unit: str) -> str:
 
 
 class Reference(Section):
-    """What the reference instrument measured. An unknown uncertainty is nan; `balls` is relative to the sidecar."""
+    """The measured quantity. An unknown uncertainty is nan; `balls` is relative to the sidecar."""
 
     quantity: Quantity = Field(
         description="what was measured: the tip, the tip and the attitude, the links' change, balls of a ball plate, "
@@ -79,12 +79,12 @@ class Reference(Section):
 
     @property
     def of_fixed_places(self) -> bool:
-        """Whether fixed ends or pins were measured whose places are unknown."""
+        """Whether fixed ends or pins of unknown place were measured."""
         return self.quantity in OF_FIXED_PLACES
 
     @property
     def standard_uncertainty(self) -> tuple[float, ...]:
-        """One number, or one for each axis, in `unit`; nan where it is not known."""
+        """One number, or one for each axis, in `unit`; nan if unknown."""
         return self.sigma_um if self.unit == "um" else self.sigma
 
     @field_validator("quantity", mode="before")
@@ -97,7 +97,7 @@ class Reference(Section):
     def _mapping(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             raise refusal("must hold `quantity:` and what belongs to it", next_step="see the format")
-        # a key without a value is a missing key; the frame's default depends on the quantity
+        # a key without a value counts as missing; the frame's default depends on the quantity
         return {"quantity": None, "frame": None, **{key: value for key, value in data.items() if value is not None}}
 
     @field_validator("unit", mode="before")
@@ -188,7 +188,7 @@ def _one_of(value: Any, names: tuple[str, ...], next_step: str) -> Any:
 
 
 def _only_of(quantity: Quantity, info: ValidationInfo) -> None:
-    """Refuse a key that belongs to another quantity than that of the reference; one that is not known passes."""
+    """Refuse a key of another quantity than the reference's; an unknown key passes."""
     if info.data.get("quantity") not in (None, quantity):
         raise refusal(f"belongs to {quantity}, not to {info.data['quantity']}", next_step="delete it")
 

@@ -1,4 +1,4 @@
-"""The sidecar NAME.yaml of a recording: the machine, what the reference is, and the rows a person excluded."""
+"""The sidecar NAME.yaml of a recording: the machine, the reference, and the rows that a person excluded."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from compd.files import FileKind
 from compd.recording.reference import Quantity, Reference
 from compd.units import REFERENCE_UNITS
 
-# What this release writes. Format 1, of release 0.1, has no `format:`; neither 1 nor 2 has `quantities_at_zero`.
+# Format written by this release. Format 1, of release 0.1, has no `format:`; neither 1 nor 2 has `quantities_at_zero`.
 FORMAT = 3
 EXTERNAL = "external"
-# What cross-validation may leave out as a whole, beside the values of a column.
+# Groups that cross-validation may leave out as a whole, besides the values of a column.
 TIME, PLACE = "time", "place"
 
 _EXCLUSION = "- {row: 17, reason: the tracker's beam was cut}"
@@ -57,7 +57,7 @@ RowNumbers = Annotated[
 
 
 class Exclusion(Section):
-    """Rows that a person left out, and why: `{row: 17, reason: ...}`, `{rows: [17, 20], ...}`, `{rows: 17-20, ...}`."""
+    """Rows left out, with reason: `{row: 17, reason: ...}`, `{rows: [17, 20], ...}`, `{rows: 17-20, ...}`."""
 
     row: RowNumbers = Field(default=(), description="the row as a spreadsheet shows it; the header is row 1")
     rows: RowNumbers = Field(default=(), description="several rows: a list, or `17-20` for the first to the last")
@@ -68,7 +68,7 @@ class Exclusion(Section):
     def _mapping_with_rows(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             raise refusal("has no reason", _EXCLUSION, "say why the row is left out")
-        # neither key: the row that is missing is reported as a wrong one is
+        # neither key: a missing row is reported like a wrong one
         return data if "row" in data or "rows" in data else {**data, "row": None}
 
     @field_validator("reason", mode="before")
@@ -232,8 +232,7 @@ class Sidecar:
 
     @property
     def counts_from(self) -> str:
-        """From where effects of measured quantities count, for people; "" for an external model's, which count as they
-        are written."""
+        """Origin of measured quantities for effects, in words; "" for an external model, which uses plain values."""
         if self.external:
             return ""
         if self.quantities_at_zero is None:
@@ -242,12 +241,12 @@ class Sidecar:
 
     @property
     def unit(self) -> str:
-        """Unit of the reference's errors: "um", or what `reference.unit` names."""
+        """Unit of the reference's errors: "um", or that of `reference.unit`."""
         return "um" if self.reference is None else self.reference.unit
 
 
 def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
-    """Read a sidecar; what is wrong goes to `problems`. None where there is none that can be read.
+    """Read a sidecar; faults go to `problems`. None for a missing or unreadable one.
 
     With problems the Sidecar has what could be read, so that the columns can be checked against it all the same.
     Raises RecordingError for a file of a newer format, in which nothing else can be judged.
@@ -310,7 +309,7 @@ def sidecar_contents(
     folds: Sequence[str] = (),
     quantities_at_zero: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
-    """What a sidecar is to hold, as plain data; keys without a value are left out.
+    """Contents of a sidecar as plain data, without keys that have no value.
 
     excluded : spreadsheet row -> reason, as `Sidecar.excluded`.
     """
@@ -348,7 +347,7 @@ def _refuse_newer_format(document: Document) -> None:
 
 
 def _columns_alone(document: Document) -> Reference | None:
-    """A faulty reference reduced to what says which columns there must be; None where its quantity is faulty."""
+    """A faulty reference reduced to the parts that determine the columns; None for a faulty quantity."""
     quantity, unit = document.value(("reference", "quantity")), document.value(("reference", "unit"))
     if quantity not in get_args(Quantity):
         return None

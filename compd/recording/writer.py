@@ -50,7 +50,7 @@ def write_recording_files(contents: Mapping[Path, Content]) -> None:
     Raises RecordingError where the disk does not take them.
     """
     try:
-        # whoever works on the recording must be able to read it
+        # everyone who works on the recording must be able to read it
         write_files(contents, mode=0o644)
     except OSError as error:
         directory = list(contents)[-1].parent
@@ -95,7 +95,7 @@ def _rounded(name: str, values: FloatArray) -> FloatArray:
 
 
 def _parquet(path: Path, columns: Mapping[str, FloatArray]) -> Content:
-    """What writes the columns as Parquet."""
+    """The writer of the columns as Parquet."""
     schema = arrow_schema(path, columns)
     return lambda file: write_parquet(file, path, schema, [arrow_batch(path, schema, columns)])
 

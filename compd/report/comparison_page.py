@@ -63,7 +63,7 @@ def name_of(comparison: Comparison) -> str:
 
 
 def no_trend_text(comparison: Comparison) -> str:
-    """What to say where the residual follows nothing in a straight line."""
+    """The text for a residual without any straight-line relation."""
     if comparison.at_floor:
         return "nowhere: what is left is noise"
     return "no straight line in anything measured explains what is left; look at the pictures for bends and steps"
@@ -163,7 +163,7 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
 
 
 def _over_time(comparison: Comparison) -> list[Panel]:
-    """Of a long recording all rows; of others the residual against time has them."""
+    """All rows of a long recording over time; shorter ones are in the residual against time."""
     if not isinstance(comparison, StreamedComparison):
         return []
     caption = f"Of all {comparison.rows_used} rows: the smallest, the mean and the largest value of each short time."
@@ -171,7 +171,7 @@ def _over_time(comparison: Comparison) -> list[Panel]:
 
 
 def _verdict(comparison: Comparison) -> str:
-    """The result, with the noise floor's remark: it says that the recording may be wrong."""
+    """The result with the noise floor's remark that the recording may be wrong."""
     remark = comparison.floor.contradiction
     return f"{comparison.verdict} {_sentence(remark)}" if remark else comparison.verdict
 
@@ -204,7 +204,7 @@ def _shown(comparison: Comparison, value_um: float) -> str:
 
 
 def _three(value: float) -> str:
-    """A value with three figures, also where the last ones are 0."""
+    """A value with three figures, including trailing zeros."""
     return number_text(value, digits=3)
 
 

@@ -23,11 +23,11 @@ from compd.report.page_table import PageTable
 from compd.report.planned_rows import planned_rows_table
 from compd.text import chance_text, estimate_text, fall_text, number_text, percent_text
 
-# Columns of the YAML in a page and a terminal: lines that are not broken can be copied.
+# Width (columns) of the YAML in a page and a terminal: unbroken lines can be copied.
 YAML_WIDTH = 76
-# Single gross rows that are listed.
+# Most gross rows in the list.
 GROSS_ROWS = 40
-# Digits of a nonlinear constant: a period is searched to less than a thousandth.
+# Digits of a nonlinear constant; a period is searched to better than a thousandth.
 CONSTANT_DIGITS = 4
 
 
@@ -55,7 +55,7 @@ def explains_text(step: DiagnosisStep, fall: ErrorFall) -> str:
 
 
 def by_noise_text(step: DiagnosisStep) -> str:
-    """How often noise alone would do as well as an effect."""
+    """Probability that noise alone does as well as an effect."""
     return f"{chance_text(step.p_value) or 'not known'}, corrected for every effect that was tried"
 
 
@@ -65,7 +65,7 @@ def _rivals(step: DiagnosisStep) -> str:
 
 
 def constant_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable | None:
-    """The constant of each coordinate with its standard error; None where there is none."""
+    """The constant of each coordinate with its standard error; None without a constant."""
     constant = diagnosis.constant
     if constant is None:
         return None
@@ -80,12 +80,12 @@ def constant_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable | None:
 
 
 def gross_rows_text(diagnosis: Diagnosis, fall: ErrorFall) -> str:
-    """How many rows nothing explains, and which."""
+    """Number and list of unexplained rows."""
     return "; ".join(gross_texts(diagnosis.gross, diagnosis.after, fall.unit, GROSS_ROWS))
 
 
 def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
-    """What the rest follows, and what changed, the strongest first."""
+    """Covariates of the rest, and changes in time, the strongest first."""
     rows = [
         (
             change_text(finding, diagnosis) if finding.is_change else short_name(finding),
@@ -126,7 +126,7 @@ def candidates_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
 
 
 def without_gain(diagnosis: Diagnosis) -> list[str]:
-    """Ids of the effects that were tried and lower the error by nothing worth a name."""
+    """Ids of tried effects with a negligible gain."""
     return [result.effect for result in diagnosis.candidates if result.status == "no_gain"]
 
 
@@ -143,7 +143,7 @@ def untested_table(diagnosis: Diagnosis) -> PageTable:
 
 
 def formula_list(diagnosis: Diagnosis) -> str:
-    """What describes the rest best, as a file of effects (a YAML list); "" where nothing does."""
+    """The best description of the rest as a file of effects (a YAML list); "" without one."""
     return "".join(formula_texts(diagnosis))
 
 
@@ -166,7 +166,7 @@ def described_by(diagnosis: Diagnosis) -> EmpiricalFinding | None:
 
 
 def _plain(effect: Mapping[str, Any]) -> dict[str, Any]:
-    """A declaration with numbers as people write them: 301.0 is 301."""
+    """A declaration with short numbers: 301.0 becomes 301."""
     parameters = {
         name: {**keys, "plausible": [int(end) if float(end).is_integer() else end for end in keys["plausible"]]}
         for name, keys in effect["parameters"].items()
@@ -175,7 +175,7 @@ def _plain(effect: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def next_table(diagnosis: Diagnosis) -> PageTable | None:
-    """Rows to measure, or what to vary and why; None where nothing is proposed."""
+    """Rows to measure, or quantities to vary with the reason; None without a proposal."""
     rows = diagnosis.next_measurement
     if not rows:
         return None

@@ -57,7 +57,7 @@ def write_diagnosis_page(
 
 
 def _step_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
-    """Of each effect its picture and its numbers."""
+    """Picture and numbers of each effect."""
     panels = []
     for number, step in enumerate(diagnosis.steps):
         figure, caption = plot_step(diagnosis.after, [step.fitted], fall)
@@ -69,7 +69,7 @@ def _step_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
 
 
 def _time_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
-    """Gross rows and changes in time, where there are any."""
+    """Gross rows and changes in time, if any."""
     if not diagnosis.gross.rows and not any(finding.is_change for finding in diagnosis.depends_on):
         return []
     caption = "The error that is left; dashed lines are changes."
@@ -79,7 +79,7 @@ def _time_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
 
 
 def _description_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
-    """What the rest follows: a picture for each covariate of the best description, all descriptions, the formulas."""
+    """Descriptions of the rest: a picture for each covariate of the best one, all descriptions, the formulas."""
     if not diagnosis.depends_on:
         return []
     table = findings_table(diagnosis, fall)

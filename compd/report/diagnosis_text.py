@@ -27,7 +27,7 @@ from compd.report.diagnosis_evidence import (
 from compd.report.page_table import PageTable
 from compd.report.terminal_table import keep_words_whole
 
-# Findings that are listed; --json has them all.
+# Most listed findings; --json has all.
 SHOWN = 8
 FORMULA_FILE = "described.yaml"
 
@@ -131,7 +131,7 @@ def _print_pairs(console: Console, pairs: Iterable[Sequence[str]]) -> None:
 
 
 def _print_planned_rows(console: Console, table: PageTable) -> None:
-    """A purpose only in the first of its rows."""
+    """The purpose in the first of its rows only."""
     shown = Table(*table.head, box=SIMPLE_HEAD)
     for column, name in zip(shown.columns, table.head, strict=True):
         column.justify = "left" if name == PURPOSE_COLUMN else "right"

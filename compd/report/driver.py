@@ -1,4 +1,4 @@
-"""What drives a part of the error, for the horizontal axis of its picture."""
+"""The driver of a part of the error: the horizontal axis of its picture."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from compd.report.error_part import ErrorPart
 from compd.report.small_multiples import axis_title
 from compd.units import unit_of
 
-# Share of a part's variation that rows with neighbouring values of the driver have in common: with less it does not
-# drive the part, with more than the second the part is one line over it.
+# Shares of a part's variation common to rows with neighbouring values of the driver. Below the first it is no driver;
+# above the second the part is a line over it.
 DRIVEN, ONE_LINE = 0.75, 0.98
 # A period in a formula: sin(2 * pi * time_s / 676).
 _PERIOD = re.compile(r"2 \* pi \* (\w+) / ([0-9.]+(?:e[+-]?[0-9]+)?)")
@@ -24,7 +24,7 @@ _PERIOD = re.compile(r"2 \* pi \* (\w+) / ([0-9.]+(?:e[+-]?[0-9]+)?)")
 
 @dataclass(frozen=True, eq=False)
 class Driver:
-    """What drives one series of a part.
+    """The driver of one series of a part.
 
     title : of an axis, with the unit.  values : (N,).
     one_line : whether the part is a single line over it.
@@ -40,7 +40,7 @@ class Driver:
 def find_driver(
     part: ErrorPart, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording, unit: str
 ) -> Driver:
-    """What a series of the part follows most closely: among what the effects need, else where the machine stands.
+    """The quantity that a series of the part follows most closely: one that the effects need, else a position.
 
     Where it follows nothing, as where an effect has several drivers at once, the part itself: against it the error
     before lies on a line, and the error after lies flat.
@@ -57,7 +57,7 @@ def find_driver(
 def _needed(
     part: ErrorPart, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording
 ) -> Iterator[Driver]:
-    """What the effects say that they need: at a link its own, else each column."""
+    """Quantities that the effects need: those of the link itself, else each column."""
     rows = aligned.rows
     needs = {need for fitted in effects for need in fitted.effect.needs}
     link = aligned.axes[series] if aligned.of_links else series
@@ -70,7 +70,7 @@ def _needed(
         column = _column(covariate)
         is_needed = column in names or ("time" in needs and covariate.name == "time")
         is_needed |= "direction" in needs and covariate.name.startswith("direction of")
-        # a gradient, where the thermometer at its top is needed
+        # a gradient, if the thermometer at its top is needed
         is_needed |= f"{covariate.name.partition(' - ')[0]}_degC" in names and " - " in covariate.name
         if is_needed:
             yield _driver(covariate)
@@ -94,14 +94,14 @@ def _of_link(
 
 
 def _places(aligned: AlignedRecording) -> Iterator[Driver]:
-    """Where the tip is, and how long the links are: what drives an effect that needs nothing."""
+    """Tip position and link lengths: drivers of an effect that needs no quantity."""
     for covariate in covariates(aligned):
         if covariate.name in ("x", "y", "z") or covariate.name.startswith("length of"):
             yield _driver(covariate)
 
 
 def _written_phases(effects: Sequence[FittedEffect], aligned: AlignedRecording) -> Iterator[Driver]:
-    """The place within a period that a formula has as a number."""
+    """Phase in a period that a formula has as a number."""
     columns = {"time_s": aligned.rows.time_s, **aligned.rows.quantities}
     for fitted in effects:
         for name, number in _PERIOD.findall(fitted.effect.equation):
@@ -112,7 +112,7 @@ def _written_phases(effects: Sequence[FittedEffect], aligned: AlignedRecording) 
 
 
 def _phases(effects: Sequence[FittedEffect], name: str, unit: str, values: FloatArray) -> Iterator[Driver]:
-    """The place within a period, for each constant of the effects that has the values' own unit."""
+    """Phase in a period, for each constant of the effects in the unit of the values."""
     for fitted in effects:
         for constant in fitted.effect.constants:
             period = fitted.constants.get(constant.name, 0.0)
@@ -132,7 +132,7 @@ def _direction(title: str, values: FloatArray) -> Driver:
 
 
 def _column(covariate: Covariate) -> str:
-    """The column of the recording that a covariate is, or would be."""
+    """The recording's column of a covariate."""
     unit = {"K": "degC", "%": "pct"}.get(covariate.unit, covariate.unit)
     return f"tip_{covariate.name}_mm" if covariate.name in ("x", "y", "z") else f"{covariate.name}_{unit}"
 

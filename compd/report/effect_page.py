@@ -27,7 +27,7 @@ AXIS_COLOURS = {"x": COLOURS["worst"], "y": COLOURS["best"], "z": COLOURS["plain
 
 
 def write_effect_page(path: Path, effect: Effect, configuration: Configuration) -> None:
-    """Write the page. Raises CompdError where the machine lacks a setting that the effect needs."""
+    """Write the page. Raises CompdError if the machine lacks a setting that the effect needs."""
     model = build_model(configuration.geometry, configuration.wiring)
     result = compute_signature(effect, model, machine_details(configuration.geometry))
     largest_um = float(np.linalg.norm(result.tip_um, axis=1).max())

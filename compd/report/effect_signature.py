@@ -1,4 +1,4 @@
-"""An effect's signature on a machine: what it does to the tip over the workspace, and against what drives it."""
+"""An effect's signature on a machine: its displacement of the tip over the workspace, and against its drivers."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from compd.model.kinematics import Movement, inverse_kinematics, update_motion
 from compd.reference_conditions import REFERENCE_PRESSURE_hPa
 from compd.units import UM_PER_MM
 
-# The workspace that is drawn: as far from machine zero as the shipped machines go comfortably.
+# Drawn workspace: distances from machine zero that the shipped machines reach easily.
 REACH_MM = 80.0
 HEIGHT_MM = 40.0
-# The place off the middle at which curves are drawn: in the middle symmetry hides much.
+# Place of the curves, off the middle, where symmetry hides much.
 ASIDE_MM = (50.0, 30.0, 0.0)
 
-# What drives an effect while the arrows are drawn, and a typical value of it.
+# Drivers of an effect for the arrows, with typical values.
 WARMING_K = 2.0
 GRADIENT_K = 0.5
 FORCE_N = 50.0
@@ -182,7 +182,7 @@ def _value(name: str, drive: Drive) -> FloatArray:
 
 
 def _directions(scale_mm: FloatArray) -> FloatArray:
-    """+1 or -1 as the rows follow one another; forwards before the first has moved."""
+    """Direction (+1 or -1) at each row in sequence; +1 before the first motion."""
     motion = None
     directions = np.empty_like(scale_mm)
     for row, scales in enumerate(scale_mm):

@@ -16,7 +16,7 @@ SECONDS_PER_HOUR = UNIT_KINDS[1]["h"]
 
 
 def plot_envelope(comparison: StreamedComparison) -> Figure:
-    """One coordinate below the other, of all rows that are used."""
+    """All used rows, one coordinate below the other."""
     aligned, envelope = comparison.aligned, comparison.totals.envelope
     figure = make_subplots(len(aligned.labels), 1, shared_xaxes=True, vertical_spacing=0.06)
     style_figure(figure, "", "", 110 + ROW_PX * len(aligned.labels)).update_layout(showlegend=False)

@@ -14,15 +14,15 @@ from compd.model.effects import FittedEffect
 from compd.statistics import solve_least_squares
 from compd.units import UM_PER_MM
 
-# Effects that add to each link: where link lengths follow from the tip, they are seen best there.
+# Ports of effects on each link: shown at the links if their lengths follow from the tip.
 LINK_PORTS = {"scale", "link"}
-# A series in which the part is smaller than this share of its largest is not drawn.
+# Least size of a drawn series, as a share of the largest.
 LEAST_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorPart:
-    """What one effect does in N rows, in each of S series: measured coordinates, or links.
+    """The part of one effect in N rows of S series: measured coordinates, or links.
 
     series : their names, such as ``"x"`` or ``"link 1"``.  at_links : whether they are links.
     part, after : (N, S) what it does, and the residual that is left with it, in the recording's unit.
@@ -37,11 +37,11 @@ class ErrorPart:
 
     @property
     def before(self) -> FloatArray:
-        """(N, S) the residual without it, everything else that was found being there."""
+        """(N, S) residual without it, with everything else found."""
         return np.asarray(self.after + self.part)
 
     def largest(self, most: int) -> list[int]:
-        """The series in which it does most, at most so many, in their order; none in which it does next to nothing."""
+        """The series with the largest parts, up to a number, in their order; negligible ones excluded."""
         sizes = np.array([rms(self.part[self.used, k]) for k in range(len(self.series))])
         order = [int(k) for k in np.argsort(-sizes)[:most] if sizes[k] > LEAST_SHARE * sizes.max()]
         return sorted(order) or [0]
@@ -50,7 +50,7 @@ class ErrorPart:
 def error_part(
     comparison: Comparison, effects: Sequence[FittedEffect], described: Sequence[FittedEffect] = ()
 ) -> ErrorPart:
-    """What effects do together.
+    """The joint part of effects.
 
     comparison : whose model has the effects.  described : effects, among them these, that its model does not have: they
     are taken off the residual first.

@@ -24,7 +24,7 @@ from compd.text import estimate_text, fall_text, nan_to_null, number_text, perce
 
 
 def evidence(diagnosis: Diagnosis) -> dict[str, Any]:
-    """As plain data: `verdict`, `lines`, `effects`, tables of what else was found, and what to measure next.
+    """Plain data: `verdict`, `lines`, `effects`, tables of other findings, and the next measurement.
 
     A table is `head`, `rows` and `caption`; None where there is nothing to tell.
     """
@@ -48,7 +48,7 @@ def evidence(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _effect(number: int, diagnosis: Diagnosis, fall: ErrorFall) -> dict[str, Any]:
-    """An effect that was named; number : from 0."""
+    """A named effect; number : from 0."""
     step = diagnosis.steps[number]
     before = fall.before if number == 0 else fall.steps[number - 1]
     with_all = "with it" if len(diagnosis.steps) == 1 else "with all that is named"
@@ -71,7 +71,7 @@ def _effect(number: int, diagnosis: Diagnosis, fall: ErrorFall) -> dict[str, Any
 
 
 def _numbers(step: DiagnosisStep, links: int) -> list[dict[str, Any]]:
-    """Fitted numbers with standard errors and the range that the effect calls plausible; searched constants."""
+    """Fitted numbers with standard errors and plausible ranges; searched constants."""
     fitted = [
         {
             "name": estimate.name,
@@ -95,7 +95,7 @@ def _numbers(step: DiagnosisStep, links: int) -> list[dict[str, Any]]:
 
 
 def _formulas(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """What describes the rest best: `declaration` as `add_effect` takes it, and `text` as a file of effects has it."""
+    """The best description of the rest: `declaration` for `add_effect`, and `text` for a file of effects."""
     finding = described_by(diagnosis)
     declarations = () if finding is None else finding.formula_effects
     return [

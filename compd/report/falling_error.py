@@ -1,4 +1,4 @@
-"""The picture of the falling error: from the error as it was, with each effect, down to the noise."""
+"""The picture of the falling error: from the initial error, with each effect, down to the noise."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from compd.diagnosis import Diagnosis, ErrorFall, Holdout, short_name
 from compd.report.page import COLOURS, style_figure
 from compd.text import number_text
 
-# Letters of a name on one line beside its bar.
+# Most letters of a name on one line beside its bar.
 NAME_WIDTH = 30
 LINE_PX, ROW_PX = 18, 44
-# The axis begins at this share of the smallest number, so that its label has room, and ends beyond the largest.
+# Start of the axis as a share of the smallest number (room for its label), and its end as a multiple of the largest.
 LEFT, RIGHT = 0.4, 1.4
 CAPTION = (
     "Error per coordinate, rms; with an effect or a description, on rows that were left out when its numbers were "
@@ -25,7 +25,7 @@ CAPTION = (
 
 
 class _Fall(NamedTuple):
-    """One bar: from an error down to another, nan where there is none before it."""
+    """One bar from an error down to another; nan without a previous error."""
 
     name: str
     before: float

@@ -13,20 +13,20 @@ from compd.report.page_table import PageTable
 from compd.report.small_multiples import NOT_RECORDED, SERIES_COLOURS, add_dots_and_means, thin
 from compd.units import UM_PER_MM
 
-# More arrows than this hide each other.
+# Most arrows; more hide each other.
 ARROWS = 400
-# Cells of the map along each axis.
+# Number of the map's cells along each axis.
 CELLS = 9
 # Thickness of a plane in a scene, as a share of its length.
 THIN = 0.01
-# Of a map: its name, and the axes to the right and upwards.
+# Maps: name, and the axes to the right and upwards.
 VIEWS = (("from above", 0, 1), ("from the front", 0, 2), ("from the side", 1, 2))
-# The typical arrow is drawn as long as this share of the workspace.
+# Length of the typical arrow as a share of the workspace.
 ARROW_SHARE = 0.12
 
 
 def plot_link_residuals(comparison: Comparison) -> Figure | PageTable:
-    """The residual as errors of the links' lengths, against each link's own length."""
+    """The residual as errors of link lengths, against each link's length."""
     links_um = comparison.link_residual_um
     if links_um is None:
         return NOT_RECORDED
@@ -106,7 +106,7 @@ def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, f
 
 
 def plot_histogram(comparison: Comparison) -> Figure:
-    """Each coordinate's residual, and what noise alone would make."""
+    """Each coordinate's residual, and the distribution of noise alone."""
     labels, unit = comparison.aligned.labels, comparison.aligned.unit
     figure = make_subplots(1, len(labels), subplot_titles=list(labels))
     for k, label in enumerate(labels, start=1):
@@ -150,7 +150,7 @@ def plot_histogram(comparison: Comparison) -> Figure:
 
 
 def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
-    """Rms residual in cells of the workspace, seen from above, from the front and from the side, as axes are known."""
+    """Rms residual in cells of the workspace: top, front and side views, for the known axes."""
     places_mm, axes = _places_mm(comparison)
     used = comparison.used & np.isfinite(places_mm).all(axis=1)
     views = [(name, a, b) for name, a, b in VIEWS if a in axes and b in axes]
@@ -192,7 +192,7 @@ def plot_workspace_map(comparison: Comparison) -> Figure | PageTable:
 
 
 def _aspect(extent: FloatArray, axes: list[int]) -> dict[str, object]:
-    """Of a scene: axes to scale, seen obliquely; a plane seen square to it, its second axis upwards."""
+    """Layout of a scene: axes to scale in an oblique view; a plane in a normal view, its second axis upwards."""
     if len(axes) == 3:
         return {"aspectmode": "data", "camera": {"eye": {"x": 1.3, "y": -1.6, "z": 0.9}}}
     # "data" would give a plane no size: its volume is 0

@@ -29,7 +29,7 @@ from compd.report.page_table import PageTable
 # Colours that stay apart for colour-blind readers (Okabe and Ito, 2008), in a fixed order of meaning.
 COLOURS = {"worst": "#d55e00", "middle": "#e69f00", "best": "#009e73", "plain": "#0072b2", "quiet": "#8a8f98"}
 
-# Plotly 7 offers to upload a figure to its makers' site; a page of measurements does not.
+# Disables Plotly 7's offer to upload a figure to its makers' site.
 _PLOTLY_CONFIG = {
     "displaylogo": False,
     "responsive": True,
@@ -37,7 +37,7 @@ _PLOTLY_CONFIG = {
     "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
 }
 
-# In the head of every page: its generator; in those of releases up to 0.2 the style of their text.
+# Marks of a page of compd in its head: the generator; up to 0.2 the style of the text.
 _PAGE_MARKS = (b'<meta name="generator" content="compd">', b'body { font: 16px/1.5 system-ui, "Segoe UI"')
 
 # Name of plotly's script where pages share it.
@@ -46,19 +46,19 @@ SHARED_SCRIPT = "plotly.min.js"
 
 @dataclass(frozen=True)
 class PageText:
-    """Lines that stay as they are, to be read or copied: in the page's source too quotes and spaces are themselves."""
+    """Verbatim lines, to be read or copied; the page's source keeps quotes and spaces, too."""
 
     text: str
 
     @property
     def html(self) -> Markup:
-        """The text with what HTML would take for markup escaped, and nothing else."""
+        """The text with HTML markup characters escaped."""
         return Markup(escape(self.text, quote=False))
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A heading, one sentence that says how to read it, and a figure, a table or lines of text."""
+    """A heading, a sentence on how to read it, and a figure, a table or lines of text."""
 
     title: str
     caption: str
@@ -66,7 +66,7 @@ class Panel:
 
 
 def check_page_path(path: Path, overwrite: bool | None = None) -> None:
-    """Raise CompdError where a page cannot be written, so that it is known before long work and not after it.
+    """Raise CompdError if a page cannot be written; called before long work.
 
     overwrite : whether to write over a file that is no page of compd; another page is replaced in any case.
     """
@@ -111,7 +111,7 @@ def write_page(
 
 
 def style_figure(figure: Figure, x: str, y: str, height_px: int = 340) -> Figure:
-    """The figure with the look that all have: axis titles with units, quiet grid, legend on top."""
+    """The figure in the common style: axis titles with units, quiet grid, legend on top."""
     figure.update_layout(
         template="plotly_white",
         height=height_px,

@@ -1,4 +1,4 @@
-"""Planned rows as a table that a person can read: every row once, and only what changes between them."""
+"""Planned rows as a readable table: every row once, varying columns only."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _UNITS = ("mm_per_s", "degC", "deg", "rad", "pct", "mm", "um", "N", "s")
 
 
 def planned_rows_table(rows: Sequence[Row]) -> PageTable:
-    """The rows of a plan, with how often each is measured; what is the same in all of them is told by the caption."""
+    """The rows of a plan with their numbers of repeats; the caption has the constant columns."""
     counted = _counted([_with_one_approach(row) for row in rows])
     names = list(dict.fromkeys(name for row, _ in counted for name in row))
     texts = {name: _column_texts([row.get(name, "") for row, _ in counted]) for name in names}
@@ -28,7 +28,7 @@ def planned_rows_table(rows: Sequence[Row]) -> PageTable:
     if any(count > 1 for _, count in counted):
         head.append("times")
         columns.append([str(count) for _, count in counted])
-    # a time that is 0 everywhere says nothing: no row waits for another
+    # a time of 0 everywhere is omitted: no row waits for another
     held = [f"{_head(name)} {texts[name][0]}" for name in constant if (name, texts[name][0]) != ("time_s", "0")]
     caption = f"The same in every row: {'; '.join(held)}." if held else ""
     return PageTable(head, list(zip(*columns, strict=True)), caption)
@@ -44,7 +44,7 @@ def _with_one_approach(row: Row) -> dict[str, Any]:
 
 
 def _counted(rows: Sequence[dict[str, Any]]) -> list[tuple[dict[str, Any], int]]:
-    """Each row with how often it comes: anywhere, where no row waits for another; else one behind the other."""
+    """Each row with its count: in any order if no row waits for another, else in sequence."""
     if any(row.get("time_s", 0) for row in rows):
         return [(row, len(list(same))) for row, same in groupby(rows)]
     different: list[dict[str, Any]] = []
@@ -55,7 +55,7 @@ def _counted(rows: Sequence[dict[str, Any]]) -> list[tuple[dict[str, Any], int]]
 
 
 def _column_texts(values: Sequence[Any]) -> list[str]:
-    """Numbers of one column with the same decimals, as many as the finest needs."""
+    """Numbers of one column with equal decimals, as many as the finest needs."""
     if any(isinstance(value, str) for value in values):
         return [str(value) for value in values]
     decimals = max(len(f"{value:.3f}".rstrip("0").partition(".")[2]) for value in values)

@@ -1,4 +1,4 @@
-"""Small multiples: values of a comparison's rows against one covariate after the other, as dots and class means."""
+"""Small multiples: values of a comparison's rows against each covariate, as dots and class means."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from compd.comparison import Comparison, Covariate
 from compd.report.page import COLOURS, style_figure
 from compd.report.page_table import PageTable
 
-# More dots than this hide each other; means are always over all rows.
+# Most dots; more hide each other. Means are always over all rows.
 DOTS = 500
 FEW_DOTS = 200
 BINS = 12
@@ -148,7 +148,7 @@ def add_dots_and_means(
 
 
 def dot_style(count: int) -> dict[str, float]:
-    """Size and opacity of so many dots: few are to be seen, many are not to hide each other."""
+    """Size and opacity of dots by their number: few stay visible, many do not hide each other."""
     return {"size": 3, "opacity": 0.35} if count > FEW_DOTS else {"size": 5, "opacity": 0.6}
 
 
@@ -162,5 +162,5 @@ def class_means(x: FloatArray, y: FloatArray, classes: int = BINS) -> tuple[Floa
 
 
 def thin(rows: IntArray, most: int) -> IntArray:
-    """At most so many of the rows, evenly spread."""
+    """An even selection of the rows, up to a number."""
     return rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)]

@@ -1,4 +1,4 @@
-"""The picture of one effect: the error against what drives it, before and after, side by side on the same scale."""
+"""The picture of one effect: the error against its driver, before and after, side by side on one scale."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from compd.report.error_part import ErrorPart, error_part
 from compd.report.page import style_figure
 from compd.report.small_multiples import DOTS, SERIES_COLOURS, add_dots_and_means, class_means, dot_style, thin
 
-# Series that are drawn, those in which the effect does most.
+# Most drawn series, those with the largest effect.
 MOST_SERIES = 3
-# A driver with so few different values is drawn as boxes.
+# Most different values of a driver that is drawn as boxes.
 MOST_BOXES = 6
-# Places at which a fitted curve is computed.
+# Points of a fitted curve.
 CURVE_CLASSES = 60
 ROW_PX = 250
-# The vertical scale holds all but this share of the rows on either side; a few stray dots would flatten the rest.
+# Share of the rows on either side outside the vertical scale; a few stray dots would flatten the rest.
 STRAY = 0.002
 HOW_TO_READ = (
     "Left: the error with everything but this. Right: with this too, on the same scale; nothing should follow the "
@@ -35,7 +35,7 @@ HOW_TO_READ = (
 def plot_step(
     comparison: Comparison, effects: Sequence[FittedEffect], fall: ErrorFall, described: Sequence[FittedEffect] = ()
 ) -> tuple[Figure, str]:
-    """The picture of what effects do together, and how to read it.
+    """The picture of the effects together, and how to read it.
 
     comparison, described : as in `error_part`.
     """

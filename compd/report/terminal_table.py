@@ -1,4 +1,4 @@
-"""Tables in a terminal of 80 columns: no name that is to be copied is cut, and no number."""
+"""Tables for a terminal of 80 columns; names for copying and numbers stay whole."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _CELL_FRAME, _FIRST_LINE = 3, 1
 
 
 def keep_words_whole(table: Table, width: int) -> Table:
-    """The table with columns so wide that words are broken between, and never within; `width`: of the terminal.
+    """The table with columns wide enough to break lines between words only; `width`: of the terminal.
 
     Where a table is wider than the terminal, rich cuts words, but not in a column that has a width. What is left over
     goes to the columns whose texts are longest. Where even the words need more, the lines between columns go.

@@ -1,4 +1,4 @@
-"""The picture of the error over time, with gross rows and with moments at which something changed."""
+"""The picture of the error over time, with gross rows and the times of changes."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from compd.units import UNIT_KINDS
 
 DOTS = 1500
 ROW_PX = 210
-# Gross rows beyond so many times what all but this share of the rows stay below are drawn at the edge.
+# Gross rows are drawn at the edge beyond this multiple of the error that all but this share of the rows stay below.
 EDGE, STRAY = 1.6, 0.002
 SECONDS_PER_HOUR = UNIT_KINDS[1]["h"]
 _CROSS = {"size": 9, "color": COLOURS["worst"], "symbol": "x-thin", "line": {"width": 2, "color": COLOURS["worst"]}}
 
 
 def plot_time(diagnosis: Diagnosis, fall: ErrorFall) -> Figure:
-    """The residual with all that was found, over time, or over rows where that is not known.
+    """The residual with all findings over time, or over rows if the time is unknown.
 
     Rows that count are dots, gross ones crosses, changes dashed lines.
     """

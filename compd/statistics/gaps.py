@@ -1,4 +1,4 @@
-"""Gaps of a quantity that was measured beside the machine: a sensor that missed a few rows."""
+"""Gaps of a quantity beside the machine: a sensor that missed a few rows."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from compd.arrays import FloatArray
 
-# Share of empty cells up to which gaps are filled: beyond it too little of what a residual follows would be measured.
+# Largest share of empty cells for filling gaps: beyond it too little of a residual's covariate would be measured.
 MOST_EMPTY = 0.1
 
 
 def filled(values: FloatArray, time_s: FloatArray) -> FloatArray:
-    """(N,) the values, empty cells with the value of the nearest row in time; as they are where too many are empty.
+    """(N,) the values, with empty cells filled from the nearest row in time; unchanged if too many are empty.
 
     values : (N,) of a quantity, nan where the cell is empty.  time_s : (N,) rising.
 

@@ -1,4 +1,4 @@
-"""The cells of a CSV file as text under their header, and what a spreadsheet's export got wrong in them."""
+"""The cells of a CSV file as text under their header, and faults of a spreadsheet's export in them."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Row = tuple[int, list[str]]
 HeaderTest = Callable[[Sequence[str]], bool]
 
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-# How far down a header may stand under title rows before it is called missing.
+# Most title rows above a header; further down it counts as missing.
 _HEADER_WITHIN = 20
 
 
 class CellProblem(NamedTuple):
-    """A kind of wrong cell: what it is, what would be right, what to do."""
+    """A kind of wrong cell: the fault, the allowed contents, the next step."""
 
     what: str
     allowed: str
@@ -74,7 +74,7 @@ _KINDS: tuple[tuple[re.Pattern[str], CellProblem], ...] = tuple(
 
 
 def cell_problem(cell: str) -> CellProblem | None:
-    """What is wrong with a stripped, not empty cell in which a number belongs; None for a finite number."""
+    """The fault of a stripped, non-empty cell of a number column; None for a finite number."""
     if NUMBER.fullmatch(cell):
         return _NOT_FINITE if abs(float(cell)) == float("inf") else None
     for pattern, problem in _KINDS:
@@ -97,7 +97,7 @@ class CsvCells(NamedTuple):
 
 
 def read_cells(content: bytes, problems: ProblemList, is_header: HeaderTest, first_row: int) -> CsvCells | None:
-    """Cells of the CSV file `content`; what is wrong goes to `problems`. None where no header can be found.
+    """Cells of the CSV file `content`; faults go to `problems`. None without a header.
 
     first_row : the row that the first line under the header has in the file; more than 2 in a block of a file.
 
@@ -171,7 +171,7 @@ def _rows(text: str, problems: ProblemList, rows_before: int) -> list[Row]:
 
 
 def _find_header(rows: Sequence[Row], problems: ProblemList, is_header: HeaderTest) -> int | None:
-    """Index of the header in `rows`; a header in another row than 1, or none at all, is reported."""
+    """Index of the header in `rows`; a header below row 1, or a missing one, is reported."""
     for index, (number, cells) in enumerate(rows[:_HEADER_WITHIN]):
         if is_header(cells):
             if index:

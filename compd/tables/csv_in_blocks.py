@@ -17,7 +17,7 @@ _PIECE_BYTES = 1 << 20
 
 
 def csv_blocks(path: Path, is_header: HeaderTest, id_columns: Collection[str], rows: int) -> Iterator[TableBlock]:
-    """The table's rows, so many lines at a time; they have their numbers in the file, also in messages.
+    """The table's rows in blocks of lines; they keep their numbers in the file, also in messages.
 
     is_header, id_columns : as in `read_table`. Texts have the same codes in every block.
     Raises RecordingError for a file that cannot be read.
@@ -52,7 +52,7 @@ def csv_row_count(path: Path) -> int:
 
 
 def _labels(path: Path, id_columns: Collection[str]) -> dict[str, tuple[str, ...]]:
-    """Column of ids -> its different texts in the whole file; only of columns that hold more than numbers."""
+    """Column of ids -> its different texts in the whole file; only for columns with more than numbers."""
     with path.open("rb") as file:
         names = [name.strip() for name in file.readline().decode("utf-8-sig", "replace").split(",")]
         indices = {name.strip('"'): index for index, name in enumerate(names) if name.strip('"') in id_columns}
@@ -65,7 +65,7 @@ def _labels(path: Path, id_columns: Collection[str]) -> dict[str, tuple[str, ...
                 for name, index in indices.items():
                     texts[name].update(cell.strip() for cell in cells[index : index + 1])
         except csv.Error:
-            return {}  # the block that holds it is refused
+            return {}  # the block with it is refused
     return {name: id_labels(cells) for name, cells in texts.items() if plain_numbers(sorted(cells)) is None}
 
 

@@ -1,4 +1,4 @@
-"""A CSV file as columns of numbers with the rows that a spreadsheet shows; every wrong cell is reported.
+"""A CSV file as columns of numbers with a spreadsheet's row numbers; every wrong cell is reported.
 
 Tolerated, because it can mean one thing only: a byte order mark, Windows line ends, spaces around a cell, quotes,
 empty rows and columns at the end. Everything else that a spreadsheet may write is refused in words.
@@ -24,16 +24,16 @@ from compd.tables.csv_cells import (
 from compd.tables.problem_list import ProblemList, column_letters, rows_text, values_text
 from compd.tables.table import FIRST_ROW, Table, id_codes, id_labels
 
-# A file of these alone can be parsed fast: nothing in it can be anything but numbers, commas and line ends.
+# Characters of a file for the fast parser: numbers, commas and line ends only.
 _PLAIN = b"0123456789eE+-.,\r\n"
-# Python alone parses fewer in a tenth of a second, which is as long as the import of pyarrow takes.
+# Fewest cells for pyarrow: Python alone parses fewer in a tenth of a second, the time of importing pyarrow.
 _LEAST_BYTES_FOR_ARROW = 1 << 20
 
 
 def read_table(
     path: Path, problems: ProblemList, is_header: HeaderTest, id_columns: Collection[str] = ()
 ) -> Table | None:
-    """Read `path`; what is wrong goes to `problems`, and reading goes on as far as it makes sense.
+    """Read `path`; faults go to `problems`, and reading goes on as far as possible.
 
     is_header : whether these cells are the header that is looked for.
     id_columns : columns that may hold text; their cells become codes 0, 1, 2 ... in sorted order.
@@ -79,17 +79,17 @@ def parse_table(
 
 
 def _without_quotes(name: str) -> str:
-    """A name as it is in quotes, as many programs write the header; others as they are."""
+    """A name without the quotes that many programs write around the header; others unchanged."""
     return name[1:-1].strip() if len(name) > 1 and name[0] == name[-1] == '"' else name
 
 
 def is_plain(body: bytes) -> bool:
-    """Whether there is nothing but numbers, commas and line ends, as far as the characters tell."""
+    """Whether the text consists of numbers, commas and line ends, judged by its characters."""
     return not body.translate(None, _PLAIN)
 
 
 def _is_text(content: bytes, problems: ProblemList) -> bool:
-    """Whether it can be text in UTF-8, and not another kind of file, which is a problem."""
+    """Whether it can be text in UTF-8; another kind of file is a problem."""
     if content.startswith(b"PK\x03\x04"):
         problems.add("", "is a spreadsheet's own file, not CSV", next_step="in the spreadsheet: save as CSV (UTF-8)")
         return False
@@ -106,12 +106,12 @@ def _is_text(content: bytes, problems: ProblemList) -> bool:
 
 
 def _names_are_valid(names: Sequence[str]) -> bool:
-    """Whether no name is empty and none comes twice."""
+    """Whether all names are different and not empty."""
     return all(names) and len(set(names)) == len(names)
 
 
 def _read_plain(path: Path, names: list[str], body: bytes, lines: list[str], first_row: int) -> Table | None:
-    """The table of a file that is nothing but plain numbers, parsed at once. lines : those of `body`.
+    """The table of a file of plain numbers, parsed at once. lines : those of `body`.
 
     None where a cell is no number after all: then `_read_any` reports which.
     """
@@ -131,7 +131,7 @@ def _read_plain(path: Path, names: list[str], body: bytes, lines: list[str], fir
 
 
 def _arrow_columns(body: bytes, names: list[str]) -> list[FloatArray] | None:
-    """The columns of plain lines as Arrow parses them, to the same numbers as Python, in a fifth of its time.
+    """The columns of plain lines by Arrow: the same numbers as Python's in a fifth of its time.
 
     None where it is not installed, and for a cell that it takes for no number, or an infinite one.
     """
@@ -161,7 +161,7 @@ def _read_any(
     id_columns: Collection[str],
     labels: Mapping[str, tuple[str, ...]] | None,
 ) -> Table:
-    """The table of any other file: every cell was read as text first, and every wrong one is reported."""
+    """The table of any other file: cells are read as text, and every wrong one is reported."""
     row = np.array([number for number, _ in csv_cells.rows], dtype=np.int64)
     columns: dict[str, FloatArray] = {}
     own_labels: dict[str, tuple[str, ...]] = {}
@@ -185,7 +185,7 @@ def _read_any(
 
 
 def plain_numbers(cells: Sequence[str]) -> FloatArray | None:
-    """The column as numbers; None when any cell is something else."""
+    """The column as numbers; None if any cell is no number."""
     # Python's own conversion is exact, but also takes 1_000, nan and inf
     if "".join(cells).encode("utf-8", "replace").translate(None, _PLAIN):
         return None
@@ -193,7 +193,7 @@ def plain_numbers(cells: Sequence[str]) -> FloatArray | None:
 
 
 def _numbers(cells: Sequence[str]) -> FloatArray | None:
-    """Cells of nothing but _PLAIN as numbers; None when any is none after all, or not finite."""
+    """Cells of _PLAIN characters as numbers; None if any is no finite number."""
     try:
         values = np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
     except ValueError:
@@ -219,7 +219,7 @@ class _CommaCells:
             self.problem = problem
 
     def report(self, problems: ProblemList) -> None:
-        """Add the one problem, if there is any such cell."""
+        """Add one problem if there is any such cell."""
         if self.places:
             problems.add(
                 f"{', '.join(self.places)}, {rows_text(sorted(self.rows))}",
@@ -233,7 +233,7 @@ class _CommaCells:
 def _checked_numbers(
     place: str, cells: Sequence[str], row: IntArray, problems: ProblemList, commas: _CommaCells
 ) -> FloatArray:
-    """The column's numbers, nan where a cell is wrong; one problem for each kind of wrong cell."""
+    """The column's numbers, nan for wrong cells; one problem for each kind of wrong cell."""
     values = np.full(len(cells), np.nan)
     wrong: dict[CellProblem, list[int]] = {}
     for i, cell in enumerate(cells):

@@ -1,4 +1,4 @@
-"""A Parquet file as columns of numbers with the rows that a spreadsheet would show; every wrong column is reported.
+"""A Parquet file as columns of numbers with a spreadsheet's row numbers; every wrong column is reported.
 
 The columns are those of the CSV file, and null is the empty cell, as is nan. Row 1 is the header there, so the first
 row of values is row 2 here, too.
@@ -21,9 +21,9 @@ from compd.tables.problem_list import ProblemList, rows_text, values_text
 from compd.tables.table import FIRST_ROW, Table, TableBlock, id_codes, id_labels
 
 SUFFIX = ".parquet"
-# What pandas writes of the labels of rows that were selected or sorted; the order of the rows says as much.
+# Column of row labels that pandas writes for selected or sorted rows; ignored, since the rows are in order.
 _ROW_LABELS = re.compile(r"__index_level_\d+__")
-# Of a row group as large as the file, so much is read ahead of each column.
+# Bytes read ahead of each column in a row group as large as the file.
 _READ_AHEAD_BYTES = 1 << 18
 
 
@@ -59,7 +59,7 @@ class ParquetTable:
         arrow, parquet = arrow_modules(path)
         self._types = arrow.types
         try:
-            # what is read ahead by row groups would be kept to the end of the file
+            # data read ahead by row groups would be kept to the end of the file
             self._file = parquet.ParquetFile(
                 path, pre_buffer=False, buffer_size=_READ_AHEAD_BYTES, page_checksum_verification=True
             )
@@ -76,22 +76,22 @@ class ParquetTable:
 
     @property
     def row_count(self) -> int:
-        """Rows of values in the file, empty ones with the others."""
+        """Number of rows in the file, including empty ones."""
         return int(self._file.metadata.num_rows)
 
     def whole(self, problems: ProblemList) -> Table:
-        """All rows; what is wrong goes to `problems`. Raises RecordingError for a damaged file."""
+        """All rows; faults go to `problems`. Raises RecordingError for a damaged file."""
         rows = max(self.row_count, 1)
         empty = self._schema.empty_table()
         labels = self._labels()
         return self._block(next(self._batches(rows), empty), FIRST_ROW, labels, problems)
 
     def blocks(self, rows: int) -> Iterator[TableBlock]:
-        """The rows, so many at a time at most, in the order of the file.
+        """The rows in blocks up to a size, in the order of the file.
 
         Raises RecordingError for a damaged file.
         """
-        labels = self._labels()  # before the rows: the file has one place at which it is read
+        labels = self._labels()  # before the rows: the file has a single read position
         first_row = FIRST_ROW
         for batch in self._batches(rows):
             problems = ProblemList(self._path)
@@ -110,7 +110,7 @@ class ParquetTable:
             raise RecordingError(_damaged(self._path)) from error
 
     def _wrong_columns(self, id_columns: Collection[str]) -> list[Problem]:
-        """Names that come twice, and columns of another kind than numbers."""
+        """Report repeated names, and columns that are not numbers."""
         problems = []
         for name in self._names:
             kind = self._schema.types[self._names.index(name)]
@@ -141,7 +141,7 @@ class ParquetTable:
         return bool(types.is_string(text) or types.is_large_string(text) or types.is_string_view(text))
 
     def _labels(self) -> Mapping[str, tuple[str, ...]]:
-        """Column of ids -> its different texts in the whole file; only of columns that hold more than numbers."""
+        """Column of ids -> its different texts in the whole file; only for columns with more than numbers."""
         kinds = zip(self._names, self._schema.types, strict=True)
         names = [name for name, kind in kinds if self._is_text(kind)]
         texts: dict[str, set[str]] = {name: set() for name in names}
@@ -187,7 +187,7 @@ class ParquetTable:
             numbers = plain_numbers(cells)
             assert numbers is not None
             return numbers
-        # a copy: what Arrow gives cannot be written to
+        # a copy: Arrow's data is read-only
         return np.array(column.cast("float64", safe=False).to_numpy(zero_copy_only=False), dtype=np.float64)
 
 

@@ -1,4 +1,4 @@
-"""The problems of one file, and rows, values and columns as its messages name them."""
+"""The problems of one file, and the wording of rows, values and columns in its messages."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from pathlib import Path
 
 from compd.errors import Problem
 
-# Rows, and different values, that a message lists.
+# Most rows, and different values, listed in a message.
 SHOWN_ROWS = 3
 
 
 class ProblemList:
-    """What is wrong with one file.
+    """Faults of one file.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ def values_text(values: Iterable[str]) -> str:
     for value in values:
         if value not in different:
             different.append(value)
-        if len(different) > SHOWN_ROWS:  # of millions no more need be looked at
+        if len(different) > SHOWN_ROWS:  # enough of millions of values
             break
     shown = ", ".join(repr(value if len(value) <= 40 else value[:37] + "...") for value in different[:SHOWN_ROWS])
     return shown + (", ..." if len(different) > SHOWN_ROWS else "")

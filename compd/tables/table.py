@@ -1,4 +1,4 @@
-"""A recording's table, from whatever file: columns of numbers, and the rows as a spreadsheet numbers them."""
+"""A recording's table from any kind of file: columns of numbers, and a spreadsheet's row numbers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Table:
 
 
 class TableBlock(NamedTuple):
-    """Some rows of a table, and what was wrong with them as they were read. table : None where there is none at all."""
+    """Some rows of a table with the faults found while reading. table : None without any table."""
 
     table: Table | None
     problems: ProblemList

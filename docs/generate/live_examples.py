@@ -68,7 +68,7 @@ class Connection:
 
 @cache
 def exchanges() -> Mapping[str, Exchange]:
-    """One exchange for every request, by its class, and one each for VERSION unasked, SETPOINT, ORDER and
+    """One exchange for every request, by its class, and one each for VERSION unsolicited, SETPOINT, ORDER and
     ERROR.
     """
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:

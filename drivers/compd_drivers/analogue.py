@@ -1,4 +1,4 @@
-"""Analogue input modules on Modbus: which input, its range, and the curve from V or mA to what is measured.
+"""Analogue input modules on Modbus: input, range, and the curve from V or mA to the measured quantity.
 
 A preset describes the module itself in its section `inputs`; what is wired to it is the person's to say.
 """
@@ -17,7 +17,7 @@ from compd_drivers.measured import DescriptionSection
 from compd_drivers.modbus_description import Address, Status
 from compd_drivers.modbus_number import NumberType
 
-INPUTS = 8  # of every module that is described here
+INPUTS = 8  # inputs of every module described here
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 RangeName = Literal["+-10V", "+-5V", "+-1V", "+-500mV", "+-150mV", "0-10V", "+-20mA", "0-20mA", "4-20mA"]
@@ -45,7 +45,7 @@ SPANS: Mapping[str, Span] = {
 
 
 class AnalogueInput(DescriptionSection):
-    """One input that is wired to a sensor."""
+    """One input with a sensor."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
     input: int = Field(ge=0, lt=INPUTS, description="the module's input, from 0")
@@ -56,7 +56,7 @@ class AnalogueInput(DescriptionSection):
 
 
 class AnalogueData(DescriptionSection):
-    """How the module gives an input's signal."""
+    """Form of an input's signal in the module."""
 
     type: NumberType = Field(description="how the number is stored")
     counts: tuple[int, int] | None = Field(
@@ -101,7 +101,7 @@ class AnalogueModule(DescriptionSection):
 
     @property
     def ranges(self) -> tuple[RangeName, ...]:
-        """All that an input may be set to; none where the module gives V or mA itself."""
+        """All settings of an input; empty for a module that delivers V or mA."""
         return tuple(name for data in self.data for name in data.ranges)
 
     def field(self, model_name: str) -> tuple[Any, FieldInfo]:
@@ -143,7 +143,7 @@ class AnalogueModule(DescriptionSection):
 
 
 class _RangedInput(AnalogueInput):
-    """An input whose range is set in the module; a model made from this one says which ranges the module has."""
+    """An input with a range set in the module; a derived model lists the module's ranges."""
 
     range: str
 
@@ -159,7 +159,7 @@ class _RangedInput(AnalogueInput):
 
 
 def _check_once(inputs: tuple[AnalogueInput, ...]) -> tuple[AnalogueInput, ...]:
-    """ValueError for an input that stands twice."""
+    """ValueError for a repeated input."""
     numbers = [wired.input for wired in inputs]
     if doubled := sorted({number for number in numbers if numbers.count(number) > 1}):
         raise ValueError(f"input {doubled[0]} stands twice")

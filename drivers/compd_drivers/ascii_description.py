@@ -1,4 +1,4 @@
-"""What a described ASCII gauge's entry in the configuration may say, and how it is checked."""
+"""Options of a described ASCII gauge in the configuration, and their checks."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQua
 from compd_drivers.number_form import DecimalMark
 from compd_drivers.reply_format import ReplyFormat
 
-# An error form that fits more than this share of so many values of all kinds leaves no value.
+# Share of sampled values of all kinds beyond which an error form would leave no value; and their number.
 NEARLY_EVERY = 0.9
 SAMPLED_VALUES = 200
-# Converters, as people write them where there are none. A request of an ADAM module begins with % and digits.
+# Converters that people write by mistake in literal text. A request of an ADAM module begins with % and digits.
 _REQUEST_PATTERN = re.compile(r"%%|%(?P<digits>[0#]?)(?P<skip>\d*)(?:\.(?P<behind>\d+))?<(?P<checksum>\w+)>|%\(\w+\)")
 _WORD_PATTERN = re.compile(r"%%|%[*?(]|%[+ ]?[0-9.]*[fdexcs]\b")
 
@@ -33,7 +33,7 @@ class AsciiChannel(MeasuredChannel):
 
 
 class ErrorReply(DescriptionSection):
-    """A reply that stands for the whole poll."""
+    """An error reply, which counts for the whole poll."""
 
     in_: str = Field(alias="in", description="what it looks like")
     quality: ReplyQuality = Field(description="what it means")
@@ -57,13 +57,13 @@ class ValueRequest(DescriptionSection):
 class Echo(Exchange):
     """A request whose reply cannot be mistaken for a measurement."""
 
-    every: int = Field(default=1, ge=1, description="before every so many polls; 1 finds every reply that is behind")
+    every: int = Field(default=1, ge=1, description="interval in polls; 1 finds every reply that is behind")
 
 
 class SerialAsciiOptions(ExchangeOptions):
     """Options of a described ASCII gauge."""
 
-    out: str = Field(default="", description="the request; left out: the device speaks unasked")
+    out: str = Field(default="", description="the request; omitted for a device that sends unsolicited readings")
     dtr_pulse_s: Seconds | None = Field(
         default=None, description="in place of `out`: the request is DTR, LOW for so long, s"
     )
@@ -93,7 +93,7 @@ class SerialAsciiOptions(ExchangeOptions):
         return self
 
     def _literal_problems(self) -> Iterator[str]:
-        """What looks like a pattern where every character stands for itself."""
+        """Apparent patterns in literal text."""
         exchanges: list[ValueRequest | Exchange] = [*self.requests, *self.init, *([self.echo] if self.echo else [])]
         for text in (self.out, *(exchange.out for exchange in exchanges)):
             if match := _REQUEST_PATTERN.search(text):
@@ -114,9 +114,9 @@ class SerialAsciiOptions(ExchangeOptions):
         if self.asked and self.dtr_pulse_s is not None:
             yield "the request is `out` or `dtr_pulse_s`, not both"
         if not self.asked and (self.init or self.echo or self.silent_in_menu):
-            yield "a device that speaks unasked, or by DTR, has no init, echo or silent_in_menu"
+            yield "a device that sends unsolicited readings, or by DTR, has no init, echo or silent_in_menu"
         if not self.asked and self.dtr_pulse_s is None and not self.in_terminator:
-            yield "a device that speaks unasked needs an `in_terminator`"
+            yield "a device that sends unsolicited readings needs an `in_terminator`"
 
     def _number_problems(self, description: Description) -> Iterator[str]:
         names = [channel.name for channel in self.channels]
@@ -141,17 +141,17 @@ class SerialAsciiOptions(ExchangeOptions):
 
     @property
     def asked(self) -> bool:
-        """Whether the device is asked by bytes."""
+        """Whether the device is polled by bytes."""
         return bool(self.out or self.requests)
 
     @property
     def values(self) -> tuple[tuple[str, str], ...]:
-        """Each request with values in its reply, without terminator, and what the reply looks like."""
+        """Each request with values in its reply, without terminator, and the reply's form."""
         return tuple((request.out, request.in_) for request in self.requests) or ((self.out, self.in_),)
 
 
 class PollForm(NamedTuple):
-    """One request as bytes, b"" where the device is not asked by any, and its reply."""
+    """One request as bytes (b"" for none), and its reply."""
 
     request: bytes
     reply: ReplyFormat
@@ -159,7 +159,7 @@ class PollForm(NamedTuple):
 
 
 class Description(NamedTuple):
-    """The options' texts, ready for use."""
+    """The compiled texts of the options."""
 
     polls: tuple[PollForm, ...]
     errors: tuple[tuple[ReplyFormat, ErrorReply], ...]
@@ -167,7 +167,7 @@ class Description(NamedTuple):
 
     @classmethod
     def of(cls, options: SerialAsciiOptions) -> Self:
-        """ValueError for a text that cannot be read."""
+        """ValueError for a faulty text."""
         single = len(options.channels) == 1
         instead = {c.name: {unescape(word) for word in c.instead} for c in options.channels}
         if single:
@@ -185,7 +185,7 @@ class Description(NamedTuple):
         )
 
     def error_like_a_value(self) -> tuple[str, str] | None:
-        """The first error form that fits nearly every value of a reply, and that reply's form."""
+        """The first error form that matches nearly every value of a reply, and that reply's form."""
         for poll in self.polls if self.errors else ():
             values = list(poll.reply.samples(SAMPLED_VALUES))
             for form, error in self.errors:
@@ -200,7 +200,7 @@ class Description(NamedTuple):
 
 
 def _what_it_means(match: re.Match[str]) -> str:
-    """What has to stand in a request in place of a converter."""
+    """The literal text of a request in place of a converter."""
     if match[0] == "%%":
         return "a single %"
     if match["checksum"] not in CHECKSUMS:
@@ -215,7 +215,7 @@ def _what_it_means(match: re.Match[str]) -> str:
 
 
 def _format(text: str, mark: DecimalMark, instead: Mapping[str, Collection[bytes]] | None = None) -> ReplyFormat:
-    """ValueError names the text that cannot be read."""
+    """ValueError names the faulty text."""
     try:
         return ReplyFormat(text, instead, mark)
     except ValueError as error:

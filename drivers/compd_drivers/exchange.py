@@ -1,4 +1,4 @@
-"""A request's reply on a line of bytes: two timeouts, and nothing behind the reply."""
+"""The reply to a request on a line of bytes: two timeouts, and no bytes behind the reply."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ExchangeOptions(GaugeOptions):
 
 
 def ask(line: ByteLine, options: ExchangeOptions, request: bytes) -> float:
-    """Send a request, behind a break where there is one; its time, s. Raises LineFault as the line does."""
+    """Send a request, after a break if there is one; return its time (s). Raises LineFault as the line does."""
     if options.break_s is not None:
         line.send_break(options.break_s)
     return line.send(request)
@@ -52,7 +52,7 @@ def receive_line(
     reply_timeout_s: float | None = None,
     gap_timeout_s: float | None = None,
 ) -> bytes:
-    """Bytes up to `terminator`, without it: for replies whose length is not known, as they come.
+    """Bytes up to `terminator`, without it: for replies of unknown length.
 
     Raises LineFault as the line does, MISMATCH beyond `limit` bytes.
     """
@@ -75,7 +75,7 @@ def following(line: ByteLine, count: int, gap_timeout_s: float | None, so_far: b
 
 
 def nothing_behind(line: ByteLine, options: ExchangeOptions, reply: bytes) -> None:
-    """Raises LineFault(MISMATCH) when more has come than the reply, unless the options allow it."""
+    """Raises LineFault(MISMATCH) for bytes behind the reply, unless the options allow them."""
     if options.extra_input == "ignore":
         return
     try:
@@ -88,7 +88,7 @@ def nothing_behind(line: ByteLine, options: ExchangeOptions, reply: bytes) -> No
 
 
 class MenuSilence:
-    """Tells a device that does not answer while in its menu from one that is lost.
+    """Distinguishes a device that is silent in its menu from a lost one.
 
     It had answered on this connection and then twice not: silent. The first time is a timeout like any other: the
     reply may only be late. A cable that came off looks the same as the menu.
@@ -99,12 +99,12 @@ class MenuSilence:
         self._timeouts = 0
 
     def answered(self, line: ByteLine) -> None:
-        """A whole reply has come."""
+        """Note a whole reply."""
         self._answered_on = line
         self._timeouts = 0
 
     def named(self, fault: LineFault, line: ByteLine) -> LineFault:
-        """The fault of a poll by its right name. Drains before it gives SILENT. Raises LineFault as draining does."""
+        """The precise fault of a poll. Drains before SILENT. Raises LineFault as draining does."""
         if fault.quality is not Quality.TIMEOUT or self._answered_on is not line:
             return fault
         self._timeouts += 1

@@ -34,7 +34,7 @@ class HeidenhainNd28xOptions(GaugeOptions):
     """Options of a scale display."""
 
     unit: Literal["mm", "inch"] = Field(
-        default="mm", description="what the display shows; the other one is refused, so that nobody switches it unseen"
+        default="mm", description="unit of the display; the other one is refused, so that switching it is noticed"
     )
 
 
@@ -58,7 +58,7 @@ class HeidenhainNd28x(Gauge[ByteLine]):
         return [(len(STX), REPLY_LENGTH)]
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
-        """Raises LineFault: MISMATCH for anything but a whole reply in the configured unit."""
+        """Raises LineFault: MISMATCH unless the reply is whole and in the configured unit."""
         time_s = line.send(STX)
         reply = line.receive(REPLY_LENGTH)
         match = _REPLY.fullmatch(reply)

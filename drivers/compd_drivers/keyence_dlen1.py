@@ -38,14 +38,14 @@ INSTEAD = {
     b"-099999998": (Quality.SENSOR_FAULT, "invalid"),
     b"+100000000": (Quality.SENSOR_FAULT, "amplifier error"),
 }
-LARGEST = 99_999_997  # beyond it every number is a code
+LARGEST = 99_999_997  # larger numbers are codes
 ERRORS = {b"031": "starting its communication", b"254": "system error, or starting", b"255": "format"}
 
 
 class KeyenceDlEn1Options(GaugeOptions):
     """Options of a DL-EN1."""
 
-    heads: int = Field(ge=1, le=MOST_HEADS, description="how many heads hang on the unit; channels are named 1, 2 ...")
+    heads: int = Field(ge=1, le=MOST_HEADS, description="number of heads on the unit; channels are named 1, 2 ...")
     decimals: int = Field(ge=0, le=6, description="of the amplifiers' display; GT2 in 0.1 um: 4")
 
 
@@ -70,7 +70,7 @@ class KeyenceDlEn1(Gauge[ByteLine]):
         return [(len(b"MS" + END), self._limit)]
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
-        """Raises LineFault: DEVICE_ERROR for `ER`, MISMATCH for anything but two fields per head."""
+        """Raises LineFault: DEVICE_ERROR for `ER`, MISMATCH unless there are two fields per head."""
         time_s = line.send(b"MS" + END)
         reply = line.receive_until(END, self._limit)[: -len(END)]
         if error := _ERROR.fullmatch(reply):

@@ -17,7 +17,7 @@ from pydantic import Field
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 
 MOST_HEADS = 15
-NO_VALUE_MM = 199.999  # from here on the number is a code, not a length
+NO_VALUE_MM = 199.999  # from here on numbers are codes
 END = b"\r\n"
 _NUMBER = re.compile(rb"[+-]\d{3}\.\d{4}")
 _NO_NUMBER = re.compile(rb"[^\d,]{1,9}")  # dashes or letters in place of digits
@@ -30,7 +30,7 @@ _STATUS_LENGTH = 3  # of `,dd`
 class KeyenceGt2DlRs1aOptions(GaugeOptions):
     """Options of a DL-RS1A."""
 
-    heads: int = Field(ge=1, le=MOST_HEADS, description="how many heads hang on the unit; channels are named 1, 2 ...")
+    heads: int = Field(ge=1, le=MOST_HEADS, description="number of heads on the unit; channels are named 1, 2 ...")
     request: Literal["M0", "MS"] = Field(
         default="M0", description="M0: values; MS: values with each head's status, for units that want it"
     )
@@ -59,7 +59,7 @@ class KeyenceGt2DlRs1a(Gauge[ByteLine]):
         return [(len(self._name + END), self._limit)]
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
-        """Raises LineFault: DEVICE_ERROR for `ER`, MISMATCH for anything but one field per head."""
+        """Raises LineFault: DEVICE_ERROR for `ER`, MISMATCH unless there is one field per head."""
         time_s = line.send(self._name + END)
         reply = line.receive_until(END, self._limit)[: -len(END)]
         name, *fields = reply.split(b",")
@@ -79,7 +79,7 @@ class KeyenceGt2DlRs1a(Gauge[ByteLine]):
 
 
 def _reading(field: bytes, time_s: float, reply: bytes) -> Reading:
-    """One head. Digits and others mixed are damage on the wire, and then no field of the reply can be trusted."""
+    """One head. Digits mixed with other characters are damage on the wire, which makes every field doubtful."""
     if not _NUMBER.fullmatch(field):
         if _NO_NUMBER.fullmatch(field):
             return bad(time_s, Quality.SENSOR_FAULT, field.decode("ascii", "backslashreplace"))

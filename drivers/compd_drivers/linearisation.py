@@ -1,4 +1,4 @@
-"""From a sensor's signal (V, mA) to what it measures: a table or a polynomial out of its calibration.
+"""From a sensor's signal (V, mA) to its quantity: a table or a polynomial from its calibration.
 
     linearisation: {signal: V, table: [[-10, -1.0], [0, 0.002], [10, 1.0]]}
     linearisation: {signal: mA, polynomial: [-1.25, 0.0625], valid: [4, 20]}       # -1.25 + 0.0625 x, at 20 mA 0
@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from compd.gauge import Quality, Reading, bad, good
 
-# NAMUR NE 43: outside these a 4-20 mA transmitter reports its own failure, or its wire is broken.
+# Limits (mA) of NAMUR NE 43: outside them a 4-20 mA transmitter reports its own failure, or its wire is broken.
 FAILURE_LOW_mA = 3.6
 FAILURE_HIGH_mA = 21.0
 
@@ -31,7 +31,7 @@ class Linearisation(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    signal: Literal["V", "mA"] = Field(description="what the sensor puts out")
+    signal: Literal["V", "mA"] = Field(description="the sensor's signal")
     table: tuple[tuple[Finite, Finite], ...] | None = Field(
         default=None, min_length=2, description="[signal, value] pairs, signals rising; straight lines between them"
     )
@@ -75,10 +75,10 @@ class Linearisation(BaseModel):
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Lowest and highest signal that has a value."""
+        """Lowest and highest signal with a value."""
         if self.table is not None:
             return self.table[0][0], self.table[-1][0]
-        assert self.valid is not None  # the validator has seen to it
+        assert self.valid is not None  # ensured by the validator
         return self.valid
 
     def reading(self, signal: float, time_s: float) -> Reading:
@@ -101,7 +101,7 @@ class Linearisation(BaseModel):
             for coefficient in reversed(self.polynomial):
                 value = value * signal + coefficient
             return value
-        assert self.table is not None  # the validator has seen to it
+        assert self.table is not None  # ensured by the validator
         after = min(bisect_right(self.table, signal, key=lambda pair: pair[0]), len(self.table) - 1)
         (x0, y0), (x1, y1) = self.table[after - 1 : after + 1]
         return y0 + (y1 - y0) * (signal - x0) / (x1 - x0)

@@ -38,9 +38,9 @@ class MahrC1202Options(GaugeOptions):
     """Options of a C1202."""
 
     features: Annotated[tuple[Literal[1, 2, 3], ...], Field(min_length=1)] = Field(
-        description="which features are read; channels are named 1, 2, 3"
+        description="features to read; channels are named 1, 2, 3"
     )
-    unit: Literal["mm", "um", "inch"] = Field(description="what it is set to; any other one on the wire is refused")
+    unit: Literal["mm", "um", "inch"] = Field(description="its unit; any other one on the wire is refused")
     digits: int = Field(ge=1, le=6, description="digits before the point, leading zeros included")
     decimals: int = Field(ge=1, le=6, description="digits behind the point")
 
@@ -78,7 +78,7 @@ class MahrC1202(Gauge[ByteLine]):
         return [(len(self._request), len(self._asked) * (feature + 1))]
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
-        """Raises LineFault: SILENT or TIMEOUT (see above), MISMATCH for anything but the features that were asked."""
+        """Raises LineFault: SILENT or TIMEOUT (see above), MISMATCH unless the requested features answer."""
         time_s = line.send(self._request)
         try:
             reply = receive_line(line, CR, LONGEST_REPLY)

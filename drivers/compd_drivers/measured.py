@@ -1,4 +1,4 @@
-"""What every described channel has: a name, the unit on the wire, and when its number counts.
+"""Common options of described channels: name, unit on the wire, valid numbers.
 
 One key `unit` says what the device sends; the channel delivers mm, degC, N, hPa, pct or 1.
 """
@@ -18,7 +18,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 WireUnit = Literal[
     "mm", "um", "nm", "inch", "mil", "degC", "degF", "K", "N", "kN", "hPa", "mbar", "kPa", "Pa", "pct", "1", "V", "mA"
 ]
-# What a device may say in place of a number.
+# Qualities that a device may send in place of a number.
 ReplyQuality = Literal["sensor_fault", "device_error", "over_range", "under_range", "silent"]
 
 
@@ -52,23 +52,23 @@ CONVERSIONS: Mapping[str, _Conversion] = {
 SIGNALS = ("V", "mA")
 
 
-# No instrument shows a number that is smaller, but for 0, or larger; a float whose bytes are exchanged does.
+# Smallest (besides 0) and largest plausible float; floats with exchanged bytes lie outside.
 SMALLEST_FLOAT, LARGEST_FLOAT = 1e-20, 1e20
 
 
 def not_measured(number: float) -> bool:
-    """Whether a float on the wire can be no measurement, and is read in a wrong order of its bytes."""
+    """Whether a float on the wire is implausible, and probably read in a wrong order of its bytes."""
     return math.isfinite(number) and number != 0.0 and not SMALLEST_FLOAT <= abs(number) <= LARGEST_FLOAT
 
 
 class DescriptionSection(BaseModel):
-    """A part of a description: unknown keys are refused, and nothing changes it."""
+    """A part of a description: unknown keys are refused, values are immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class MeasuredChannel(DescriptionSection):
-    """One number that a device sends."""
+    """One number sent by a device."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9_]+$", description="name of the channel")
     unit: WireUnit = Field(description="of the number on the wire, after `scale`; V and mA need a linearisation")
@@ -93,11 +93,11 @@ class MeasuredChannel(DescriptionSection):
 
     @property
     def channel(self) -> Channel:
-        """What the gauge delivers."""
+        """The gauge's channel."""
         return Channel(self.name, self.measures if self.linearisation else CONVERSIONS[self.unit].unit)
 
     def reading(self, number: float, time_s: float) -> Reading:
-        """The reading for a number as it stood on the wire."""
+        """The reading for a number from the wire."""
         scaled = number * self.scale
         if self.linearisation is not None:
             reading = self.linearisation.reading(scaled, time_s)
@@ -113,5 +113,5 @@ class MeasuredChannel(DescriptionSection):
 
 
 def repeated(names: list[str]) -> str:
-    """The names that stand more than once, in one text; "" if none does."""
+    """Repeated names in one text; "" for none."""
     return ", ".join(sorted({name for name in names if names.count(name) > 1}))

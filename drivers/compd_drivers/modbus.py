@@ -44,12 +44,12 @@ from compd_drivers.modbus_description import ModbusChannel, ModbusOptions, Modbu
 from compd_drivers.modbus_doubts import doubts
 from compd_drivers.modbus_number import FLOATS, READ_BITS, decode
 
-# Less than Modbus allows: a serial master wants to ask for more.
+# Most registers of a read: fewer than Modbus allows, as a serial master asks for one more.
 MOST_REGISTERS, MOST_BITS = 124, 1992
 
 
 class RegisterBlock(NamedTuple):
-    """Adjacent registers that are read together."""
+    """Adjacent registers read together."""
 
     function: int
     address: int
@@ -57,7 +57,7 @@ class RegisterBlock(NamedTuple):
 
 
 class _RegisterPlace(NamedTuple):
-    """Where a channel's registers are in the blocks."""
+    """Position of a channel's registers in the blocks."""
 
     block: int
     first: int
@@ -124,13 +124,13 @@ class Modbus(Gauge[RegisterLine]):
         return writes + [(8, 5 + _data_bytes(block)) for block in self.blocks]
 
     def read(self, line: RegisterLine) -> Sequence[Reading]:
-        """Raises LineFault as the line does: a block that cannot be read leaves the whole gauge without values.
+        """Raises LineFault as the line does: an unreadable block leaves the whole gauge without values.
 
         MISMATCH for another device than the one that the description names.
         """
         if self._ready_on is not line:
             self._begin(line)
-        self._ready_on = None  # until all has gone well
+        self._ready_on = None  # until all has succeeded
         latched_s = [self._write(line, write) for write in self._description.write_before_poll]
         replies = [self._read_block(line, block) for block in self.blocks]
         self._ready_on = line
@@ -145,7 +145,7 @@ class Modbus(Gauge[RegisterLine]):
         return readings
 
     def _begin(self, line: RegisterLine) -> None:
-        """Make sure that it is this device, then write what it needs. Raises LineFault."""
+        """Check the device's identity, then write its settings. Raises LineFault."""
         if identity := self._description.identity:
             place = (self._unit, identity.function, identity.address)
             registers, _ = line.read_registers(*place, len(identity.equals))
@@ -227,7 +227,7 @@ def _status_quality(status: Status, status_value: int) -> Quality:
 
 
 def _other_orders(channel: ModbusChannel, registers: Sequence[int], raw: float) -> str:
-    """What the same registers are in the other orders of bytes and words, for a person who knows the value."""
+    """The same registers in other orders of bytes and words, for a person who knows the value."""
     orders = [
         channel.model_copy(update={"word_order": words, "byte_order": inside})
         for words in ("high_first", "low_first")

@@ -1,4 +1,4 @@
-"""What a described Modbus gauge's entry in the configuration may say, and how it is checked."""
+"""Options of a described Modbus gauge in the configuration, and their checks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BROADCAST = 0
 
 
 class Status(DescriptionSection):
-    """A register, or bits of one, that say whether a channel's value counts."""
+    """A register, or bits of one, with the validity of a channel's value."""
 
     address: Address = Field(description="of the status register, or bit")
     function: Function | None = Field(default=None, description="by which it is read; the channel's own if left out")
@@ -66,12 +66,12 @@ class ModbusChannel(RegisterNumber):
 
     @property
     def status_function(self) -> int:
-        """The function by which the status is read."""
+        """The function for reading the status."""
         return self.status.function if self.status and self.status.function else self.function
 
 
 class ModbusWrite(DescriptionSection):
-    """Something that is written to the device."""
+    """A value written to the device."""
 
     function: Literal[5, 6, 16] = Field(description="5: one coil, 6: one register, 16: several registers")
     address: Address = Field(description="of the coil or the first register, from 0")
@@ -82,7 +82,7 @@ class ModbusWrite(DescriptionSection):
         default=None, description="to whom: the gauge's own if left out; 0 on a serial line: all, without an answer"
     )
     settle_s: Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)] = Field(
-        default=0.0, description="how long the device is busy with it: the next request waits so long"
+        default=0.0, description="how long the device is busy with it: the next request waits for this time"
     )
 
     @model_validator(mode="after")
@@ -99,7 +99,7 @@ class ModbusWrite(DescriptionSection):
 
 
 class Identity(DescriptionSection):
-    """Registers by which the device is known: a serial number, a type."""
+    """Registers that identify the device: a serial number, a type."""
 
     function: Literal[3, 4] = Field(description="3: holding registers, 4: input registers")
     address: Address = Field(description="of the first of them, from 0")

@@ -1,4 +1,4 @@
-"""What can be used of a described Modbus gauge and is probably a slip: registers that two numbers share, a factor."""
+"""Probable slips in a described Modbus gauge: registers shared by two numbers, an odd factor."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from compd.gauge import OptionDoubt
 from compd_drivers.modbus_description import ModbusChannel
 from compd_drivers.modbus_number import FLOATS
 
-# Modbus's "reference numbers": in a manual 10001 is the first discrete input, 30001 the first input register, 40001 the
-# first holding register.
+# First digits of Modbus's "reference numbers": in a manual 10001 is the first discrete input, 30001 the first input
+# register, 40001 the first holding register.
 _REFERENCES = {10001: 2, 30001: 4, 40001: 3}
 _HIGHEST_REFERENCE = 9999
-# No sensor of a machine shows so much, in any unit; an ill factor is wrong by ten or more.
+# Numbers above those of any sensor of a machine, by unit; a wrong factor is off by ten or more.
 _LARGEST = {"degC": 5e3, "hPa": 1e5, "pct": 1e4}
-# No sensor of a machine has a digit as coarse as that; a float's digit is fine, and its factor turns kelvin or
-# fahrenheit into degC at most.
+# Coarsest digit of a machine's sensors by unit; a float's digit is fine, and its factor at most converts kelvin or
+# fahrenheit to degC.
 _COARSEST = {"mm": 0.1, "degC": 2.0}
 _FLOATS_FACTOR = {"degC": 1.0}
 
 
 def doubts(channels: Sequence[ModbusChannel]) -> Iterator[OptionDoubt]:
-    """What is doubtful about a register map."""
+    """Doubts about a register map."""
     for (_, one), (k, other) in combinations(enumerate(channels), 2):
         if _share(one, other):
             yield OptionDoubt(
@@ -51,7 +51,7 @@ def doubts(channels: Sequence[ModbusChannel]) -> Iterator[OptionDoubt]:
 
 
 def _why_no_factor(channel: ModbusChannel) -> str:
-    """What is wrong with a channel's `scale`; "" where nothing is, or nobody can say."""
+    """The fault of a channel's `scale`; "" for a good or undecidable one."""
     if channel.scale == 0:
         return "the value would never change"
     if channel.linearisation is not None or channel.type == "bit":
@@ -75,7 +75,7 @@ def _span(channel: ModbusChannel) -> str:
 
 
 def _share(one: ModbusChannel, other: ModbusChannel) -> bool:
-    """Whether two numbers have a register in common of which each takes the whole."""
+    """Whether two numbers both take the whole of a common register."""
     if one.function != other.function or "bit" in (one.type, other.type):
         return False
     apart = one.address + one.length <= other.address or other.address + other.length <= one.address
@@ -87,9 +87,9 @@ def _takes_all(channel: ModbusChannel) -> bool:
 
 
 def _largest(channel: ModbusChannel) -> float:
-    """The largest number that a whole number's registers can hold, in the channel's unit; 0 where nobody can say."""
+    """The largest number in a whole number's registers, in the channel's unit; 0 if unknown."""
     if channel.highest is not None:
         return 0.0
     bits = 8 * channel.bytes
-    # more than 16 bits are seldom used up
+    # more than 16 bits are seldom used fully
     return abs(channel.scale) * (2 ** (bits - 1) - 1) if 8 < bits <= 16 else 0.0

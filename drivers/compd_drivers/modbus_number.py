@@ -1,4 +1,4 @@
-"""How a number is kept in Modbus registers: its type, the order of words and bytes, and the bits that belong to it."""
+"""Form of a number in Modbus registers: its type, the order of words and bytes, and its bits."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ READ_BITS = (1, 2)
 
 
 class RegisterNumber(DescriptionSection):
-    """Where in the registers a number's bits are."""
+    """Position of a number's bits in the registers."""
 
     type: NumberType = Field(
         description="how the number is stored: int or uint with 8, 16, 24, 32 or 64 bits; float32, float64; bcd8, "
@@ -33,16 +33,14 @@ class RegisterNumber(DescriptionSection):
         default="high_first", description="of a number in several registers"
     )
     byte_order: Literal["big", "little"] = Field(default="big", description="inside a register; big is Modbus's own")
-    at_byte: int = Field(
-        default=0, ge=0, le=7, description="bytes before the number, in its registers as those orders put them"
-    )
+    at_byte: int = Field(default=0, ge=0, le=7, description="bytes before the number, in its registers in those orders")
     mask: Mask | None = Field(default=None, description="the bits that belong to the number; all if left out")
     shift: int = Field(default=0, ge=0, le=63, description="bits by which what the mask leaves is moved down")
     minus: Mask | None = Field(default=None, description="the bit that is 1 for a negative number beside its size")
 
     @property
     def bytes(self) -> int:
-        """Bytes that the number takes, without those before it; 0 for a bit."""
+        """Length of the number in bytes, without those before it; 0 for a bit."""
         return int(re.sub(r"\D", "", self.type) or 0) // 8
 
     @property

@@ -1,4 +1,4 @@
-r"""MQTT gauge: what a device, or a gateway, publishes on a topic; a plain number, or JSON with a path.
+r"""MQTT gauge: values published on a topic by a device or a gateway; a plain number, or JSON with a path.
 
 A plain number, which its device publishes ten times a second, whether or not it has changed:
 
@@ -40,20 +40,20 @@ _NUMBER = re.compile(rb"\s*([+-]?[0-9]+(\.[0-9]*)?([eE][+-]?[0-9]+)?)\s*")
 _NOT_FINITE = re.compile(rb"\s*[+-]?(nan|inf|infinity)\s*", re.IGNORECASE)
 _FRACTION = re.compile(r"[T ]\d\d:?\d\d:?\d\d[.,](\d+)")
 _UNITS_S: Mapping[str, float] = {"unix_s": 1.0, "unix_ms": 1e-3, "unix_us": 1e-6, "unix_ns": 1e-9}
-# Times outside of these are no times, s since 1970: the years 2000 and 2100. A clock that was never set shows 1970.
+# Valid times (s since 1970): the years 2000 to 2100. A clock that was never set shows 1970.
 _EARLIEST_S, _LATEST_S = 946684800.0, 4102444800.0
 SHOWN_BYTES = 60  # of a payload, in a fault's detail
 
 
 class MqttStatus(DescriptionSection):
-    """A part of the payload that says whether the value counts."""
+    """The part of the payload with the value's validity."""
 
     at: Pointer = Field(pattern=_POINTER, description="where it stands, as a JSON Pointer")
     ok: tuple[str | bool | int, ...] = Field(min_length=1, description="what it says when the value counts")
 
 
 class MqttChannel(MeasuredChannel):
-    """One value: its topic, and where it stands in the payload."""
+    """One value: its topic, and its position in the payload."""
 
     topic: str = Field(min_length=1, description="without wildcards")
     value: Pointer = Field(
@@ -141,7 +141,7 @@ class Mqtt(PushedGauge):
         return period_s
 
     def stamp(self, place: int, message: Message) -> Stamp:
-        """The time in the payload. Raises LineFault (MISMATCH) where it is to have one."""
+        """The time in the payload. Raises LineFault (MISMATCH) if a required one is missing."""
         described = self._described[place]
         if described.time is None or self.options.time_from == "arrival":
             return Stamp(math.nan)
@@ -188,7 +188,7 @@ def _number_reading(described: MqttChannel, payload: bytes, time_s: float) -> Re
 
 
 def _as_float(value: float) -> float:
-    """The number; inf for a whole number that is too large for a float."""
+    """The number; inf for a whole number too large for a float."""
     try:
         return float(value)
     except OverflowError:
@@ -196,7 +196,7 @@ def _as_float(value: float) -> float:
 
 
 def _at(document: Any, pointer: Pointer) -> Any:
-    """What stands at a JSON Pointer (RFC 6901). Raises LineFault (MISMATCH) where nothing does."""
+    """The value at a JSON Pointer (RFC 6901). Raises LineFault (MISMATCH) if there is none."""
     value = document
     for token in pointer.split("/")[1:]:
         key = token.replace("~1", "/").replace("~0", "~")

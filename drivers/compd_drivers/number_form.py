@@ -1,4 +1,4 @@
-"""How a number stands in a reply: what printf would print, as a pattern, and the words that multiply it."""
+"""Form of a number in a reply: the output of printf as a pattern, and the words that multiply it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class NumberForm:
     mark: DecimalMark
 
     def __post_init__(self) -> None:
-        """ValueError for what no number can be."""
+        """ValueError for an impossible form."""
         if self.decimals is not None and (self.kind in "dx" or (self.decimals == 0 and self.kind == "f")):
             raise ValueError("decimals belong to %f and %e, and %f has at least one")
         if self.kind == "x" and "+" in self.flags and self.width is None:
@@ -47,7 +47,7 @@ class NumberForm:
 
     @property
     def place(self) -> str:
-        """The pattern of its place: as wide as the number is, where that is known."""
+        """The pattern of its place: as wide as the number, if that is known."""
         return self.text if self.width is None else f"{characters(self.kind, self.mark)}{{{self.width}}}"
 
     @cached_property
@@ -55,7 +55,7 @@ class NumberForm:
         return re.compile(self.text.encode("latin-1"))
 
     def value(self, text: bytes, unsigned: bool) -> float | None:
-        """The number that a text is; None where it is none. unsigned : the sign stands elsewhere, not in the number."""
+        """The number in a text; None if it is none. unsigned : the sign stands outside the number."""
         if not self._matches.fullmatch(text) or (unsigned and re.match(rb" *[+-]", text)):
             return None
         digits = text.replace(b" ", b"")
@@ -96,7 +96,7 @@ class FactorWords:
 
     @classmethod
     def of(cls, channel: str, text: str) -> Self:
-        """ValueError for anything but WORD=FACTOR, with | between them."""
+        """ValueError unless it is WORD=FACTOR, separated by |."""
         factors: dict[str, float] = {}
         for part in text.split("|"):
             word, equals, factor = part.rpartition("=")
@@ -120,5 +120,5 @@ class FactorWords:
 
     @property
     def pattern(self) -> str:
-        """The longest word first, or `mm` would pass for `m`."""
+        """The longest word first, so that `mm` does not match `m`."""
         return "|".join(re.escape(word) for word in sorted(self.factors, key=len, reverse=True))

@@ -1,4 +1,4 @@
-"""OPC UA gauge: numbers that a server, of a PLC or of a measuring system, has as nodes.
+"""OPC UA gauge: numbers in nodes of a server, such as a PLC or a measuring system.
 
     gauges:
       joint_1: {driver: opc_ua, line: plc, channels: [{name: value, node: "ns=2;s=Probe1", unit: um}]}
@@ -28,7 +28,7 @@ SHOWN = 60  # characters of a value that is no number
 
 
 class OpcUaChannel(MeasuredChannel):
-    """One value: a node, or an entry of a node that is an array."""
+    """One value: a node, or an entry of an array node."""
 
     node: str = Field(pattern=_NODE, description="its id: ns=2;s=NAME, ns=2;i=NUMBER, nsu=NAMESPACE;s=NAME")
     index: int | None = Field(default=None, ge=0, description="entry of an array, from 0; left out: it is one number")
@@ -47,7 +47,7 @@ class OpcUaOptions(PushedGaugeOptions):
 
 
 class OpcUa(PushedGauge):
-    """Numbers that an OPC UA server has as nodes, by a subscription."""
+    """Numbers in nodes of an OPC UA server, by a subscription."""
 
     Options: ClassVar[type[GaugeOptions]] = OpcUaOptions
     line_kind: ClassVar[LineKind] = "nodes"

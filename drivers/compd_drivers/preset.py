@@ -1,4 +1,4 @@
-"""A described gauge as data: what the YAML file of a preset may say, and what it makes of a gauge's options.
+"""A described gauge as data: the contents of a preset's YAML file, and their use for a gauge's options.
 
 `drivers/compd_drivers/presets/README.md` shows how a preset is written. The model here checks the file when it is
 read; `gauge_options` and `simulated_options` fill the description in with the options that a person has chosen.
@@ -21,14 +21,14 @@ Value = str | int | float
 
 
 class LineAsDelivered(DescriptionSection):
-    """How the manual says that the device's port is set."""
+    """Port settings by the device's manual."""
 
     baud: int = Field(ge=50, description="bits per second")
     format: str = Field(pattern=r"^[78][NEO][12]$", description="data bits, parity, stop bits: 8N1, 7E2 ...")
 
 
 class PresetOption(DescriptionSection):
-    """An option that the person has to choose: exactly one of `one_of`, `some_of`, `whole` and `like`."""
+    """An option for the person to choose: exactly one of `one_of`, `some_of`, `whole` and `like`."""
 
     one_of: tuple[Value, ...] = Field(default=(), description="the values of which one is chosen")
     some_of: tuple[Value, ...] = Field(default=(), description="the values of which at least one is chosen")
@@ -71,7 +71,7 @@ class PresetOption(DescriptionSection):
 
 
 class PresetVariant(DescriptionSection):
-    """A part of the description that holds for some values of the options only."""
+    """A part of the description that applies to some values of the options only."""
 
     when: dict[str, Value | tuple[Value | None, ...] | None] = Field(
         default={}, description="option -> its value, or several of which one is enough; {}: always"
@@ -153,7 +153,7 @@ class Preset(DescriptionSection):
         )
 
     def gauge_options(self, options: GaugeOptions, base: type[BaseModel]) -> BaseModel:
-        """The base driver's options for the chosen ones. ValueError where no variant applies, or they do not fit."""
+        """The base driver's options for the chosen ones. ValueError if no variant applies, or they contradict."""
         return base.model_validate(self._described(options, base, simulated=False))
 
     def simulated_options(self, options: GaugeOptions, base: type[BaseModel]) -> BaseModel:
@@ -187,7 +187,7 @@ class Preset(DescriptionSection):
 
 
 def field_at(model: type[BaseModel], path: str) -> FieldInfo:
-    """The field `a`, or `a.b` where `a` is a list of sections. ValueError where the model has none."""
+    """The field `a`, or `a.b` for a list `a` of sections. ValueError if the model has none."""
     *lists, name = path.split(".")
     for key in lists:
         items = getattr(model.model_fields.get(key), "annotation", None)
@@ -201,7 +201,7 @@ def field_at(model: type[BaseModel], path: str) -> FieldInfo:
 
 
 def placeholders(description: Any) -> Iterator[str]:
-    """The options' names that stand in braces anywhere in a description."""
+    """Names of options in braces anywhere in a description."""
     if isinstance(description, str):
         yield from (name for _, name, _, _ in string.Formatter().parse(description) if name is not None)
     elif isinstance(description, dict):
@@ -228,7 +228,7 @@ def fill_in(description: Any, chosen: Mapping[str, Any]) -> Any:
 
 
 def in_one_line(error: ValidationError) -> str:
-    """All that pydantic found, each with its place; of a list only what is wrong with its items, if anything is."""
+    """All errors of pydantic with their locations; for a list with faulty items only those of the items."""
     details = error.errors(include_url=False)
     places = [detail["loc"] for detail in details]
     return "; ".join(

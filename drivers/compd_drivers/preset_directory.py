@@ -43,7 +43,7 @@ class PresetDirectory:
         self.simulated_device = cache(self._simulated_device)
 
     def names(self) -> list[str]:
-        """Of all presets, sorted."""
+        """Names of all presets, sorted."""
         return sorted(file.name.removesuffix(SUFFIX) for file in self._folder.iterdir() if file.name.endswith(SUFFIX))
 
     def read(self, name: str) -> tuple[Preset, Document]:
@@ -86,7 +86,7 @@ class PresetDirectory:
 
 
 def driver_class(name: str, preset: Preset, base: type[Gauge[Any]]) -> type[Gauge[Any]]:
-    """A class that differs from its base driver in its options alone.
+    """A class that differs from its base driver only in its options.
 
     Raises ValueError where an option is `like` one that the base driver has not, ValidationError where `sample`
     are no options of this preset.
@@ -118,7 +118,7 @@ def driver_class(name: str, preset: Preset, base: type[Gauge[Any]]) -> type[Gaug
 
 
 def simulated_class(name: str, preset: Preset, base_options: type[BaseModel], device: Any) -> type:
-    """The base protocol's simulated device for this description. A channel that is not read has its sensor off."""
+    """The base protocol's simulated device for this description. Unread channels have their sensor off."""
 
     def initialise(self: Any, options: Any, sense: Any) -> None:
         described: Any = preset.simulated_options(options, base_options)

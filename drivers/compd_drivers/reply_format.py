@@ -1,4 +1,4 @@
-r"""What a reply must look like: text with converters, in the manner of StreamDevice and printf.
+r"""Form of a reply: text with converters, in the manner of StreamDevice and printf.
 
 Everything is literal but a backslash and a percent sign:
 
@@ -40,8 +40,8 @@ from compd.lines import CHECKSUMS, ChecksumField, ChecksumKind
 from compd.text import unescape
 from compd_drivers.number_form import DecimalMark, FactorWords, NumberForm, characters
 
-OPEN_LENGTH = 32  # bytes of a number without width: more than any instrument sends
-OPEN_SKIPPED = 256  # bytes of a skipped part without width, such as the rest of a protocol's line
+OPEN_LENGTH = 32  # most bytes of a number without width: above those of any instrument
+OPEN_SKIPPED = 256  # most bytes of a skipped part without width, such as the rest of a protocol's line
 _CONVERTER = re.compile(
     r"%(?:(?P<percent>%)"
     r"|(?P<digits>[0#]?)(?P<skip>\d*)(?:\.(?P<behind>\d+))?<(?P<checksum>\w+)>"
@@ -63,17 +63,17 @@ class ReplyFormat:
     def __init__(
         self, text: str, instead: Mapping[str, Collection[bytes]] | None = None, mark: DecimalMark = "."
     ) -> None:
-        """`instead`: by channel, what may stand in place of its number. ValueError says what is wrong."""
+        """`instead`: alternatives to the number, by channel. ValueError names the fault."""
         self._instead = instead or {}
         self._mark = mark
         self._numbers: list[NumberForm] = []
         self._words: list[FactorWords] = []
         self._checks: list[ChecksumField] = []
-        self._before: Literal["fixed", "number", "number of open width", "skipped"] = "fixed"  # what stands before
-        self._samples: list[Callable[[Random, bytes], bytes]] = []  # each part, behind what stands before it
+        self._before: Literal["fixed", "number", "number of open width", "skipped"] = "fixed"  # the parts before
+        self._samples: list[Callable[[Random, bytes], bytes]] = []  # each part, behind the parts before it
         self.length: int | None = 0
         self.longest = 0
-        self.literal = b""  # all that is literal, for counting terminators
+        self.literal = b""  # all literal text, for counting terminators
         source = unescape(text).decode("latin-1")
         pattern = ""
         at = 0
@@ -101,11 +101,11 @@ class ReplyFormat:
 
     @property
     def has_checksum(self) -> bool:
-        """Whether damage is found by more than its shape."""
+        """Whether damage is detected by more than the reply's shape."""
         return bool(self._checks)
 
     def match(self, reply: bytes) -> tuple[float | bytes, ...] | None:
-        """Per number its value, or the bytes that stand in its place; None if the reply is anything else.
+        """Value of each number, or the bytes in its place; None for any other reply.
 
         A reply whose checksum does not fit is no match either: see `checksum_fits`.
         """
@@ -135,7 +135,7 @@ class ReplyFormat:
             try:
                 for part in self._samples:
                     reply += part(random, reply)
-            except ValueError:  # no checksum can be made of what is skipped
+            except ValueError:  # skipped text has no checksum
                 continue
             if self.match(reply) is not None:
                 yield reply
@@ -157,7 +157,7 @@ class ReplyFormat:
         return True
 
     def _sign_is_elsewhere(self, channel: str) -> bool:
-        """Whether a word beside the channel's number says its sign."""
+        """Whether a word beside the channel's number gives its sign."""
         return any(words.turns_sign for words in self._words if words.channel == channel)
 
     def _literally(self, text: str) -> str:
@@ -210,7 +210,7 @@ class ReplyFormat:
             width = width or 1
         of_kind = "." if kind == "c" else r"[^ \t\r\n]" if kind == "s" else characters(kind, self._mark) if kind else ""
         skipped = of_kind or _set(match["set"])
-        # what is skipped must not take digits of the number before it, which it cannot where both have a width
+        # skipped text must not take digits of the preceding number; widths of both prevent it
         both_fixed = self._before == "number" and width is not None and not match["optional"]
         whole = self._digits_end if self._before.startswith("number") and not both_fixed else ""
         of_the_set = re.compile(skipped.encode("latin-1"), re.DOTALL)
@@ -225,7 +225,7 @@ class ReplyFormat:
 
     @property
     def _digits_end(self) -> str:
-        """What must not follow a number of open width."""
+        """Parts that must not follow a number of open width."""
         return rf"(?![0-9{self._mark}])"
 
     def _number(self, match: re.Match[str]) -> str:
@@ -243,7 +243,7 @@ class ReplyFormat:
         words = [re.escape(word.decode("latin-1")) for word in sorted(self._instead.get(name, ()), key=len)]
         lengths = {len(word) for word in self._instead.get(name, ())} | {width}
         self._longer(width if len(lengths) == 1 else None)
-        # nor may it take the sign or a digit of this one; and a number of open width ends with its last digit
+        # nor the sign or a digit of this one; and a number of open width ends with its last digit
         mark = re.escape(self._mark)
         begins = rf"(?:(?<![0-9{mark}+\-])|(?<![{mark}+\-])(?=[+\- ]))" if self._before == "skipped" else ""
         ends = "" if width or decimals else r"(?![0-9A-Fa-f])" if number.kind == "x" else self._digits_end
@@ -265,7 +265,7 @@ class ReplyFormat:
 
 
 def _set(text: str) -> str:
-    """A StreamDevice set as a regular expression: a leading ^ turns it round, a-z is a range."""
+    """A StreamDevice set as a regular expression: a leading ^ negates it, a-z is a range."""
     turned, members = ("^", text[1:]) if text.startswith("^") else ("", text)
     if not members:
         raise ValueError("%*[]: a set without members")

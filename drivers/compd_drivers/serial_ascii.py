@@ -39,15 +39,13 @@ Wagner Force Ten, page 25: blank or minus, 5 digits and point, blank, unit, Peak
       errors: [{in: "%*?[ ]HELP%*?[ LB]", quality: over_range}]
 
 A device that is asked by a pulse of DTR has `dtr_pulse_s` in place of `out`; `line_needs` powers its cable.
-A device that speaks unasked, as the last, has no `out`: each of its lines counts, never a half one, and its time is
-that at which the line before it began; `reply_timeout_s` must be longer than its period.
-A device with a request for each of its values (M1, M2 ...) has `requests: [{out: M1, in: ...}, ...]` in place of `out`
-and `in`; each channel has the time of its own request.
-`echo` is a second request whose reply looks different: asked before every `every`-th poll, it finds a device whose
-replies are one behind.
-Devices that fall silent by design (in their menu) get `silent_in_menu: true`: after a whole reply on a connection,
-the second poll without any byte is `silent` instead of `timeout`. A cable that comes off afterwards looks the same,
-and the detail says so; both are without a value.
+A device that sends unsolicited readings, as the last, has no `out`: each of its lines counts, never a half one, and its
+time is that at which the line before it began; `reply_timeout_s` must be longer than its period. A device with a
+request for each of its values (M1, M2 ...) has `requests: [{out: M1, in: ...}, ...]` in place of `out` and `in`; each
+channel has the time of its own request. `echo` is a second request whose reply looks different: asked before every
+`every`-th poll, it finds a device whose replies are one behind. Devices that fall silent by design (in their menu) get
+`silent_in_menu: true`: after a whole reply on a connection, the second poll without any byte is `silent` instead of
+`timeout`. A cable that comes off afterwards looks the same, and the detail says so; both are without a value.
 
 Without a checksum in `in` a damaged digit is still a digit: a length that is not where the last ones lead is asked for
 a second time, as those of all gauges are. Other quantities are not: set a parity on the line.
@@ -101,7 +99,7 @@ class SerialAscii(Gauge[ByteLine]):
         self._fixed_length = all(form.length is not None for form in forms)
         forms += [form for form, _ in self._description.errors]
         self._limit = max(form.longest for form in forms) + len(self._description.terminator)
-        self._ready_on: ByteLine | None = None  # the connection on which `init` was said
+        self._ready_on: ByteLine | None = None  # the connection on which `init` was sent
         self._until_echo = 0
         self._silence = MenuSilence()
 
@@ -153,7 +151,7 @@ class SerialAscii(Gauge[ByteLine]):
             self._until_echo = 0
         self._check_echo(line)
         replies = [self._values(line, poll) for poll in self._description.polls]
-        # one that says it is in trouble is spoken to from the beginning
+        # a device that reports trouble is initialised again
         in_trouble = any(
             isinstance(answer, Reading) and answer.quality is Quality.DEVICE_ERROR for answer, _ in replies
         )
@@ -165,7 +163,7 @@ class SerialAscii(Gauge[ByteLine]):
         return readings
 
     def _place(self, channel: str) -> tuple[int, int]:
-        """Which request's reply has the channel's number, and which number of it; the only one where it has no name."""
+        """The request and the index of the channel's number in its reply; the only number if unnamed."""
         for k, poll in enumerate(self._description.polls):
             if channel in poll.reply.channels:
                 return k, poll.reply.channels.index(channel)
@@ -187,13 +185,13 @@ class SerialAscii(Gauge[ByteLine]):
         if self._protocol.dtr_pulse_s is not None:
             time_s = line.pulse_dtr(self._protocol.dtr_pulse_s)
         elif not self._protocol.asked:
-            return self._unasked(line, poll.reply)
+            return self._unsolicited(line, poll.reply)
         else:
             time_s = ask(line, self._protocol, poll.request)
         return self._whole(line, poll.reply), time_s
 
-    def _unasked(self, line: ByteLine, form: ReplyFormat) -> tuple[bytes, float]:
-        """The next reply of a device that speaks unasked, and its time (s)."""
+    def _unsolicited(self, line: ByteLine, form: ReplyFormat) -> tuple[bytes, float]:
+        """The next reply of a device that sends unsolicited readings, and its time (s)."""
         terminator, protocol = self._description.terminator, self._protocol
         waits_s = protocol.reply_timeout_s, protocol.gap_timeout_s
         try:
@@ -205,7 +203,7 @@ class SerialAscii(Gauge[ByteLine]):
         except LineFault as fault:
             if fault.quality is not Quality.TIMEOUT:
                 raise
-            text = f"{fault.detail}; `reply_timeout_s` must be longer than the period of a device that speaks unasked"
+            text = f"{fault.detail}; `reply_timeout_s` must be longer than the period of unsolicited readings"
             raise LineFault(fault.quality, text) from fault
         return reply, time_s
 

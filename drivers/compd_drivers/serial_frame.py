@@ -35,18 +35,18 @@ from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQua
 NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
 _TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
 _FLOATS: Mapping[str, str] = {"float32": "f", "float64": "d"}
-FEWEST_FIXED_BYTES = 2  # of a frame without a checksum
+FEWEST_FIXED_BYTES = 2  # fewest fixed bytes of a frame without a checksum
 
 
 class FrameLayout(NamedTuple):
-    """A reply's bytes: None where any byte may stand, and where the checksum stands."""
+    """A reply's bytes (None for any byte), and the position of the checksum."""
 
     fixed: tuple[int | None, ...]
     checksum: slice
 
     @classmethod
     def of(cls, text: str) -> Self:
-        """ValueError for anything but hexadecimal bytes, `..` and one run of `CS`."""
+        """ValueError unless it consists of hexadecimal bytes, `..` and one run of `CS`."""
         tokens = text.split()
         for token in tokens:
             if not _TOKEN.fullmatch(token):
@@ -69,7 +69,7 @@ class FrameLayout(NamedTuple):
 
 
 class FrameChecksum(DescriptionSection):
-    """How the checksum of a frame is made."""
+    """Computation of a frame's checksum."""
 
     kind: ChecksumKind = Field(description="how it is computed")
     first: Annotated[int, Field(ge=0)] = Field(default=0, description="first byte that it covers, from 0")
@@ -79,12 +79,12 @@ class FrameChecksum(DescriptionSection):
     byte_order: Literal["little", "big"] = Field(default="little", description="of a checksum of two bytes")
 
     def of(self, data: bytes, place: slice) -> bytes:
-        """The checksum that belongs at `place` of `data`."""
+        """The checksum for position `place` of `data`."""
         checksum = CHECKSUMS[self.kind].of(data[self.first : place.start if self.end is None else self.end])
         return checksum if self.byte_order == "little" else checksum[::-1]
 
     def check(self, frame: FrameLayout, key: str) -> None:
-        """ValueError where `frame`, the option `key`, has no place for this checksum."""
+        """ValueError if `frame`, the option `key`, has no place for this checksum."""
         if self.kind == "modbus_lrc":
             raise ValueError(
                 f"`{key}` has no digits: modbus_lrc is of hexadecimal digits, in bytes it is negative_sum8"
@@ -106,11 +106,11 @@ class FrameChannel(MeasuredChannel):
 
     @property
     def length(self) -> int:
-        """Bytes that the number takes."""
+        """Length of the number in bytes."""
         return int(re.sub(r"\D", "", self.type)) // 8
 
     def number(self, data: bytes) -> float:
-        """The number in a whole frame, as sent."""
+        """The number in a whole frame, unscaled."""
         raw = data[self.at : self.at + self.length]
         if code := _FLOATS.get(self.type):
             (value,) = struct.unpack(f"{'<' if self.byte_order == 'little' else '>'}{code}", raw)
@@ -119,7 +119,7 @@ class FrameChannel(MeasuredChannel):
 
 
 class ErrorFrame(DescriptionSection):
-    """A reply that stands for the whole poll."""
+    """An error reply, which counts for the whole poll."""
 
     frame: str = Field(description="its bytes, as in `frame`")
     quality: ReplyQuality = Field(description="what it means")
@@ -166,7 +166,7 @@ class SerialFrameOptions(ExchangeOptions):
 
     @property
     def request(self) -> bytes:
-        """What is sent, its checksum included."""
+        """The request including its checksum."""
         if self.out_checksum is None:
             return bytes.fromhex(self.out)
         frame = FrameLayout.of(self.out)
@@ -254,7 +254,7 @@ class SerialFrame(Gauge[ByteLine]):
         return following(line, count if gap_s is None else 1, gap_s, so_far)
 
     def _receive(self, line: ByteLine) -> tuple[bytes, ErrorFrame | None]:
-        """The reply, and the error that it is, if it is one."""
+        """The reply, and its error, if it is one."""
         data = b""
         for length in sorted({len(frame.fixed) for frame in (self._frame, *(frame for frame, _ in self._errors))}):
             if not data:

@@ -69,7 +69,7 @@ class SerialGateway:
             self._open.append(connection)
             threading.Thread(target=self._hear, args=[connection], daemon=True).start()
 
-    def _hear(self, connection: socket.socket) -> None:
+    def _receive(self, connection: socket.socket) -> None:
         with connection, connection.makefile("rb") as stream:
             try:
                 while head := stream.read(6):

@@ -291,7 +291,7 @@ def check_simulated_device(path: Path) -> None:
         if gauge.line_kind == "registers":
             device = ModbusSlaves([device], over_tcp=transcript.over_tcp)
         for exchange in marked:
-            reply = device.speak() if exchange.sent == PULSE else device.hear(exchange.sent)
+            reply = device.speak() if exchange.sent == PULSE else device.receive(exchange.sent)
             assert reply == exchange.received, f"line {poll.line}"
             compared += 1
     assert compared, "mark with <* what the simulated device answers"

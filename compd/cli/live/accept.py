@@ -1,4 +1,4 @@
-"""`compd accept`: a person has looked at a gauge that the daemon does not believe."""
+"""`compd accept`: trust a gauge again after a person has inspected it."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ def accept(
         list[str] | None,
         typer.Argument(
             metavar="[GAUGE]...",
-            help="A gauge, one channel as gauge.channel, or `all`; left out: tell which are not believed, and why.",
+            help="A gauge, one channel as gauge.channel, or `all`; default: list the distrusted ones with reasons.",
         ),
     ] = None,
     daemon: DaemonOption = DEFAULT_SOCKET,
 ) -> None:
-    """Believe a gauge again that jumped or came back with another value; look at it first, and reference it."""
+    """Trust a gauge again that jumped or came back with another value; inspect and reference it first."""
     from compd.client import connect
 
     failed = False
@@ -44,7 +44,7 @@ def accept(
 
 
 def not_believed(status: dict[str, Any], setpoint: dict[str, Any]) -> list[str]:
-    """What STATUS and SETPOINT say of gauges that are not believed, for people, with what to type."""
+    """The distrusted gauges in STATUS and SETPOINT in words, with the command to type."""
     distrusted = [gauge for gauge in status["gauges"] if gauge["quality"] == "distrusted"]
     lines = [f"{gauge['channel']}: {gauge.get('detail', 'no reason given')}" for gauge in distrusted]
     if setpoint["state"] == "fault" and not distrusted:

@@ -1,4 +1,4 @@
-"""`compd adopt`: a model file into the running daemon."""
+"""`compd adopt`: load a model file into the running daemon."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ import typer
 
 from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
 
-# Reading a model file takes a second; an effect of a person's own may import what it likes.
+# Timeout (s) of the answer: reading a model file takes a second, and an effect of one's own may import any library.
 _TIMEOUT_S = 30.0
 
 FileArgument = Annotated[
-    Path | None, typer.Argument(metavar="[FILE]", help="The model file; left out: tell what the daemon runs with.")
+    Path | None, typer.Argument(metavar="[FILE]", help="The model file; default: print the daemon's present model.")
 ]
 NoneOption = Annotated[bool, typer.Option("--none", help="No model file: the machine without effects, no shadow.")]
 
 
 def adopt(file: FileArgument = None, daemon: DaemonOption = DEFAULT_SOCKET, none: NoneOption = False) -> None:
-    """Let the running daemon use a model file: between two ticks, the correction slewing to the new one."""
+    """Load a model file into the running daemon; the correction slews to it."""
     typer.echo(ask_daemon(file, daemon, none, shadow=False)["kept_text"])
 
 
 def ask_daemon(file: Path | None, daemon: str, none: bool, shadow: bool) -> dict[str, Any]:
-    """Ask the daemon to take a model file, or with None what it runs with; print and return its answer."""
+    """Ask the daemon to load a model file, or with None for its present model; print and return its answer."""
     from compd.client import connect
     from compd.errors import DaemonError
 
@@ -50,7 +50,7 @@ def ask_daemon(file: Path | None, daemon: str, none: bool, shadow: bool) -> dict
 
 
 def _with_hashes(text: str) -> str:
-    """A refusal of the daemon, with the hash of each Python file in it that is not listed and can be read here."""
+    """A refusal of the daemon, with the hash of each unlisted Python file in it that is readable here."""
     from compd.plugins import HASH_PLACE, hash_of_code
 
     def line(match: re.Match[str]) -> str:

@@ -1,4 +1,4 @@
-"""`compd doctor`: does this computer let the daemon do its work?"""
+"""`compd doctor`: check whether this computer is fit for the daemon."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _INSTALLED = Path("/etc/compd/machine.yaml")
 def doctor(
     config: Annotated[
         Path | None,
-        typer.Argument(help=f"The machine's configuration (YAML); {_INSTALLED} if left out, where there is one."),
+        typer.Argument(help=f"The machine's configuration (YAML); {_INSTALLED} by default, if it exists."),
     ] = None,
 ) -> None:
-    """Look at what the daemon needs of this computer; end with what to do, in order.
+    """Check ports, permissions and real-time setup of this computer; list what to fix.
 
-    Ports and who holds them, rights, real time, latency of USB adapters, clock, disk, TCP port, the unit of systemd.
-    Nothing is opened, written or asked that a running daemon could notice. Run it as the daemon's user. The exit code
-    is 1 where something keeps the daemon from its work.
+    It looks at ports and their owners, permissions, real time, latency of USB adapters, clock, disk, TCP port and the
+    systemd unit, without disturbing a running daemon. Run it as the daemon's user. The exit code is 1 for a fault that
+    stops the daemon.
     """
     from rich.console import Console
     from rich.padding import Padding

@@ -1,4 +1,4 @@
-"""`compd driver test`: does a driver ever give a wrong number?"""
+"""`compd driver test`: check that a driver never delivers a wrong number."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ def _drivers() -> None:
 @driver.command("test")
 def try_on_wires(
     name: Annotated[
-        str | None, typer.Argument(help="Entry point, or /absolute/file.py:ClassName; all installed if left out.")
+        str | None, typer.Argument(help="Entry point, or /absolute/file.py:ClassName; default: all installed ones.")
     ] = None,
     options: Annotated[
-        Path | None, typer.Option(help="YAML with the gauge's options; the driver's own `sample_options` if left out.")
+        Path | None, typer.Option(help="YAML with the gauge's options; default: the driver's own `sample_options`.")
     ] = None,
     simulator: Annotated[
-        str | None, typer.Option(help="Its simulated device: entry point or file; the driver's own if left out.")
+        str | None, typer.Option(help="Its simulated device: entry point or file; default: the driver's own.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="In virtual time alone, no ptys or ports.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Only in virtual time, without ptys and ports.")] = False,
 ) -> None:
-    """Try a driver on wires that go wrong: each fault must give its quality, and the next good reading must be right.
+    """Try a driver on faulty wires: each fault must give its quality, and the next good reading must be right.
 
     Exit code 1 if any case fails, or if a driver cannot be tried.
     """
@@ -56,8 +56,8 @@ def try_on_wires(
 
 
 def _try(driver: DriverUnderTest, quick: bool) -> int:
-    """Print each case as it ends, and the table; the number that failed."""
-    from compd.conformance import run_conformance
+    """Print each case as it ends, and the table; return the number of failures."""
+    from compd.commissioning.conformance.report import run_conformance
 
     typer.echo(f"\n{driver.name}, {driver.gauge.line_kind}:")
     results: list[tuple[str, CaseResult]] = []

@@ -21,18 +21,18 @@ TargetArgument = Annotated[
     str,
     typer.Argument(help="A driver's name, or a file (.yaml): a machine, or gauges and their lines."),
 ]
-NameArgument = Annotated[str | None, typer.Argument(help="With a file of several gauges: which of them.")]
+NameArgument = Annotated[str | None, typer.Argument(help="Name of the gauge, for a file of several.")]
 Port = Annotated[
     str,
     typer.Option(
-        help="/dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port, where no file names the line."
+        help="/dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port, unless a file names the line."
     ),
 ]
 Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
 Format = Annotated[
     str | None, typer.Option("--format", help="Data bits, parity, stop bits: 8N1, 7E2 ..., from the manual.")
 ]
-Timeout = Annotated[float, typer.Option("--timeout", min=0.01, help="How long to wait for the first byte, s.")]
+Timeout = Annotated[float, typer.Option("--timeout", min=0.01, help="Wait (s) for the first byte.")]
 LineKeys = Annotated[
     list[str] | None,
     typer.Option("--line", help="Another key of the line: echo=true, pause_s=0.02, rts=false, kind=modbus_ascii."),
@@ -42,7 +42,7 @@ Set = Annotated[list[str] | None, typer.Option("--set", help="An option of the d
 
 @gauge.command("list")
 def list_gauges() -> None:
-    """List the installed drivers and presets, and where each protocol comes from."""
+    """List the installed drivers and presets, with the source of each protocol."""
     from rich.console import Console
     from rich.table import Table
 
@@ -61,7 +61,7 @@ def list_gauges() -> None:
 
 @gauge.command()
 def show(name: Annotated[str, typer.Argument(help="A driver's name: `compd gauge list`.")]) -> None:
-    """Show a driver: what it speaks, where that was read, an example, and every option."""
+    """Show a driver: its protocol with the source, an example, and every option."""
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -86,9 +86,9 @@ def scan(
         bool, typer.Option("--probe", help="Ask every port with each preset's read request. SENDS BYTES to all ports.")
     ] = False,
 ) -> None:
-    """Find serial ports; with --probe, look which presets fit what answers."""
-    from compd.gauge_tools import announcements, preset_candidates
-    from compd.lines import serial_ports
+    """Find serial ports; with --probe, find the presets that match the answers."""
+    from compd.commissioning.probe import announcements, preset_candidates
+    from compd.lines.computer_ports import serial_ports
 
     ports = serial_ports()
     if not ports:
@@ -157,9 +157,9 @@ def watch(
     timeout_s: Timeout = 1.0,
     line_keys: LineKeys = None,
     assignments: Set = None,
-    polls: Annotated[int | None, typer.Option(min=1, help="Stop after so many polls; Ctrl-C if left out.")] = None,
+    polls: Annotated[int | None, typer.Option(min=1, help="Stop after this many polls; default: at Ctrl-C.")] = None,
 ) -> None:
-    """Poll one gauge as fast as its line goes, or listen to it: values, rate, age, noise and faults."""
+    """Poll one gauge as fast as its line allows, or listen to it: values, rate, age, noise and faults."""
     from rich.console import Console
     from rich.live import Live
 
@@ -189,11 +189,11 @@ def learn(
     format_: Format = None,
     timeout_s: Timeout = 1.0,
     line_keys: LineKeys = None,
-    out: Annotated[str, typer.Option(help=r"Request to send, with escapes: '?\r'; empty: it speaks unasked.")] = "",
-    replies: Annotated[int, typer.Option(min=3, help="How many replies to capture live.")] = 6,
+    out: Annotated[str, typer.Option(help=r"Request to send, with escapes: '?\r'; empty for unsolicited data.")] = "",
+    replies: Annotated[int, typer.Option(min=3, help="Number of replies to capture live.")] = 6,
     unit: Annotated[
         str,
-        typer.Option(help="Unit of the numbers on the wire, where they do not say it: mm, um ...; or mm,inch."),
+        typer.Option(help="Unit of the numbers on the wire, if the replies lack it: mm, um ...; or mm,inch."),
     ] = "",
     names: Annotated[str, typer.Option(help="Names of the numbers, with commas between; - skips one: a,-,b.")] = "",
     ranges: Annotated[
@@ -215,12 +215,14 @@ def learn(
     ] = None,
     decimals: Annotated[
         int | None,
-        typer.Option(min=0, help="Decimals that the display shows, where more digits follow or no point is sent."),
+        typer.Option(min=0, help="Decimals of the display, if more digits follow or no point is sent."),
     ] = None,
-    decimal_mark: Annotated[str, typer.Option(help="Where replies leave it open: , or .")] = "",
-    skip_end: Annotated[int, typer.Option(min=0, help="Skip so many characters at the end of every reply.")] = 0,
+    decimal_mark: Annotated[str, typer.Option(help="Decimal mark of ambiguous replies: , or .")] = "",
+    skip_end: Annotated[int, typer.Option(min=0, help="Skip this many characters at the end of every reply.")] = 0,
     plain: Annotated[bool, typer.Option("--plain", help="Every digit belongs to its number.")] = False,
-    to: Annotated[Path | None, typer.Option(help="Write the gauge and its line there, for `read` and `watch`.")] = None,
+    to: Annotated[
+        Path | None, typer.Option(help="Write the gauge and its line to this file, for `read` and `watch`.")
+    ] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Write a `serial_ascii` description from a few replies of a gauge that no preset knows.
@@ -285,7 +287,7 @@ def _listed(text: str) -> tuple[str, ...]:
 
 def _between_captures(done: int, wanted: int) -> None:
     typer.echo(f"{done} of {wanted} captured; move the gauge, then Enter: ", nl=False)
-    sys.stdin.readline()  # at its end, as without a terminal, nobody is waited for
+    sys.stdin.readline()  # at its end, as without a terminal, there is no waiting for a key
     typer.echo()
 
 

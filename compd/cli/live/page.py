@@ -18,7 +18,7 @@ def page(
     address: Annotated[
         str, typer.Argument(metavar="[CONFIG]", help="The daemon's configuration (YAML), or its Unix socket.")
     ] = DEFAULT_SOCKET,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Where the page is; 0: any free port.")] = 7760,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port of the page; 0: any free port.")] = 7760,
     listen: Annotated[
         str | None,
         typer.Option(metavar="HOST", help="Name or address of this computer, for browsers on others; needs --tokens."),
@@ -37,10 +37,10 @@ def page(
             help="Add a token, role view or operate, to --tokens; print it, with --listen or --behind an address too.",
         ),
     ] = None,
-    read_only: Annotated[bool, typer.Option("--read-only", help="No orders from any browser.")] = False,
+    read_only: Annotated[bool, typer.Option("--read-only", help="Refuse orders from browsers.")] = False,
     recordings: Annotated[Path, typer.Option(help="The directory of recordings.")] = Path("recordings"),
     models: Annotated[
-        Path | None, typer.Option(help="The directory of model files to choose from; that of CONFIG if left out.")
+        Path | None, typer.Option(help="The directory of model files to choose from; default: that of CONFIG.")
     ] = None,
 ) -> None:
     """Show the machine live in the browser: state, errors, gauges, the last hour.
@@ -69,7 +69,7 @@ def page(
             for token in read_tokens(_needed(tokens, "--behind" if listen is None else "--listen", f"; {_TLS}"))
         ]
 
-    # a token of the command's own is for who has started it, on the terminal or behind a pipe, and not for a log
+    # a token of the command's own is for its user, on the terminal or behind a pipe, and not for a log
     shown = alone and not is_journal(sys.stdout)
     log_to_stderr()
     hide_secrets_of_libraries()
@@ -98,15 +98,15 @@ def _print_address(address: str) -> None:
 
 
 def _print_qr_code(address: str) -> None:
-    """On a terminal, for a tablet beside it; never into a file or a log."""
-    from compd.page import print_qr_code
+    """Print the QR code on a terminal, for a tablet beside it; never into a file or a log."""
+    from compd.page.qr_code import print_qr_code
 
     if sys.stdout.isatty():
         print_qr_code(address, sys.stdout)
 
 
 def _origin(behind: str | None) -> str | None:
-    """Raises typer.BadParameter where it is not the origin of a server with TLS."""
+    """Raises typer.BadParameter unless it is the origin of a server with TLS."""
     if behind is None:
         return None
     parts = urlsplit(behind)

@@ -1,4 +1,4 @@
-"""`compd poll`: ask a gauge at once that did not answer, and is asked seldom since."""
+"""`compd poll`: poll an unresponsive gauge at once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def poll(
     gauge: Annotated[str, typer.Argument(help="A gauge of the running machine, by its name in the configuration.")],
     daemon: DaemonOption = DEFAULT_SOCKET,
 ) -> None:
-    """Ask a gauge at once that is asked seldom because it did not answer; print what came of it."""
+    """Poll an unresponsive gauge now and print the result."""
     from compd.client import connect
     from compd.clock import MonotonicClock
 
@@ -37,7 +37,7 @@ def poll(
 
 
 def gauge_status(status: dict[str, Any], gauge: str) -> dict[str, Any]:
-    """A gauge's part of STATUS, with the counts of its polls; empty where its line has none of it."""
+    """A gauge's part of STATUS with its poll counts; empty if its line has none."""
     for line in status["lines"].values():
         if gauge in line["gauges"]:
             part: dict[str, Any] = line["gauges"][gauge]

@@ -1,4 +1,4 @@
-"""`compd record`: raw readings from the running daemon onto the disk."""
+"""`compd record`: record raw readings of the running daemon."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from compd.tables import TableFormat
 
 _MB = 1_000_000
 _S_PER_H = 3600.0
-# The daemon is gone when it has said nothing for this long, or for three intervals.
+# Silence (s) after which the daemon counts as gone; at least three intervals.
 _TIMEOUT_S = 5.0
 
 
 class WhenFull(StrEnum):
-    """What happens at the limit."""
+    """Action at the limit."""
 
     STOP = "stop"
     DROP_OLDEST = "drop-oldest"
@@ -28,30 +28,36 @@ class WhenFull(StrEnum):
 def record(
     name: Annotated[
         Path,
-        typer.Argument(help="Where to: NAME becomes NAME-0001.csv and so on, with --format parquet NAME-0001.parquet."),
+        typer.Argument(
+            help="Name of the files: NAME becomes NAME-0001.csv ..., with --format parquet NAME-0001.parquet."
+        ),
     ],
     address: DaemonOption = DEFAULT_SOCKET,
     rate_hz: Annotated[float, typer.Option(min=0.001, help="Rows per second; the cycles between are left out.")] = 10.0,
     burst: Annotated[
-        float | None, typer.Option(min=0.001, help="Every cycle, for so many seconds; another recorder may run beside.")
+        float | None, typer.Option(min=0.001, help="Record every cycle for this many seconds; other recorders may run.")
     ] = None,
-    seconds: Annotated[float | None, typer.Option(min=0.001, help="End after so long; otherwise at Ctrl-C.")] = None,
-    part_mb: Annotated[float, typer.Option(min=0.01, help="Begin a new part after so many MB.")] = 100.0,
-    part_hours: Annotated[float, typer.Option(min=0.0001, help="Begin a new part after so many hours.")] = 24.0,
-    limit_mb: Annotated[float, typer.Option(min=0.01, help="All parts together; see --when-full.")] = 5000.0,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.001, help="End after this many seconds; default: at Ctrl-C.")
+    ] = None,
+    part_mb: Annotated[float, typer.Option(min=0.01, help="Begin a new part after this many MB.")] = 100.0,
+    part_hours: Annotated[float, typer.Option(min=0.0001, help="Begin a new part after this many hours.")] = 24.0,
+    limit_mb: Annotated[
+        float, typer.Option(min=0.01, help="Limit (MB) of all parts together; see --when-full.")
+    ] = 5000.0,
     when_full: Annotated[
-        WhenFull, typer.Option(help="At the limit: end the recording, or delete its oldest part and say so.")
+        WhenFull, typer.Option(help="At the limit: end the recording, or delete its oldest part with a message.")
     ] = WhenFull.STOP,
     table_format: Annotated[
         TableFormat,
         typer.Option(
             "--format",
-            help="Of the table. A part of Parquet is NAME-0001.arrow until it is closed; what a kill leaves of it is "
+            help="Format of the table. A part of Parquet is NAME-0001.arrow until it is closed; an interrupted one is "
             "closed by the next `compd record` of the name, or by `compd recording convert`.",
         ),
     ] = TableFormat.CSV,
 ) -> None:
-    """Record raw readings, never corrected ones, from the running daemon: table, sidecar, and all that a replay needs.
+    """Record raw, uncorrected readings from the running daemon: table, sidecar, and all input of a replay.
 
     When the daemon ends and starts again, the recording goes on in a new part.
     """

@@ -1,4 +1,4 @@
-"""`compd release`: end the role of the controller, whoever has it."""
+"""`compd release`: end the controller's role of any client."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`compd replay`: a recorded run through the live path again."""
+"""`compd replay`: compute a recorded run again by the live path."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Annotated, Any
 
 import typer
 
-# Cells of the CSV that are listed; a file that was opened and saved by another program differs everywhere.
+# Most cells of the CSV in the list; a file saved by another program differs everywhere.
 _MOST_CELLS = 5
 
 
 def replay(
-    name: Annotated[Path, typer.Argument(help="As given to `compd record` (all parts), or one part.")],
-    machine: Annotated[Path, typer.Option("--machine", help="The configuration with which the daemon ran.")],
+    name: Annotated[Path, typer.Argument(help="NAME of `compd record` (all parts), or one part.")],
+    machine: Annotated[Path, typer.Option("--machine", help="The daemon's configuration during the recording.")],
     model: Annotated[
         list[Path] | None,
-        typer.Option("--model", help="A model file that was used but is not kept beside it."),
+        typer.Option("--model", help="A model file of the run without a copy beside the recording."),
     ] = None,
-    setpoints: Annotated[bool, typer.Option(help="Print the setpoints that come out, one per line.")] = False,
+    setpoints: Annotated[bool, typer.Option(help="Print the resulting setpoints, one per line.")] = False,
 ) -> None:
-    """Compute a recorded run again and compare its setpoints with those that were sent, bit for bit.
+    """Compute a recorded run again and compare its setpoints with the sent ones, bit for bit.
 
     Orders that clients gave meanwhile are listed. Exit code 1 when one differs, when rows of the CSV have no cycle, or
     when a cell of the CSV is not what its cycle says.
@@ -70,7 +70,7 @@ def replay(
 
 
 def _order_text(order: Mapping[str, Any]) -> str:
-    """One line: when, what, who, and whether it was done."""
+    """One line: time, order, client and outcome."""
     words = [f"order at {order.get('time_s', 0):.3f} s:", order.get("order", ""), order.get("subject", "")]
     words += ["from", order.get("client", "?"), f"({order['by']})" if order.get("by") else ""]
     return " ".join(filter(None, map(str, words))) + ("" if order.get("done") else ", refused")

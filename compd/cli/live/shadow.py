@@ -1,4 +1,4 @@
-"""`compd shadow`: a model file beside the running daemon's own."""
+"""`compd shadow`: compute a second model in parallel to the running daemon's own."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from compd.cli.options import DEFAULT_SOCKET, DaemonOption
 
 
 def shadow(file: FileArgument = None, daemon: DaemonOption = DEFAULT_SOCKET, none: NoneOption = False) -> None:
-    """Let the running daemon compute a model file's correction beside its own, and publish both; its own is applied."""
+    """Let the running daemon also compute the correction of a model file, and publish both; its own is applied."""
     ask_daemon(file, daemon, none, shadow=True)

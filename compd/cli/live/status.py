@@ -1,4 +1,4 @@
-"""`compd status`: is the machine's correction good? For people and for monitoring."""
+"""`compd status`: health of the correction, for people and for monitoring."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def status(
     address: Annotated[
         str, typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names it.")
     ] = DEFAULT_SOCKET,
-    timeout_s: Annotated[float, typer.Option("--timeout", min=0.1, help="How long to wait for an answer, s.")] = 5.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the same, and all that STATUS says, as JSON.")] = False,
+    timeout_s: Annotated[float, typer.Option("--timeout", min=0.1, help="Wait (s) for an answer.")] = 5.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the same and all of STATUS as JSON.")] = False,
 ) -> None:
     """Print state and reason of the daemon's setpoints, and the gauges that are not good.
 

@@ -24,12 +24,13 @@ from compd.setpoint_states import State, state_named
 from compd.units import UM_PER_MM
 
 _BAR_WIDTH = 21  # odd: one cell is zero
-# A full bar is the largest correction, but never less than this: noise is no bar.
+# Least correction (mm) of a full bar, so that noise shows no bar.
 _LEAST_FULL_BAR_MM = 1e-3
-# Sources of the correction in the table of the links; every other is an effect, with a row of its own.
+# Sources of the correction with a column in the table of the links; all others are effects with rows of their own.
 _OWN_COLUMN = ("joints", "frame")
 _STATUS_EVERY_S = 1.0
-# Setpoints that are read, so that a silence is noticed before the eye would; up to three periods may pass without one.
+# Least rate (Hz) of read setpoints, at which silence is noticed faster than by eye; and the periods that may pass
+# without one.
 _LEAST_RATE_HZ = 40.0
 _PERIODS = 3.0
 _LOOK_EVERY_S = 0.1
@@ -41,13 +42,13 @@ def watch(
         str, typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names one.")
     ] = DEFAULT_ADDRESS,
     rate_hz: Annotated[float, typer.Option(min=0.1, help="Setpoints per second.")] = 10.0,
-    count: Annotated[int, typer.Option(min=0, help="Stop after so many setpoints; 0 = until Ctrl-C.")] = 0,
-    json_lines: Annotated[bool, typer.Option("--json", help="Print the messages as they come, one per line.")] = False,
+    count: Annotated[int, typer.Option(min=0, help="Stop after this many setpoints; 0 = until Ctrl-C.")] = 0,
+    json_lines: Annotated[bool, typer.Option("--json", help="Print the received messages, one per line.")] = False,
     token_file: Annotated[
-        Path | None, typer.Option(help="File with the daemon's token, where it wants one of TCP clients.")
+        Path | None, typer.Option(help="File with the daemon's token, if it requires one from TCP clients.")
     ] = None,
 ) -> None:
-    """Watch the daemon: tip, corrections and where they come from, state and reason, ages, loop."""
+    """Watch the daemon: tip, corrections with their sources, state and reason, ages, loop."""
     token = None if token_file is None else token_file.read_text(encoding="utf-8")
     with connect_patiently(address, lambda path: connect(path, token=token)) as client:
         try:
@@ -92,7 +93,7 @@ class NewestSetpoint:
         self._thread.start()
 
     def picture(self) -> RenderableType | None:
-        """What is true now; None before the first setpoint."""
+        """The present state; None before the first setpoint."""
         with self._change:
             if self._setpoint is None:
                 return None
@@ -100,7 +101,7 @@ class NewestSetpoint:
 
     @property
     def has_expired(self) -> bool:
-        """Whether nothing of the newest setpoint may be shown any more."""
+        """Whether the newest setpoint has expired."""
         with self._change:
             return self._late_s() is not None
 
@@ -117,7 +118,7 @@ class NewestSetpoint:
                 raise self._error
 
     def end(self) -> None:
-        """Follow no longer; the client may be closed then."""
+        """Stop following; the client may be closed then."""
         self._ended = True
         self._thread.join(_END_WITHIN_S)
 
@@ -132,13 +133,13 @@ class NewestSetpoint:
                 rate_hz = min(self._rate_hz, status["loop"]["rate_hz"])
                 lasts_s = max(setpoint["valid_until"] - setpoint["time_s"], _PERIODS / rate_hz)
                 expires_s = self._clock.monotonic() + lasts_s
-                if self._same_clock and setpoint["valid"]:  # it may have waited: this program was suspended
+                if self._same_clock and setpoint["valid"]:  # it may be old: this program was suspended
                     expires_s = min(expires_s, setpoint["valid_until"])
                 with self._change:
                     self._setpoint, self._status, self._expires_s = setpoint, status, expires_s
                 if self._ended:
                     return
-        except ValueError:  # a daemon that stands still, and the client was closed meanwhile
+        except ValueError:  # the daemon stands still, and the client was closed meanwhile
             if not self._ended:
                 raise
         except CompdError as error:
@@ -163,7 +164,7 @@ def _show(client: Client, rate_hz: float, count: int, same_clock: bool) -> None:
                     due_s += 1 / rate_hz if is_due else 0.0
         except CompdError:
             if (picture := newest.picture()) is not None:
-                live.update(picture, refresh=True)  # no number stays on the screen
+                live.update(picture, refresh=True)  # leave no number on the screen
             raise
         finally:
             newest.end()
@@ -174,7 +175,7 @@ def _show(client: Client, rate_hz: float, count: int, same_clock: bool) -> None:
 def view(
     version: dict[str, Any], setpoint: dict[str, Any], status: dict[str, Any], late_s: float | None = None
 ) -> RenderableType:
-    """One picture of the daemon: what a VERSION, a SETPOINT and a STATUS message say.
+    """One picture of the daemon from a VERSION, a SETPOINT and a STATUS message.
 
     late_s : how long ago the setpoint expired, and none came after it, s; nothing of it is shown then.
     """
@@ -255,7 +256,7 @@ def _corrections(setpoint: dict[str, Any]) -> Table:
 
 
 def _effects(setpoint: dict[str, Any]) -> Table:
-    """One row per effect of the model: its name is whole however many links there are."""
+    """One row per effect of the model with its whole name, for any number of links."""
     links = range(1, len(setpoint["correction_mm"]) + 1)
     table = Table(
         "effect, um", *(f"link {number}" for number in links), box=None, pad_edge=False, collapse_padding=True
@@ -288,7 +289,7 @@ def bar(value: float, largest: float) -> Text:
 
 
 def lost_gauges(gauges: Sequence[dict[str, Any]]) -> list[str]:
-    """One text for all channels of a gauge that are not good for the same reason: "joints: line_lost (all 9)"."""
+    """One text for all channels of a gauge with the same fault: "joints: line_lost (all 9)"."""
     channels: dict[str, list[str]] = {}
     lost: dict[tuple[str, str], list[str]] = {}
     for entry in gauges:
@@ -325,7 +326,7 @@ def _loop(status: dict[str, Any]) -> Text:
 
 
 def _ended_processes(status: dict[str, Any]) -> str:
-    """The daemon's processes that have ended and were started anew; "" where none has."""
+    """The daemon's restarted processes; "" for none."""
     processes = status.get("processes", {})  # a daemon of 0.2.0 has none
     return "; ".join(
         f"{name}, start {process['starts']}, the one before: {process['last_end']}"

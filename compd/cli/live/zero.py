@@ -10,9 +10,9 @@ import typer
 from compd.cli.options import DEFAULT_SOCKET
 from compd.units import UM_PER_MM
 
-# The daemon looks at the gauges for a second; a slow disk may take as long again.
+# Timeout (s) of the answer: the daemon averages the gauges for a second, and a slow disk takes time.
 _TIMEOUT_S = 15.0
-# Gauges whose difference is printed; the others differ less.
+# Most gauges in the list; the others differ less.
 _SHOWN = 9
 
 
@@ -21,7 +21,7 @@ def zero(
         str, typer.Argument(help="The daemon's Unix socket, or the configuration (YAML) that names it.")
     ] = DEFAULT_SOCKET,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Do not ask where a gauge is far from the zero before, or not believed.")
+        bool, typer.Option("--yes", help="Do not ask about gauges that are distrusted or far from the previous zero.")
     ] = False,
 ) -> None:
     """Take machine zero: bring the machine to its zero position, let it stand still, then run this.
@@ -51,7 +51,7 @@ def zero(
 
 
 def changes_text(changed_mm: Mapping[str, float]) -> str:
-    """By how much the gauges differ from the machine zero before: channel -> mm, the largest ones first."""
+    """Differences of the gauges from the previous machine zero: channel -> mm, the largest ones first."""
     largest = sorted(changed_mm, key=lambda channel: -abs(changed_mm[channel]))
     width = max(map(len, largest), default=0)
     lines = ["against the zero before, which is kept as machine-zero.json.old:"]

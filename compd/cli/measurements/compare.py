@@ -1,4 +1,4 @@
-"""`compd compare`: the model beside measurements."""
+"""`compd compare`: compare the model with measurements."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from compd.comparison import Comparison
     from compd.model.effects import FittedEffect
 
-# More sentences than this nobody reads in a terminal.
+# Most sentences in the terminal.
 MOST_SENTENCES = 6
 
 
@@ -27,7 +27,7 @@ def compare(
     ],
     machine: MachineOption = None,
     model: Annotated[
-        Path | None, typer.Option("--model", help="The model file with fitted effects; without it, no effect acts.")
+        Path | None, typer.Option("--model", help="The model file with fitted effects; default: no effects.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
     html: Annotated[
@@ -35,10 +35,10 @@ def compare(
     ] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Compare the model with recordings: how far apart, against which noise, what each part does, where it fails.
+    """Compare the model with recordings: print residuals, noise floor, contributions and the worst regions.
 
-    A recording of more than 200,000 rows is gone through block by block, in constant memory; what rests on a sample of
-    it is said.
+    A recording of more than 200,000 rows is processed block by block, in constant memory; results from a sample of it
+    are marked.
     """
     from compd.errors import CompdError, Problem
 
@@ -69,8 +69,8 @@ def compare(
 
 
 def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison:
-    """In memory, or block by block where the recording is too long for it."""
-    from compd.comparison import is_long
+    """The comparison in memory, or block by block for a long recording."""
+    from compd.comparison.stream.recording_stream import is_long
 
     if not is_long(path):
         from compd.api import compare as compare_recording
@@ -81,7 +81,7 @@ def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison
     from compd.cli.progress import count_shown
     from compd.table_file import row_count
 
-    # read twice: for the sample, then row by row
+    # two passes: for the sample, then row by row
     with count_shown(2 * row_count(path), f"comparing {path.name}") as progress:
         return compare_stream(path, model, machine=machine, progress=progress)
 

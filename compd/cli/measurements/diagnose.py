@@ -1,4 +1,4 @@
-"""`compd diagnose`: which physical effect is the model missing?"""
+"""`compd diagnose`: find the physical effect that the model lacks."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ def diagnose(
         list[Path],
         typer.Argument(
             metavar="RECORDING [SEALED...]",
-            help="NAME.csv or NAME.parquet to learn from; any others stay sealed until the end, when the result is "
-            "tried on them once.",
+            help="NAME.csv or NAME.parquet to learn from; any others stay sealed until the end, for one "
+            "test of the result.",
         ),
     ],
     machine: MachineOption = None,
     model: Annotated[
-        Path | None, typer.Option("--model", help="The model file with what is known already; it is not changed.")
+        Path | None, typer.Option("--model", help="The model file with the known effects; it is not changed.")
     ] = None,
     effects: EffectsOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
     html: Annotated[Path | None, typer.Option("--html", help="Write the page with pictures; works offline.")] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Learn which physical effect is missing: twelve lines with the verdict and what to do next, then the evidence.
+    """Find the missing physical effect: twelve lines with the verdict and the next step, then the evidence.
 
     Of a recording of more than 200,000 rows a sample is diagnosed, spread evenly.
     """
@@ -70,8 +70,9 @@ def diagnose(
 
 
 def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, int]:
-    """The recording and 0; of one that is too long for the memory a sample, and the number of its rows."""
-    from compd.comparison import is_long, open_recording
+    """The recording and 0; for one too long for the memory a sample, and the number of its rows."""
+    from compd.comparison.open import open_recording
+    from compd.comparison.stream.recording_stream import is_long
 
     if not is_long(path):
         return open_recording(path, machine), 0

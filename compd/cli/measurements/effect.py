@@ -1,4 +1,4 @@
-"""`compd effect`: the library of physical causes, and changing a model file by them, one step at a time."""
+"""`compd effect`: the library of physical causes, and stepwise changes of a model file."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ if TYPE_CHECKING:
     from compd.model.effects import Effect
     from compd.model_file import Declaration, ModelFile
 
-ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` begins one where there is none.")]
-RecordingOption = Annotated[Path, typer.Option("--recording", help="What to fit on: NAME.csv or NAME.parquet.")]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show what would happen; write nothing.")]
+ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` creates a missing one.")]
+RecordingOption = Annotated[
+    Path, typer.Option("--recording", help="The recording for the fit: NAME.csv or NAME.parquet.")
+]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show the result without writing it.")]
 EFFECT_HELP = "An id from `compd effect list`; FILE.yaml with one effect, or FILE.yaml:ID; FILE.py:NAME."
 
 
@@ -31,7 +33,7 @@ effect = typer.Typer(no_args_is_help=True, help="List and show physical causes, 
 
 @effect.command(name="list")
 def list_effects(effects: EffectsOption = None) -> None:
-    """List every effect that is installed, or those of --effects: where each acts, what it needs, what it is."""
+    """List the installed effects, or those of --effects: port, required quantities, description."""
     from rich.console import Console
     from rich.table import Table
 
@@ -39,7 +41,7 @@ def list_effects(effects: EffectsOption = None) -> None:
 
     table = Table("effect", "port", "needs", "physics")
     table.columns[0].no_wrap = True
-    table.columns[2].overflow = "fold"  # names of quantities are to be copied whole
+    table.columns[2].overflow = "fold"  # names of quantities stay whole for copying
     for entry in (gather_effects(effects) if effects else load_library()).values():
         table.add_row(entry.id, entry.port, ", ".join(entry.needs) or "-", entry.physics)
     Console().print(table)
@@ -49,13 +51,13 @@ def list_effects(effects: EffectsOption = None) -> None:
 def show(
     name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP)],
     machine: Annotated[
-        Path | None, typer.Option("--machine", help="Machine configuration (YAML); the shipped tripod if left out.")
+        Path | None, typer.Option("--machine", help="Machine configuration (YAML); default: the shipped tripod.")
     ] = None,
     effects: EffectsOption = None,
-    html: Annotated[Path | None, typer.Option("--html", help="Draw the effect's signature into this page.")] = None,
+    html: Annotated[Path | None, typer.Option("--html", help="Write a page with the effect's signature.")] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Show one effect: its physics, its parameters, and with --html what it does to the tip of a machine."""
+    """Show one effect: its physics, its parameters, and with --html its displacement of a machine's tip."""
     from rich.console import Console
 
     from compd.configuration import load_machine
@@ -67,7 +69,7 @@ def show(
         check_page_path(html, overwrite)
     shown = named_effect(name, "compd effect show", gather_effects(effects or ()))
     configuration = load_machine(machine or "tripod-cmm")
-    # an effect of one's own may be of another machine than the shipped one
+    # an effect of one's own may belong to another machine than the shipped one
     Console().print(_card(shown, configuration if machine or not shown.declared else None))
     if html is not None:
         from compd.report import write_effect_page
@@ -124,9 +126,9 @@ def fit(
 
 @effect.command()
 def undo(model: ModelOption) -> None:
-    """Take back the last step; undo again for the step before it. The ledger keeps both."""
-    from compd.diagnosis import undo_step
-    from compd.model_file import read_stored, write_stored
+    """Undo the last step; repeat it for the previous ones. The ledger keeps them."""
+    from compd.diagnosis.model_changes import undo as undo_step
+    from compd.model_file.model_document import read_stored, write_stored
 
     after = undo_step(read_stored(model), str(model))
     write_stored(model, after)
@@ -139,9 +141,10 @@ def _declared_id(declared: Declaration) -> str:
 
 
 def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinement]:
-    """The recording; of one that is too long for the memory a sample, and what fits to all its rows."""
-    from compd.comparison import is_long, open_recording
-    from compd.diagnosis import unrefined
+    """The recording; for one too long for the memory a sample, and the function that fits to all its rows."""
+    from compd.comparison.open import open_recording
+    from compd.comparison.stream.recording_stream import is_long
+    from compd.diagnosis.model_changes import unrefined
 
     if not is_long(path):
         return open_recording(path, machine), unrefined
@@ -171,7 +174,7 @@ def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:
 def _finish(
     path: Path, model: ModelFile | None, changed: ModelFile, aligned: AlignedRecording, done: str, dry_run: bool
 ) -> None:
-    """Write the file, unless it is a dry run, then say what the step did. model : before it, None for a new one."""
+    """Write the file, unless it is a dry run, then print the step's result. model : before it, None for a new one."""
     from rich.console import Console
     from rich.table import Table
 
@@ -206,7 +209,7 @@ def _finish(
 
 
 def _card(effect: Effect, configuration: Configuration | None) -> RenderableType:
-    """Everything that the effect declares, and whether the machine, if any, has what it needs."""
+    """The effect's declaration, and whether the machine, if any, meets its needs."""
     from rich.console import Group
     from rich.table import Table
 
@@ -244,7 +247,7 @@ def _card(effect: Effect, configuration: Configuration | None) -> RenderableType
 
 
 def _lacking(effect: Effect, configuration: Configuration) -> list[Problem]:
-    """What the effect needs and the machine's gauges do not measure."""
+    """Quantities that the effect needs and the machine's gauges lack."""
     from compd.machine_builder import build_model
     from compd.model.effects import available_settings, unmet_needs
 

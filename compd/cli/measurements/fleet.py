@@ -13,11 +13,11 @@ from compd.fleet import MachinesBy
 if TYPE_CHECKING:
     from compd.fleet import Examination, RecordingResult
 
-# More of each a terminal does not show; the page and the table have all.
+# Most sentences of a kind in the terminal; the page and the table have all.
 MOST_SENTENCES = 20
-# Of more machines those of which nothing is to be said share a line.
+# Number of machines above which inconspicuous ones share a line.
 MOST_MACHINES = 12
-# Of shells: ended by SIGINT.
+# Exit code of shells after SIGINT.
 _INTERRUPTED = 130
 
 fleet = typer.Typer(
@@ -37,7 +37,7 @@ MachinesOption = Annotated[
     typer.Option(
         "--machine",
         metavar="FILE",
-        help="The configuration of a machine that does not come with compd, for the recordings that name it; or a "
+        help="The configuration of a machine outside compd's, for the recordings that name it; or a "
         "pattern of several ('machines/*.yaml'). May be repeated.",
     ),
 ]
@@ -54,26 +54,25 @@ MachinesByOption = Annotated[
     MachinesBy,
     typer.Option(
         "--machines-by",
-        help="What tells machines apart that have one configuration: the directory, or nothing (sidecar); auto says "
-        "what it has taken.",
+        help="Distinction of machines with one configuration: by directory, or none (sidecar); auto prints its choice.",
     ),
 ]
 FreshOption = Annotated[
-    bool, typer.Option("--fresh", help="Examine every recording anew, also those whose result the table has already.")
+    bool, typer.Option("--fresh", help="Examine every recording again, including those with a result in the table.")
 ]
 SchedulerOption = Annotated[
     str | None,
     typer.Option(
         "--scheduler",
         metavar="tcp://HOST:PORT",
-        help="A Dask scheduler that runs already; left out, all cores of this computer do the work.",
+        help="A running Dask scheduler; default: all cores of this computer.",
     ),
 ]
 OutOption = Annotated[
     Path,
     typer.Option(
         "--out",
-        help="The table to write (Parquet). What an earlier one has of the same files, model and options is kept.",
+        help="The table to write (Parquet). Earlier results of the same files, model and options are kept.",
     ),
 ]
 HtmlOption = Annotated[Path | None, typer.Option("--html", help="Write the page too; works offline.")]
@@ -96,7 +95,7 @@ def compare(
     html: HtmlOption = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Compare every recording with the model of its machine; the effects of the model are fitted anew on each.
+    """Compare every recording with the model of its machine, refitting the model's effects on each.
 
     A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1. A run
     that was interrupted goes on where it stopped.
@@ -121,7 +120,7 @@ def diagnose(
     html: HtmlOption = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Diagnose every recording: which effect the model of its machine lacks, with its numbers.
+    """Diagnose every recording: find the effect that the model of its machine lacks, with its numbers.
 
     A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1. A run
     that was interrupted goes on where it stopped.
@@ -153,9 +152,12 @@ def report(
     fresh: FreshOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Write the page: which machine has which effect, what drifts, which machine differs, what could not be read."""
-    from compd.fleet import check_installed, examination, is_table, read_table, write_fleet_page
-    from compd.report import check_page_path
+    """Write the page: effects by machine, drifts, differing machines, unreadable recordings."""
+    from compd.fleet.cluster import check_installed
+    from compd.fleet.examination import examination
+    from compd.fleet.fleet_page import write_fleet_page
+    from compd.fleet.table import is_table, read_table
+    from compd.report.page import check_page_path
 
     check_installed()
     if not all(is_table(Path(place)) for place in places):
@@ -179,7 +181,7 @@ def _examine(
     fresh: bool,
     overwrite: bool,
 ) -> None:
-    """Examine what lies in these places, write the table and where it is wanted the page, print an overview."""
+    """Examine the recordings in these places, write the table and optionally the page, print an overview."""
     from compd.cli.problems import print_problems
     from compd.cli.progress import count_shown
     from compd.fleet import (

@@ -24,7 +24,7 @@ from compd.cli.options import MachineOption
 
 
 class ByChoice(StrEnum):
-    """What puts a row of the export beside the gauges."""
+    """Way of matching a row of the export with the gauges."""
 
     TIME = "time"
     ORDER = "order"
@@ -33,7 +33,7 @@ class ByChoice(StrEnum):
 
 
 class FrameChoice(StrEnum):
-    """Whose coordinates the instrument gives."""
+    """Frame of the instrument's coordinates."""
 
     MACHINE = "machine"
     INSTRUMENT = "instrument"
@@ -47,12 +47,12 @@ def join(
     out: Annotated[
         Path, typer.Argument(help="The recording to write: NAME.csv or NAME.parquet, and NAME.yaml beside it.")
     ],
-    time: Annotated[str | None, typer.Option(help="The export's time column; guessed from its name.")] = None,
-    x: Annotated[str | None, typer.Option(help="The export's column of x; guessed from its name.")] = None,
-    y: Annotated[str | None, typer.Option(help="The export's column of y; guessed from its name.")] = None,
-    z: Annotated[str | None, typer.Option(help="The export's column of z; guessed from its name.")] = None,
-    length: Annotated[str | None, typer.Option(help="The export's column of a length; guessed from its name.")] = None,
-    link: Annotated[int | None, typer.Option(help="For a length: the link that it measures, 1 to 6.")] = None,
+    time: Annotated[str | None, typer.Option(help="The export's time column; default: by its name.")] = None,
+    x: Annotated[str | None, typer.Option(help="The export's column of x; default: by its name.")] = None,
+    y: Annotated[str | None, typer.Option(help="The export's column of y; default: by its name.")] = None,
+    z: Annotated[str | None, typer.Option(help="The export's column of z; default: by its name.")] = None,
+    length: Annotated[str | None, typer.Option(help="The export's column of a length; default: by its name.")] = None,
+    link: Annotated[int | None, typer.Option(help="For a length: its link, 1 to 6.")] = None,
     ball: Annotated[
         int | None,
         typer.Option(
@@ -71,7 +71,7 @@ def join(
     sheet: SheetOption = None,
     offset: Annotated[
         float | None,
-        typer.Option(help="Recording time minus instrument time, in s; estimated from the motion if left out."),
+        typer.Option(help="Recording time minus instrument time, in s; default: estimated from the motion."),
     ] = None,
     frame: Annotated[
         FrameChoice, typer.Option(help="Frame of the coordinates: {M}, or the instrument's own, which is then fitted.")
@@ -83,19 +83,17 @@ def join(
             help="Standard uncertainty of an attitude about each axis, urad; without it, it is only compared."
         ),
     ] = None,
-    moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion too, not dwells alone.")] = False,
+    moving: Annotated[bool, typer.Option("--moving", help="Take rows in motion as well as dwells.")] = False,
     by: Annotated[
         ByChoice | None,
-        typer.Option(
-            help="Put rows together by one clock; points at rest by their order, their names, or distances alone."
-        ),
+        typer.Option(help="Match rows by one clock; points at rest by their order, their names, or distances alone."),
     ] = None,
     machine: MachineOption = None,
     plan: Annotated[
-        Path | None, typer.Option(help="With --by name: the plan that was measured; its row k is the point P00k.")
+        Path | None, typer.Option(help="With --by name: the measured plan; its row k is the point P00k.")
     ] = None,
 ) -> None:
-    """Put an instrument's export beside a recording: on one clock, whose offset is estimated, or point by point."""
+    """Join an instrument's export and a recording: on one clock with an estimated offset, or point by point."""
     from compd.cli.export_options import echo_taken, read_options
     from compd.instruments import read_export
     from compd.joining import Instrument, JoinOptions, choose_by, match_export, summary_lines, unfit_option

@@ -10,16 +10,16 @@ import typer
 from compd.cli.options import OverwriteOption
 
 _BAR_WIDTH = 16
-# Two spaces and a line.
+# Width of a cell's frame: two spaces and a line.
 _CELL_FRAME = 3
 
 
 def ledger(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="The model file.")],
-    html: Annotated[Path | None, typer.Option("--html", help="Draw the falling error into this page.")] = None,
+    html: Annotated[Path | None, typer.Option("--html", help="Write a page with the falling error.")] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Print every step that changed a model: what, on which recording, the error before and after."""
+    """Print every step of a model: the change, its recording, the error before and after."""
     from rich.console import Console
     from rich.table import Table
 

@@ -1,4 +1,4 @@
-"""`compd plan`: the measurement that tells two effects apart."""
+"""`compd plan`: plan the measurement that distinguishes two effects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
 
 
 class PlanShape(StrEnum):
-    """Who is to read the rows."""
+    """Consumer of the rows."""
 
     plan = "plan"
     sa = "sa"
@@ -23,36 +23,34 @@ class PlanShape(StrEnum):
 
 def plan(
     recording: Annotated[
-        Path, typer.Argument(metavar="RECORDING", help="What was measured so far: NAME.csv or NAME.parquet.")
+        Path, typer.Argument(metavar="RECORDING", help="The recording so far: NAME.csv or NAME.parquet.")
     ],
     rivals: Annotated[str, typer.Option(help="Two effects or more, by id: A,B,C.")],
-    rows: Annotated[int, typer.Option(min=2, help="How many rows may be measured.")] = 40,
-    out: Annotated[Path | None, typer.Option(help="Where to write the rows (CSV); on the screen if left out.")] = None,
+    rows: Annotated[int, typer.Option(min=2, help="Number of rows to measure.")] = 40,
+    out: Annotated[Path | None, typer.Option(help="File for the rows (CSV); default: the screen.")] = None,
     machine: MachineOption = None,
-    model: Annotated[Path | None, typer.Option("--model", help="The model file with what is known already.")] = None,
+    model: Annotated[Path | None, typer.Option("--model", help="The model file with the known effects.")] = None,
     effects: EffectsOption = None,
     beside: Annotated[
         str | None,
-        typer.Option(help="Other effects that were found and are not in the model, by id: C,D. They are fitted along."),
+        typer.Option(help="Other effects found outside the model, by id: C,D. They are fitted along."),
     ] = None,
     workspace: Annotated[
         str | None,
-        typer.Option(help="Where the tip may go, in mm: x0,x1,y0,y1,z0,z1; as in the recording if left out."),
+        typer.Option(help="Workspace of the tip in mm: x0,x1,y0,y1,z0,z1; default: as in the recording."),
     ] = None,
-    force: Annotated[
-        float | None, typer.Option(min=0, help="Largest load in N; as in the recording if left out.")
-    ] = None,
+    force: Annotated[float | None, typer.Option(min=0, help="Largest load in N; default: as in the recording.")] = None,
     temperature: Annotated[
-        str | None, typer.Option(help="Lowest,highest in degC; as in the recording if left out.")
+        str | None, typer.Option(help="Lowest,highest in degC; default: as in the recording.")
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(min=0, help="Highest speed in mm/s; as in the recording if left out.")
+        float | None, typer.Option(min=0, help="Highest speed in mm/s; default: as in the recording.")
     ] = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(
             metavar="COLUMN=LOW,HIGH",
-            help="With `machine: external`: lowest and highest value of a column; as in the recording if left out. "
+            help="With `machine: external`: lowest and highest value of a column; default: as in the recording. "
             "May be repeated.",
         ),
     ] = None,
@@ -64,8 +62,8 @@ def plan(
             "for the controller.",
         ),
     ] = PlanShape.plan,
-    feed: Annotated[float | None, typer.Option(min=0.1, help="For gcode: mm/min between the places.")] = None,
-    dwell: Annotated[float, typer.Option(min=0, help="For gcode: seconds at rest at each place.")] = 3.0,
+    feed: Annotated[float | None, typer.Option(min=0.1, help="For gcode: feed between the places, mm/min.")] = None,
+    dwell: Annotated[float, typer.Option(min=0, help="For gcode: dwell at each place, s.")] = 3.0,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Plan the rows (poses, loads, temperatures, speeds, other settings) on which rival effects differ most.
@@ -104,7 +102,7 @@ def plan(
 
 
 def _by_column(texts: list[str]) -> dict[str, tuple[float, float]]:
-    """The limits COLUMN=LOW,HIGH by column. Raises CompdError with the first that is not understood."""
+    """The limits COLUMN=LOW,HIGH by column. Raises CompdError for the first malformed one."""
     from compd.errors import CompdError, Problem
 
     limits: dict[str, tuple[float, float]] = {}
@@ -118,7 +116,7 @@ def _by_column(texts: list[str]) -> dict[str, tuple[float, float]]:
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:
-    """The numbers of an option. Raises CompdError where there are not `count`."""
+    """The numbers of an option. Raises CompdError unless there are `count`."""
     from compd.errors import CompdError, Problem
 
     try:

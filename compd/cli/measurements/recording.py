@@ -1,4 +1,4 @@
-"""`compd recording`: what is in a recording, and can it be used?"""
+"""`compd recording`: check, change and merge recordings."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def check(
     path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
     machine: Annotated[
         Path | None,
-        typer.Option("--machine", help="The machine's configuration; one that comes with compd is found by its name."),
+        typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name."),
     ] = None,
 ) -> None:
     """Check a recording; report every problem at once, with file, row, column, value, what is allowed, next step."""
@@ -54,10 +54,10 @@ def merge(
         Path, typer.Option(help="The recording to write: NAME.csv or NAME.parquet, and NAME.yaml beside it.")
     ],
     machine: MachineOption = None,
-    overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
+    overwrite: Annotated[bool, typer.Option(help="Overwrite existing files.")] = False,
 ) -> None:
-    """Put recordings of one machine together, so that compare, diagnose and effect add learn from all of them."""
-    from compd.comparison import read_with_machine
+    """Merge recordings of one machine, so that compare, diagnose and effect add learn from all of them."""
+    from compd.comparison.open import read_with_machine
     from compd.errors import CompdError, Problem
     from compd.recording import ASSUMED_GAP_S, merge_recordings
     from compd.table_file import written_path
@@ -93,7 +93,7 @@ def convert(
         ),
     ],
     destination: Annotated[Path, typer.Argument(help="What to write: NAME.parquet or NAME.csv.")],
-    overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
+    overwrite: Annotated[bool, typer.Option(help="Overwrite existing files.")] = False,
 ) -> None:
     """Write a recording of any length as Parquet or as CSV: the same numbers in the same rows, the same sidecar."""
     from compd.cli.progress import count_shown
@@ -113,10 +113,10 @@ RowsOption = Annotated[
 def exclude(
     path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
     rows: RowsOption,
-    reason: Annotated[str, typer.Option(help="Why they are left out; it is kept in NAME.yaml.")],
+    reason: Annotated[str, typer.Option(help="Reason, kept in NAME.yaml.")],
 ) -> None:
-    """Leave rows out of a recording, with a reason; its sidecar is changed, and nothing else."""
-    from compd.recording import exclude_rows, rows_of_text
+    """Leave rows out of a recording, with a reason; only its sidecar is changed."""
+    from compd.recording.exclusions import exclude_rows, rows_of_text
 
     numbers = rows_of_text(rows, "--rows")
     exclude_rows(path, numbers, reason)
@@ -128,8 +128,8 @@ def include(
     path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
     rows: RowsOption,
 ) -> None:
-    """Let rows count again that were left out."""
-    from compd.recording import include_rows, rows_of_text
+    """Let rows count again after leaving them out."""
+    from compd.recording.exclusions import include_rows, rows_of_text
 
     numbers = rows_of_text(rows, "--rows")
     include_rows(path, numbers)
@@ -137,7 +137,7 @@ def include(
 
 
 def _summary(contents: Recording) -> list[str]:
-    """What a person wants to see before trusting a recording: sizes, reference, and every row that is not used."""
+    """Summary of a recording for a person: sizes, reference, and every unused row."""
     gauges = [
         f"{values.shape[1]} {name}"
         for name, values in (

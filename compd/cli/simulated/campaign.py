@@ -1,4 +1,4 @@
-"""`compd campaign`: a recording from a machine that does not exist, as a measuring campaign would bring home."""
+"""`compd campaign`: simulate the recording of a measuring campaign."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 
 class ReferenceKind(StrEnum):
-    """What measures beside the gauges."""
+    """The reference instrument beside the gauges."""
 
     tracker = "tracker"
     interferometer = "interferometer"
@@ -26,25 +26,23 @@ def campaign(
     out: Annotated[
         Path, typer.Option(help="The recording to write: NAME.csv or NAME.parquet, and NAME.yaml beside it.")
     ],
-    seed: Annotated[int, typer.Option(min=0, help="Machine, weather, points and noise follow from it.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of machine, weather, points and noise.")] = 1,
     effect: Annotated[
         list[str] | None,
-        typer.Option(help="A cause that the gauges do not see: id=strength, or id alone for three times the noise."),
+        typer.Option(help="A cause unseen by the gauges: id=strength, or id alone for three times the noise."),
     ] = None,
     hidden: Annotated[
-        int | None, typer.Option(min=0, help="Hide a cause that follows from this number, under seal.")
+        int | None, typer.Option(min=0, help="Hide a random cause by this seed; its answer is sealed.")
     ] = None,
-    reference: Annotated[ReferenceKind, typer.Option(help="The instrument beside it.")] = ReferenceKind.tracker,
+    reference: Annotated[ReferenceKind, typer.Option(help="The reference instrument.")] = ReferenceKind.tracker,
     other_days: Annotated[
         int, typer.Option(min=0, help="Another campaign on the same machine: other points, weather and loads.")
     ] = 0,
-    plan: Annotated[
-        Path | None, typer.Option(help="Measure these rows, as `compd plan --out` has written them, and nothing else.")
-    ] = None,
+    plan: Annotated[Path | None, typer.Option(help="Measure only these rows, written by `compd plan --out`.")] = None,
     zero_degC: Annotated[
-        float, typer.Option("--zero-temperature", help="Of machine and room when machine zero is taken, degC.")
+        float, typer.Option("--zero-temperature", help="Temperature of machine and room at machine zero, degC.")
     ] = 20.0,
-    overwrite: Annotated[bool, typer.Option(help="Write over files that are there.")] = False,
+    overwrite: Annotated[bool, typer.Option(help="Overwrite existing files.")] = False,
 ) -> None:
     """Simulate a measuring campaign: about 600 rows in four sessions, repeats, loads, passes, 1 % outliers.
 

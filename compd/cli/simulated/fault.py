@@ -14,7 +14,7 @@ def fault(
     simulation: Annotated[
         Path, typer.Argument(metavar="DIRECTORY", help="The directory that `compd simulate` runs in.")
     ],
-    line: Annotated[str | None, typer.Argument(help="The line, as in the configuration; left out: list them.")] = None,
+    line: Annotated[str | None, typer.Argument(help="The line's name in the configuration; default: list all.")] = None,
     kind: Annotated[
         str | None, typer.Argument(metavar="[FAULT]", help="unplugged, silent, late ...; none mends the line.")
     ] = None,
@@ -51,5 +51,5 @@ def fault(
 
 
 def _quoted(names: list[str]) -> str:
-    """As a shell takes them."""
+    """Words quoted for a shell."""
     return ", ".join(f"'{name}'" if " " in name else name for name in names)

@@ -1,4 +1,4 @@
-"""`compd paper`: the paper's experiments again, on the simulated machine; nothing is tuned to hit its numbers."""
+"""`compd paper`: the paper's experiments on the simulated machine, without tuning to its numbers."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from compd.configuration import Configuration
     from compd.paper import Reproduction
 
-Config = Annotated[Path | None, typer.Argument(help="The machine; the shipped tripod if left out.")]
-Page = Annotated[Path, typer.Option(help="Where the page with the picture goes.")]
-Seed = Annotated[int, typer.Option(min=0, help="Joints, weather and noise follow from it.")]
+Config = Annotated[Path | None, typer.Argument(help="The machine; default: the shipped tripod.")]
+Page = Annotated[Path, typer.Option(help="File of the page with the picture.")]
+Seed = Annotated[int, typer.Option(min=0, help="Random seed of joints, weather and noise.")]
 
-Machine = Annotated[Path | None, typer.Option("--machine", help="The machine; the shipped tripod if left out.")]
+Machine = Annotated[Path | None, typer.Option("--machine", help="The machine; default: the shipped tripod.")]
 
 paper = typer.Typer(
     no_args_is_help=True,
@@ -49,7 +49,7 @@ def fig21(config: Config = None, page: Page = Path("out/fig21.html"), seed: Seed
 
 @paper.command()
 def instantaneous(machine: Machine = None, page: Page = Path("out/instantaneous.html"), seed: Seed = 1) -> None:
-    """Equations (4) and (5): how far the instantaneous frame is from the exact one, by the size of the change."""
+    """Equations (4) and (5): difference of the instantaneous from the exact frame, by the size of the change."""
     from rich.console import Console
     from rich.table import Table
 

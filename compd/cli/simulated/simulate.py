@@ -1,4 +1,4 @@
-"""`compd simulate`: a machine that does not exist, on real ports."""
+"""`compd simulate`: a simulated machine on real ports."""
 
 from __future__ import annotations
 
@@ -21,35 +21,34 @@ LOOK_EVERY_S = 0.25
 def simulate(
     config: Annotated[Path, typer.Argument(help="The machine's configuration; it is read, never written.")],
     directory: Annotated[
-        Path | None, typer.Option(help="Where ports, sockets and the daemon's configuration go; a new one if left out.")
+        Path | None,
+        typer.Option(help="Directory of ports, sockets and the daemon's configuration; default: a new one."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Weather, joints and points follow from it.")] = 1,
-    speedup: Annotated[
-        float, typer.Option(min=0.001, max=100_000, help="Weather and warm-up run this many times faster.")
-    ] = 1.0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of weather, joints and points.")] = 1,
+    speedup: Annotated[float, typer.Option(min=0.001, max=100_000, help="Speed-up of weather and warm-up.")] = 1.0,
     zero_hold: Annotated[
-        float, typer.Option(min=0, help="Seconds at machine zero, before switch-on, to take machine zero in.")
+        float, typer.Option(min=0, help="Seconds at machine zero before switch-on, for taking machine zero.")
     ] = 60.0,
-    seconds: Annotated[float | None, typer.Option(min=0, help="Stop after so many seconds.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0, help="Stop after this many seconds.")] = None,
     hidden: Annotated[
         list[int] | None,
         typer.Option(
             min=0,
-            help="Hide a cause that follows from this number, in a machine whose gauges see all else.",
+            help="Hide a random cause by this seed, in a machine whose gauges measure all else.",
         ),
     ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="ID[=STRENGTH]", help="Hide this cause likewise; without a strength three times the noise."
+            metavar="ID[=STRENGTH]", help="Hide this cause likewise; default strength: three times the noise."
         ),
     ] = None,
     plan: Annotated[
         Path | None,
-        typer.Option(help="After machine zero go through these rows, as `compd plan --out` has written them."),
+        typer.Option(help="After machine zero go through these rows, written by `compd plan --out`."),
     ] = None,
     zero_degC: Annotated[
-        float, typer.Option("--zero-temperature", help="Of machine and room when it is switched on, degC.")
+        float, typer.Option("--zero-temperature", help="Temperature of machine and room at switch-on, degC.")
     ] = 20.0,
     broker: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="The MQTT broker to which lines of kind mqtt publish.")
@@ -113,7 +112,7 @@ def simulate(
         directory.mkdir(parents=True, exist_ok=True)
         simulation = Simulation(configuration, world, directory.resolve(), clock, _address(broker))
         stack.callback(simulation.stop)
-        # devices are never late because a computer is busy: below the daemon that polls them, above everybody else
+        # real devices are not late on a busy computer: priority below the polling daemon, above all other processes
         use_fifo(configuration.loop.priority // 8)
         daemon = simulation.start()
         if sized:
@@ -149,7 +148,7 @@ def _hidden(configuration: Configuration, seed: int, numbers: Sequence[int], tex
 
 
 def _lines(simulation: Simulation) -> Table:
-    """What is served where."""
+    """Served lines and their addresses."""
     from rich.table import Table
 
     configuration = simulation.configuration
@@ -185,7 +184,7 @@ def _next_commands(simulation: Simulation, daemon: Configuration) -> str:
 
 
 def _planned(plan: Mapping[str, Any]) -> str:
-    """Where in the plan it is."""
+    """Progress of the plan."""
     doing = {
         "walk": "a walk first, for the clocks",
         "way": "on the way",
@@ -199,7 +198,7 @@ def _planned(plan: Mapping[str, Any]) -> str:
 
 
 def _status(simulation: Simulation) -> Text:
-    """One line: what it does, where its tip is, how warm it is, how far its frame has moved."""
+    """One line: action, tip, temperatures, displacement of the frame."""
     from rich.text import Text
 
     from compd.simulation import DISTANCES

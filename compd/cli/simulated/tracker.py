@@ -1,4 +1,4 @@
-"""`compd tracker`: the simulated machine's laser tracker writes its export, and looks over the daemon's shoulder."""
+"""`compd tracker`: write the export of the simulated machine's laser tracker, and check the daemon's tip against it."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from compd.simulation import Looks
 
 _ANSWER_TIMEOUT_S = 15.0
-# So long at rest, every gauge has been read anew.
+# Rest (s) after which every gauge has been read again.
 _REST_S = 0.5
 
 
 class ExportFormat(StrEnum):
-    """In which shape the export is written."""
+    """Shape of the export."""
 
     csv = "csv"
     iso = "iso"
@@ -35,7 +35,9 @@ class ExportFormat(StrEnum):
 def tracker(
     simulation: Annotated[Path, typer.Argument(help="The directory that `compd simulate` runs in.")],
     out: Annotated[Path, typer.Option(help="The export, for `compd join`.")],
-    seconds: Annotated[float | None, typer.Option(min=1, help="End after so long; otherwise at Ctrl-C.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=1, help="End after this many seconds; default: at Ctrl-C.")
+    ] = None,
     rate_hz: Annotated[float, typer.Option(min=1, max=50, help="Measurements per second.")] = 20.0,
     shape: Annotated[
         ExportFormat,
@@ -54,7 +56,7 @@ def tracker(
     unit: Annotated[str, typer.Option(help="Unit of the lengths in the export.")] = "mm",
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Let the simulated laser tracker look at the tip, and say how far the daemon's tip is from it at rest.
+    """Let the simulated laser tracker measure the tip, and print the distance of the daemon's tip from it at rest.
 
     Its clock begins at 0, as a real one's does: `compd join` finds the offset from the motion.
     """
@@ -92,7 +94,7 @@ def tracker(
 
 
 def _check_options(shape: ExportFormat, link: int | None, points: bool, unit: str) -> None:
-    """Raise CompdError for a shape that cannot hold what is to be written, or for no unit."""
+    """Raise CompdError for a shape that cannot hold the data, or for an unknown unit."""
     from compd.errors import CompdError, Problem
     from compd.units import UNIT_KINDS
 
@@ -112,7 +114,7 @@ def _check_options(shape: ExportFormat, link: int | None, points: bool, unit: st
 
 
 def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate_hz: float) -> str:
-    """Look until the time is over, and return in words how far the daemon's tip was from what the tracker saw."""
+    """Measure until the time is over; return the distance of the daemon's tip from the tracker's in words."""
     import numpy as np
 
     from compd.cli.progress import ElapsedShown
@@ -156,8 +158,8 @@ def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate
 
 
 def _for_join(shape: ExportFormat, link: int | None, points: bool, unit: str, rate_hz: float) -> str:
-    """Options without which `compd join` asks, because the file says nothing of it."""
-    from compd.instruments import FORMATS
+    """Options that `compd join` needs, since the file lacks the information."""
+    from compd.instruments.writers.registry import FORMATS
 
     written = FORMATS[shape.value]
     given = [

@@ -1,4 +1,4 @@
-"""`compd check`: is this configuration a machine?"""
+"""`compd check`: check a machine's configuration."""
 
 from __future__ import annotations
 
@@ -23,15 +23,13 @@ def check(
     drivers: Annotated[bool, typer.Option("--drivers", help="List the installed gauge drivers and stop.")] = False,
     what_cannot_be_seen: Annotated[
         bool,
-        typer.Option(
-            "--what-cannot-be-seen", help="Print which faults of the gauges nothing shows, and what they cost."
-        ),
+        typer.Option("--what-cannot-be-seen", help="Print the undetected faults of the gauges, and their cost."),
     ] = False,
 ) -> None:
-    """Check a configuration; report every error at once, with file, line, key, value, what is allowed, next step.
+    """Check a configuration; report every error at once with file, line, key, value, allowed values and next step.
 
-    Warnings are of what can be used but is probably a mistake or a risk; they change no exit code. The rate is compared
-    with the time that a cycle takes on this computer.
+    Warnings flag usable but suspicious settings; the exit code stays 0. The rate is compared with the time of a cycle
+    on this computer.
     """
     if schema:
         from compd.configuration import json_schema
@@ -75,8 +73,8 @@ def check(
 
 
 def print_zero(configuration: Configuration) -> None:
-    """Print the lengths at machine zero that a tape measure shows."""
-    from compd.configuration import FRAME_DISTANCES
+    """Print the lengths at machine zero for a tape measure."""
+    from compd.configuration.operation import FRAME_DISTANCES
     from compd.machine_builder import build_model
 
     zero = build_model(configuration.geometry, configuration.wiring).zero
@@ -86,7 +84,7 @@ def print_zero(configuration: Configuration) -> None:
 
 
 def print_blind_spots(configuration: Configuration) -> None:
-    """Print what a drift of each length costs, and the faults that nothing shows."""
+    """Print the cost of a drift of each length, and the undetected faults."""
     from rich.console import Console
     from rich.padding import Padding
     from rich.table import Table
@@ -115,16 +113,12 @@ def print_blind_spots(configuration: Configuration) -> None:
 
 
 def print_lines(configuration: Configuration) -> list[Problem]:
-    """Print what the lines carry and which jumps their gauges can feign; the warnings that follow."""
-    from compd.commissioning import (
-        budget_warnings,
-        feigned_jumps,
-        jump_warnings,
-        line_budgets,
-        period_warnings,
-        reply_warnings,
-        shared_address_warnings,
-    )
+    """Print the load of the lines and the undetected jumps of their gauges; return the resulting warnings."""
+    from compd.commissioning.feigned_jumps import feigned_jumps, jump_warnings, reply_warnings
+    from compd.commissioning.line_budget import line_budgets
+    from compd.commissioning.line_warnings import budget_warnings
+    from compd.commissioning.pushed_periods import period_warnings
+    from compd.commissioning.shared_addresses import shared_address_warnings
 
     budgets = line_budgets(configuration)
     jumps = feigned_jumps(configuration, budgets)
@@ -140,8 +134,8 @@ def print_lines(configuration: Configuration) -> list[Problem]:
 
 
 def _print_cycle(configuration: Configuration) -> list[Problem]:
-    """Print what a cycle takes on this computer; the warning that follows."""
-    from compd.commissioning import cycle_warnings, measure_cycle, python_effect_times
+    """Print the time of a cycle on this computer; return the resulting warning."""
+    from compd.commissioning.cycle_time import cycle_warnings, measure_cycle, python_effect_times
 
     cycle = measure_cycle(configuration)
     typer.echo(
@@ -154,7 +148,7 @@ def _print_cycle(configuration: Configuration) -> list[Problem]:
 
 
 def token_warnings(configuration: Configuration) -> list[Problem]:
-    """What would keep the daemon from using the token's file; run by another user, check may not be able to read it."""
+    """Problems of the token file for the daemon; another user may be unable to check it."""
     from compd.errors import DaemonError
     from compd.live.service import TcpAccess
 
@@ -215,7 +209,7 @@ def _print_budgets(budgets: Sequence[LineBudget]) -> None:
 
 
 def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
-    """What each length gauge can feign without being distrusted."""
+    """Largest undetected jumps of each length gauge."""
     from rich.console import Console
     from rich.table import Table
 
@@ -243,7 +237,7 @@ def _print_jumps(jumps: Sequence[FeignedJump]) -> None:
 
 
 def _believed_cells(believed: BelievedJump) -> tuple[str, str]:
-    """Milliseconds and micrometres; "?" where they are not known."""
+    """Milliseconds and micrometres; "?" if unknown."""
     poll = "?" if math.isnan(believed.poll_s) else f"{believed.poll_s * 1e3:.1f}"
     if math.isinf(believed.jump_mm):
         return poll, "any"

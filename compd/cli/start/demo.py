@@ -13,28 +13,28 @@ if TYPE_CHECKING:
 
 
 def demo(
-    config: Annotated[Path | None, typer.Argument(help="The machine; the shipped tripod if left out.")] = None,
-    seconds: Annotated[float, typer.Option(min=5, help="How long it runs.")] = 20.0,
-    page: Annotated[Path, typer.Option(help="Where the page with the pictures goes.")] = Path("out/demo.html"),
-    seed: Annotated[int, typer.Option(help="Weather, joints and targets follow from it.")] = 1,
+    config: Annotated[Path | None, typer.Argument(help="The machine; default: the shipped tripod.")] = None,
+    seconds: Annotated[float, typer.Option(min=5, help="Duration, s.")] = 20.0,
+    page: Annotated[Path, typer.Option(help="File of the page with the pictures.")] = Path("out/demo.html"),
+    seed: Annotated[int, typer.Option(help="Random seed of weather, joints and targets.")] = 1,
     live: Annotated[
         bool, typer.Option("--live", help="Show the machine in the browser instead, until Ctrl-C.")
     ] = False,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="With --live: where the page is; 0: any free port.")
+        int, typer.Option(min=0, max=65535, help="With --live: TCP port of the page; 0: any free port.")
     ] = 7760,
     linuxcnc: Annotated[
         bool,
         typer.Option("--linuxcnc", help="Correct LinuxCNC on the shipped hexapod instead, and find a hidden effect."),
     ] = False,
     program: Annotated[
-        Path | None, typer.Option(help="With --linuxcnc: the G-code that it runs; a shipped one if left out.")
+        Path | None, typer.Option(help="With --linuxcnc: the G-code to run; default: a shipped one.")
     ] = None,
     effect: Annotated[
-        str, typer.Option(metavar="ID=STRENGTH", help="With --linuxcnc: the effect that is hidden in the machine.")
+        str, typer.Option(metavar="ID=STRENGTH", help="With --linuxcnc: the effect hidden in the machine.")
     ] = "link_expansion=8",
 ) -> None:
-    """Run a simulated machine, the daemon and a controller; show what compensation gains."""
+    """Run a simulated machine, the daemon and a controller; show the gain by compensation."""
     if linuxcnc:
         _show_linuxcnc(seed, program, effect)
         return
@@ -71,8 +71,8 @@ def demo(
 
 
 def _load_daemon() -> None:
-    """The first start on a machine compiles the kernels: here it is said, and the daemon's own start does not wait."""
-    import_module("compd.live.run_daemon")
+    """Compile the kernels at the first start on a machine, with a message, so that the daemon's start does not wait."""
+    import_module("compd.live.run")
 
 
 def _show_live(config: Path | None, seed: int, port: int) -> None:

@@ -1,4 +1,4 @@
-"""`compd docs`: the documentation, which comes with compd and works offline."""
+"""`compd docs`: the documentation, shipped with compd for offline use."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from compd.errors import CompdError, Problem
 
 _ROOT = Path(__file__).parents[3]
-# Inside an installed package, and in a checkout.
+# Directories in an installed package, and in a checkout.
 _PLACES = (_ROOT / "compd" / "documentation", _ROOT / "docs" / "_build" / "html")
 
 
@@ -33,7 +33,7 @@ def docs(
 
 
 def documentation_directory() -> Path:
-    """The directory of the built pages. Raises CompdError where there are none."""
+    """The directory of the built pages. Raises CompdError if there are none."""
     for place in _PLACES:
         if (place / "index.html").is_file():
             return place
@@ -47,7 +47,7 @@ def documentation_directory() -> Path:
 
 
 def find_page(directory: Path, name: str) -> Path:
-    """The page of that name: its path below `directory`, or the end of one that no other page has.
+    """The page of that name: its path below `directory`, or a unique end of one.
 
     A folder's page may be named by the folder: `tutorials` is `tutorials/index`. Raises CompdError with the names that
     are near where no page or more than one has this name.
@@ -76,7 +76,7 @@ def find_page(directory: Path, name: str) -> Path:
 
 
 def _near(wanted: str, pages: list[str]) -> list[str]:
-    """The pages whose name or whose last part is like `wanted`; the folders' pages where none is."""
+    """The pages whose name or last part resembles `wanted`; else the folders' pages."""
     from difflib import get_close_matches
 
     parts = {page.rpartition("/")[2]: page for page in pages}

@@ -1,4 +1,4 @@
-"""What on this computer keeps the daemon from doing its work: ports, rights, real time, clock, disk, service.
+"""Checks of this computer for the daemon: ports, permissions, real time, clock, disk, service.
 
 Everything is looked at and nothing touched: no port is opened, no file written, no device asked. So a daemon that runs
 is not disturbed.

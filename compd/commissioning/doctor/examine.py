@@ -1,4 +1,4 @@
-"""All looks of the doctor, and what follows from them in order."""
+"""All checks of the doctor, and the next steps in order."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from compd.commissioning.doctor.system import (
 )
 from compd.configuration import Configuration
 
-# Of the shipped configurations, for a computer that has none yet.
+# Values of the shipped configurations, for a computer without a configuration.
 _USUAL_PRIORITY = 40
 _USUAL_DIRECTORY = Path("/var/lib/compd")
 _TIMEOUT_S = 2.0
 
 
 def examine(configuration: Configuration | None, computer: Computer | None = None) -> list[Finding]:
-    """Look at everything; without a configuration at the computer alone."""
+    """Make all checks; without a configuration those of the computer alone."""
     computer = computer or Computer()
     findings: list[Finding] = []
     daemon = None
@@ -46,7 +46,7 @@ def examine(configuration: Configuration | None, computer: Computer | None = Non
 
 
 def what_to_do(findings: Sequence[Finding]) -> list[str]:
-    """The next steps: first of what keeps the daemon from its work, in the order of the looks, then advice."""
+    """The next steps: faults first, in the order of the checks, then advice."""
     by_weight = sorted(findings, key=lambda finding: -finding.verdict)
     return list(dict.fromkeys(finding.next_step for finding in by_weight if finding.next_step))
 
@@ -61,5 +61,5 @@ def _daemon_finding(daemon: DaemonStatus) -> Finding:
 
 
 def is_fit(findings: Sequence[Finding]) -> bool:
-    """Whether nothing keeps the daemon from its work."""
+    """Whether there are no faults."""
     return all(finding.verdict is not Verdict.FAULT for finding in findings)

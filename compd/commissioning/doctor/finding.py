@@ -1,4 +1,4 @@
-"""What the doctor finds, and the computer as it sees it."""
+"""Findings of the doctor, and its view of the computer."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ _COMMAND_TIMEOUT_S = 5.0
 
 
 class Verdict(IntEnum):
-    """Of one look: GOOD; UNKNOWN, this user or this computer cannot tell; ADVICE, it works and could be better; FAULT,
-    it keeps the daemon from its work. What is larger is to be mended first."""
+    """Result of a check; larger ones come first.
+
+    GOOD; UNKNOWN: not visible to this user or on this computer; ADVICE: it works and could be better; FAULT: it stops
+    the daemon.
+    """
 
     GOOD = 0
     UNKNOWN = 1
@@ -24,7 +27,7 @@ class Verdict(IntEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One look. subject : what was looked at. what : how it is. next_step : what to do; "" where nothing is."""
+    """One finding. subject : the checked item. what : its condition. next_step : the action; "" for none."""
 
     verdict: Verdict
     subject: str
@@ -33,27 +36,27 @@ class Finding:
 
 
 def good(subject: str, what: str) -> Finding:
-    """Nothing to do."""
+    """A good finding."""
     return Finding(Verdict.GOOD, subject, what)
 
 
 def fault(subject: str, what: str, next_step: str) -> Finding:
-    """It keeps the daemon from its work."""
+    """A finding that stops the daemon."""
     return Finding(Verdict.FAULT, subject, what, next_step)
 
 
 def advice(subject: str, what: str, next_step: str) -> Finding:
-    """It works, and could be better."""
+    """A finding that works, and could be better."""
     return Finding(Verdict.ADVICE, subject, what, next_step)
 
 
 def unknown(subject: str, what: str, next_step: str = "") -> Finding:
-    """It cannot be seen here."""
+    """A finding that is not visible here."""
     return Finding(Verdict.UNKNOWN, subject, what, next_step)
 
 
 def _run(command: Sequence[str]) -> str | None:
-    """Standard output of a command; None where there is no such command, or it fails or hangs."""
+    """Standard output of a command; None if it is missing, fails or hangs."""
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=_COMMAND_TIMEOUT_S, check=False, stdin=subprocess.DEVNULL
@@ -65,7 +68,7 @@ def _run(command: Sequence[str]) -> str | None:
 
 @dataclass(frozen=True)
 class Computer:
-    """The computer that is looked at. root : "/", or in tests a directory in its place. run : a command's output."""
+    """The checked computer. root : "/", or in tests a directory in its place. run : a command's output."""
 
     root: Path = Path("/")
     run: Callable[[Sequence[str]], str | None] = field(default=_run)
@@ -75,14 +78,14 @@ class Computer:
         return self.root / str(absolute).lstrip("/")
 
     def read(self, absolute: str | Path) -> str | None:
-        """Content of a small file without its last line end; None where it cannot be read."""
+        """Content of a small file without its last line end; None if unreadable."""
         try:
             return self.path(absolute).read_text(encoding="utf-8", errors="replace").strip()
         except OSError:
             return None
 
     def resolve(self, absolute: str) -> Path | None:
-        """What a path leads to, as a path of this computer; None where there is nothing."""
+        """The resolved path on this computer; None if it does not exist."""
         path = Path(os.path.realpath(self.path(absolute)))
         if not path.exists():
             return None

@@ -1,4 +1,4 @@
-"""Serial ports and network devices of a configuration: are they there, and may this user open them?"""
+"""Serial ports and network devices of a configuration: presence, and permission of this user to open them."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from compd.commissioning.doctor.finding import Computer, Finding, advice, fault,
 from compd.configuration import LineSettings, ModbusTcpLine, MqttLine, OpcUaLine, TcpLine
 
 _BY_ID, _BY_PATH = "/dev/serial/by-id", "/dev/serial/by-path"
-# Their other end is held by another program as a matter of course.
+# Directory of pseudo terminals, whose other end is normally held by another program.
 _PSEUDO_TERMINALS = "/dev/pts"
 _CONNECT_TIMEOUT_S = 1.0
-# FTDI's default keeps bytes back for 16 ms.
+# Largest latency timer (ms) without advice; FTDI's default is 16 ms.
 _SHORT_LATENCY_MS = 2
 
 
 def port_findings(computer: Computer, lines: Mapping[str, LineSettings], daemon_runs: bool) -> Iterator[Finding]:
-    """For every line of a configuration. daemon_runs : its devices are then not connected to a second time."""
+    """Findings for every line of a configuration. daemon_runs : no second connection to its devices."""
     shared = _shared_names(computer)
     for name, line in lines.items():
         subject = f"line {name}"
@@ -97,7 +97,7 @@ def _how_to_be_permitted(device: Path) -> str:
 
 
 def _shared_names(computer: Computer) -> dict[Path, str]:
-    """Adapters that udev cannot tell apart, by device: of the same vendor, product and serial number, if any."""
+    """Adapters that udev cannot distinguish, by device: same vendor, product and serial number, if any."""
     by_identity: dict[tuple[str, str, str], list[Path]] = {}
     for entry in sorted(computer.path("/sys/class/tty").glob("tty[UA][SC][BM]*")):
         if (identity := _identity(computer, entry.name)) is not None:

@@ -1,4 +1,4 @@
-"""Real time, clock, disk, the daemon's own sockets and its unit."""
+"""Checks of real time, clock, disk, the daemon's own sockets and its unit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from compd.commissioning.doctor.finding import Computer, Finding, advice, fault,
 # linux/capability.h
 _CAP_IPC_LOCK, _CAP_SYS_NICE = 14, 23
 _UNIT = "compd"
-# A recording takes 100 to 200 MB an hour with its cycles; machine zero a few kB.
+# Least free space (bytes): a recording takes 100 to 200 MB an hour with its cycles, machine zero a few kB.
 _LITTLE_BYTES, _SCARCE_BYTES = 100e6, 2e9
 _COARSE_S = 1e-6
 _LISTENING = "0A"  # net/tcp_states.h
@@ -26,7 +26,7 @@ _LIMITS = "run the daemon by systemd/compd.service, or give its user rtprio 98 a
 
 
 def realtime_findings(computer: Computer, priority: int, granted: Mapping[str, Any]) -> Iterator[Finding]:
-    """Whether the loop may have real time. granted : what the running daemon was granted, from STATUS; {} without."""
+    """Real-time permissions of the loop. granted : those of the running daemon from STATUS; {} without a daemon."""
     yield from _granted_findings(granted) if granted else _permitted_findings(computer, priority)
     yield _kernel_finding(computer)
     runtime = computer.read("/proc/sys/kernel/sched_rt_runtime_us")
@@ -48,7 +48,7 @@ def realtime_findings(computer: Computer, priority: int, granted: Mapping[str, A
 
 
 def _granted_findings(granted: Mapping[str, Any]) -> Iterator[Finding]:
-    """Of a daemon that runs: what it has."""
+    """Permissions of a running daemon."""
     for name, next_step in (("sched_fifo", _LIMITS), ("locked_memory", _LIMITS), ("wake_latency", _RULES)):
         permission = granted.get(name)
         if permission is None:
@@ -60,7 +60,7 @@ def _granted_findings(granted: Mapping[str, Any]) -> Iterator[Finding]:
 
 
 def _permitted_findings(computer: Computer, priority: int) -> Iterator[Finding]:
-    """Where none runs: what this user may have."""
+    """Permissions of this user, without a running daemon."""
     capabilities = int(_status_of_self(computer).get("CapEff", "0"), 16)
     limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
     if capabilities >> _CAP_SYS_NICE & 1 or limit == resource.RLIM_INFINITY or limit >= priority:
@@ -91,7 +91,7 @@ def _kernel_finding(computer: Computer) -> Finding:
 
 
 def clock_findings(computer: Computer) -> Iterator[Finding]:
-    """Synchronised? Fine enough?"""
+    """Synchronisation and resolution of the clock."""
     resolution_s = time.get_clock_info("monotonic").resolution
     if resolution_s > _COARSE_S:
         yield fault(
@@ -114,11 +114,11 @@ def clock_findings(computer: Computer) -> Iterator[Finding]:
             "timedatectl set-ntp true",
         )
     else:
-        yield unknown("clock", "nobody says here whether the time of day is synchronised")
+        yield unknown("clock", "it is unknown here whether the time of day is synchronised")
 
 
 def disk_findings(computer: Computer, directory: Path) -> Iterator[Finding]:
-    """The state directory: can machine zero be kept, and is there room?"""
+    """The state directory: permission for machine zero, and free space."""
     subject = "disk"
     existing = next(place for place in (directory, *directory.parents) if computer.path(place).exists())
     if not os.access(computer.path(existing), os.W_OK | os.X_OK):
@@ -136,7 +136,7 @@ def disk_findings(computer: Computer, directory: Path) -> Iterator[Finding]:
 
 
 def tcp_finding(computer: Computer, port: int, daemon_runs: bool) -> Finding:
-    """The TCP port of the daemon: does anybody else listen on it?"""
+    """The TCP port of the daemon: is it free, or the daemon's own?"""
     subject = f"TCP port {port}"
     inodes = _listeners(computer, port)
     if not inodes:
@@ -157,7 +157,7 @@ def tcp_finding(computer: Computer, port: int, daemon_runs: bool) -> Finding:
 
 
 def unit_finding(computer: Computer, daemon_runs: bool) -> Finding:
-    """The unit of systemd, where there is one."""
+    """The systemd unit, if there is one."""
     shown = computer.run(
         ["systemctl", "show", _UNIT, "--property=LoadState,ActiveState,SubState,NRestarts,UnitFileState"]
     )
@@ -187,7 +187,7 @@ def unit_finding(computer: Computer, daemon_runs: bool) -> Finding:
 
 
 def _listeners(computer: Computer, port: int) -> list[str]:
-    """Inodes of the sockets that listen on a TCP port, from /proc/net."""
+    """Inodes of the sockets listening on a TCP port, from /proc/net."""
     found = []
     for table in ("/proc/net/tcp", "/proc/net/tcp6"):
         for line in (computer.read(table) or "").splitlines()[1:]:

@@ -1,4 +1,4 @@
-"""A calibrated artefact in the simulated machine: the program that probes it, and the recording that comes of that."""
+"""A calibrated artefact in the simulated machine: the program that probes it, and the resulting recording."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ CORNERS_mm = (
     (20.0, -60.0, 295.0),
     (0.0, 0.0, 340.0),
 )
-# The gauges are read so far outside of the corner, along x, y and z: the probe must not touch there.
+# Distance (mm) from the corner, along x, y and z, at which the gauges are read without a touch.
 CLEAR_mm = 0.5
-# Of a place, um: the face is found to the way of one servo period, and the gauges' noise comes in addition.
+# Uncertainty (um) of a probed place: the path of one servo period, plus the gauges' noise.
 SIGMA_um = 0.3
-# Height in which the tip goes from one corner to the next, above all of them.
+# Height (mm) of the tip between corners, above all of them.
 ABOVE_mm = 350.0
 
 _SUBPROGRAMS = """\
@@ -78,12 +78,12 @@ def probing_program(corners_mm: Sequence[Sequence[float]] = CORNERS_mm) -> str:
 
 
 def write_artefact(path: Path) -> None:
-    """artefact.json, by which the simulated probe knows where the faces truly are."""
+    """artefact.json, with the true faces for the simulated probe."""
     path.write_text(json.dumps({"corners_mm": CORNERS_mm}))
 
 
 def reading_times_s(samples: Sequence[MotionSample]) -> list[tuple[float, float]]:
-    """Begin and end of each mark at which gauges were to be read."""
+    """Begin and end of each mark for reading the gauges."""
     times_s: list[tuple[float, float]] = []
     began_s: float | None = None
     for sample in samples:
@@ -96,7 +96,7 @@ def reading_times_s(samples: Sequence[MotionSample]) -> list[tuple[float, float]
 
 
 def write_probed_recording(path: Path, gauges: Sequence[Path], rounds: Sequence[Sequence[MotionSample]]) -> int:
-    """Write the recording of what was probed: one row for each corner and round, gauges as they were at rest there.
+    """Write the recording of the probing: one row for each corner and round, with the gauges at rest there.
 
     gauges : the parts that `compd record` has written meanwhile. rounds : the motion log of each run of the probing
     program. Returns the number of rows. Corners of a round that was not finished are left out, and so are those for

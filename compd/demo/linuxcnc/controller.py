@@ -18,23 +18,23 @@ from typing import Any, Self
 from compd.configuration import shipped_configuration
 from compd.errors import DaemonError, Problem
 
-# LinuxCNC refuses to run as root. Debian has this user everywhere, and it owns nothing.
+# User for LinuxCNC, which refuses to run as root: present in every Debian, without files of its own.
 ORDINARY_USER = "nobody"
 START_S = 60.0
 END_S = 30.0
 POLL_S = 0.05
-# How often a person presses a switch that does nothing, and waits for it, s.
+# Presses of a switch without effect, and the wait (s) for each.
 PRESSES, PRESSED_S = 3, 1.0
-# Longer than anything the panel waits for by itself.
+# Longest wait (s) for the panel, above each of its own waits.
 ANSWER_S = 90.0
 LINKS = 6
-# In a message that the servo thread was late, which stops no program.
+# Text of a message about a late servo thread, which stops no program.
 LATENESS = "realtime delay"
-# How often somebody looks whether a program still runs, s.
+# Interval (s) of checks whether a program still runs.
 LOOK_S = 1.0
-# Corrections have arrived within so much of what is asked for, which changes all the time; and that takes at most, s.
+# Distance within which corrections have reached their varying target, and the longest time (s) for it.
 ARRIVED_MM, ARRIVED_S = 2e-4, 10.0
-# There can be one LinuxCNC on a computer.
+# Lock file: one LinuxCNC on a computer.
 LOCK = Path("/tmp/linuxcnc.lock")
 _HERE = Path(__file__).parent
 _SCRIPTS = ("machine_link.py", "operator_panel.py")
@@ -42,7 +42,7 @@ SIMULATED_MACHINE = ("machine.hal", "probe.hal")
 
 
 def obstacle() -> str:
-    """Why LinuxCNC cannot be started on this computer, and what to do; "" where it can."""
+    """Reason why LinuxCNC cannot be started on this computer, with the next step; "" if it can."""
     for program, package in (
         ("linuxcnc", "linuxcnc-uspace"),
         ("halcmd", "linuxcnc-uspace"),
@@ -56,7 +56,7 @@ def obstacle() -> str:
 
 
 def edited(text: str, changes: Iterable[tuple[str, str]]) -> str:
-    """A shipped file with passages exchanged, each of which is in it once."""
+    """A shipped file with replaced passages, each of which occurs once."""
     for before, after in changes:
         assert text.count(before) == 1, before
         text = text.replace(before, after)
@@ -147,24 +147,24 @@ class LinuxCnc:
         return message["result"]
 
     def do(self, do: str, timeout_s: float = ANSWER_S, **arguments: Any) -> None:
-        """A request that must come about. Raises DaemonError where it does not, with LinuxCNC's messages."""
+        """A request that must succeed. Raises DaemonError with LinuxCNC's messages otherwise."""
         if not self.ask(do, timeout_s, **arguments):
             raise self._problem(f"did not {do} {arguments or ''}: {self.errors[-3:]}")
 
     def switch_on(self) -> None:
-        """Switch on, and home where the machine stands: at machine zero."""
+        """Switch on, and home at the present position, machine zero."""
         self.do("on")
         self.do("home")
 
     def arm(self) -> None:
-        """Press the bridge's switch until it is armed. Raises DaemonError with its reason where it refuses."""
+        """Press the bridge's switch until it is armed. Raises DaemonError with its reason if it refuses."""
         for _ in range(PRESSES):
             if self.arms():
                 return
         raise self._problem(f"the bridge does not arm: {self.held_by() or 'a setpoint was late'}")
 
     def arms(self) -> bool:
-        """Press the bridge's switch once: whether it is armed then. It refuses where a setpoint was late just then."""
+        """Press the bridge's switch once; return whether it is armed. It refuses after a late setpoint."""
         self.do("press", name="compd-arm")
         try:
             self.wait_for("compd.armed", True, PRESSED_S)
@@ -173,17 +173,17 @@ class LinuxCnc:
         return True
 
     def held_by(self) -> str:
-        """Why the feed is held; "" where it is not. A program stands then until the bridge is armed again."""
+        """Reason of a held feed, "" for none. A program then waits until the bridge is armed again."""
         reason: str = self.ask("held_by")
         return reason
 
     def without_corrections(self) -> None:
-        """Let the machine move although the bridge is not armed."""
+        """Let the machine move even while the bridge is disarmed."""
         self.set_signal("compd-arm", "0")
         self.set_signal("compd-required", "0")
 
     def with_corrections(self) -> None:
-        """Let the machine move only while the bridge is armed, arm it, and wait until the corrections have arrived.
+        """Allow motion only with an armed bridge, arm it, and wait until the corrections have arrived.
 
         Raises DaemonError where it cannot be armed, or is not armed so long.
         """
@@ -214,7 +214,7 @@ class LinuxCnc:
         return result
 
     def wait_for(self, pin: str, value: Any, timeout_s: float = 10.0) -> None:
-        """Return when a pin has a value. Raises DaemonError, with the bridge's reason, where it does not get it."""
+        """Return when a pin has a value. Raises DaemonError with the bridge's reason if it never has."""
         end_s = time.monotonic() + timeout_s
         while self.value(pin) != value:
             if time.monotonic() > end_s:
@@ -270,11 +270,11 @@ class LinuxCnc:
         if os.geteuid() == 0:
             for path in (self.directory, *self.directory.iterdir(), *self._simulation.glob("*.sock")):
                 shutil.chown(path, ORDINARY_USER)
-            # so that the user can come to what is its own
+            # so that the user can reach its own files
             self._simulation.chmod(0o711)
 
     def give(self, path: Path) -> None:
-        """Let the controller's user have a file that was written into the directory, or a socket that is new."""
+        """Give the controller's user a file written into the directory, or a new socket."""
         if os.geteuid() == 0:
             shutil.chown(path, ORDINARY_USER)
 
@@ -293,7 +293,7 @@ class LinuxCnc:
             time.sleep(POLL_S)
 
     def _end(self) -> None:
-        """LinuxCNC ends its parts itself when the panel has ended; what is then left is killed."""
+        """LinuxCNC ends its parts itself after the panel's end; the rest is then killed."""
         assert self._process is not None
         try:
             self._process.wait(END_S)

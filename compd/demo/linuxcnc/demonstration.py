@@ -26,24 +26,24 @@ from compd.errors import CompdError, DaemonError, Problem
 from compd.gauge import Quality
 from compd.simulation import ControlClient, Mechanism
 
-# A minute of demonstration is half an hour of weather and warm-up.
-LINUXCNC_SPEEDUP = 30.0
-# The machine stands at machine zero until the controller commands it.
+# Speed-up of weather and warm-up: a minute of demonstration is half an hour.
+SPEEDUP = 30.0
+# Time (s) at machine zero, until the controller commands the machine.
 ZERO_HOLD_S = 600.0
 SHIPPED_PROGRAM = Path(__file__).parent / "program.ngc"
-# What each drive gives off during each round of probing, W. The drives work hard, idle, and work hard again, so that
-# what grows with the links' temperature is told from what grows with time.
+# Heat (W) of each drive during each round of probing. The drives work hard, idle, and work hard again, which separates
+# growth by the links' temperature from growth with time.
 ROUNDS_W = (3.0, 3.0, 0.3, 3.0)
 # The rest of the machine's heat, as after switch-on: base ring, cabinet by column, platform, tool, lamps.
 _OTHER_HEAT = {"ring_W": 12.0, "cabinet_W": [8.0, 3.0, 4.0], "platform_W": 0.4, "tool_W": 0.0, "lamps_W": 3.0}
 LONGEST_PROGRAM_S = 1200.0
-# A computer that is busy disarms the bridge: how often corrections are switched on, before that is an error.
+# Attempts to switch corrections on before it is an error; a busy computer disarms the bridge.
 ARMINGS = 20
-# And a program is run.
+# Attempts to run a program.
 RUNS = 5
-# An error below so many times the noise is not worth a further effect in the model.
+# Ratio of error and noise below which the model needs no further effect.
 NOISE_RATIO = 2.0
-# The correction of another model is reached at `limits.slew_mm_per_s`: 0.2 mm in 0.4 s.
+# Time (s) to reach the correction of another model at `limits.slew_mm_per_s`: 0.2 mm take 0.4 s.
 ADOPTED_S = 10.0
 
 OFF, ON, ADOPTED = "corrections off", "corrections on", "the effect adopted"
@@ -51,7 +51,7 @@ OFF, ON, ADOPTED = "corrections off", "corrections on", "the effect adopted"
 
 @dataclass
 class LinuxCncDemo:
-    """What came of it.
+    """Result of the demonstration.
 
     errors : of the program, by how it was run. rows : that were probed. diagnosis : of these, in a sentence.
     adopted : the effects of it that are worth their place in the model, in order.
@@ -72,8 +72,7 @@ def run_linuxcnc_demo(
     program: Path = SHIPPED_PROGRAM,
     speedup: float = LINUXCNC_SPEEDUP,
 ) -> LinuxCncDemo:
-    """Probe while the machine warms up; run the program without corrections and with them; diagnose what was probed,
-    adopt what was found, and run the program again.
+    """Probe during the warm-up; run the program without and with corrections; adopt the diagnosis; run it again.
 
     Parameters
     ----------
@@ -117,7 +116,7 @@ def run_linuxcnc_demo(
 
 
 class _Session:
-    """A controller on a simulated machine with its daemon, and what is done there more than once."""
+    """A controller on a simulated machine with its daemon, and repeated actions on them."""
 
     def __init__(
         self,
@@ -138,7 +137,7 @@ class _Session:
         return tip_errors(self._mechanism, self._run(self._program))
 
     def correct(self) -> None:
-        """Switch the corrections on. Raises DaemonError where they do not stay on, ARMINGS times."""
+        """Switch the corrections on. Raises DaemonError if they fail to stay on ARMINGS times."""
         for tries_left in reversed(range(ARMINGS)):
             try:
                 self._controller.with_corrections()
@@ -164,7 +163,7 @@ class _Session:
         return write_probed_recording(recording, sorted(self._directory.glob("gauges-*.csv")), rounds)
 
     def heat(self, drive_W: float) -> None:
-        """What the drives give off from now on, each."""
+        """Set the heat of each drive from now on."""
         with ControlClient(self._directory / "control.sock") as machine:
             machine.ask("HEAT", drives_W=[drive_W] * self._links, **_OTHER_HEAT)
 
@@ -178,7 +177,7 @@ class _Session:
                     return
 
     def _run(self, program: Path) -> list[MotionSample]:
-        """Run a program; again where LinuxCNC stops it, as where its probe was late. Raises DaemonError after RUNS."""
+        """Run a program; repeat it if LinuxCNC stops it, as for a late probe. Raises DaemonError after RUNS."""
         for runs_left in reversed(range(RUNS)):
             try:
                 start_s, end_s = self._controller.run(program, LONGEST_PROGRAM_S, self._go_on)
@@ -190,7 +189,7 @@ class _Session:
         return read_motion_log(self._controller.motion_log, start_s, end_s)
 
     def _go_on(self, held_by: str) -> None:
-        """What an operator does whose machine stands: acknowledge what waits for it, and arm."""
+        """The operator's action for a stopped machine: acknowledge, and arm."""
         acknowledged = self._acknowledge()
         outcome = "armed again" if self._controller.arms() else "not armed yet"
         told = f"  The feed was held: {held_by}. {', '.join([*acknowledged, outcome])}."
@@ -199,7 +198,7 @@ class _Session:
         self._told = told
 
     def _acknowledge(self) -> list[str]:
-        """Accept every gauge that waits for a person; what was accepted, in words. In this machine none is wrong."""
+        """Accept every distrusted gauge; return a description. In this machine none is wrong."""
         with connect(self._directory / "compd.sock", ADOPTED_S) as daemon:
             gauges = [gauge["channel"] for gauge in daemon.status()["gauges"] if gauge["quality"] == Quality.DISTRUSTED]
             for gauge in gauges:
@@ -214,7 +213,7 @@ class _Session:
 
 
 def diagnose(recording: Path, machine: Path) -> tuple[str, list[str]]:
-    """`compd diagnose` on a recording: what it says, and those of the effects it names that are worth their place."""
+    """`compd diagnose` on a recording: its text, and the named effects that are worth adding."""
     result = json.loads(_compd("diagnose", str(recording), "--machine", str(machine), "--json"))
     effects = []
     for step in result["steps"]:
@@ -232,7 +231,7 @@ def add_effects(effects: Sequence[str], recording: Path, machine: Path, model: P
 
 
 def _compd(*arguments: str) -> str:
-    """A command of compd as a person enters it: what it prints. Raises CompdError with its message."""
+    """Run a command of compd; return its output. Raises CompdError with its message."""
     result = subprocess.run(
         [sys.executable, "-P", "-m", "compd", *arguments], capture_output=True, text=True, check=False
     )

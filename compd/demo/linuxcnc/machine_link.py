@@ -30,19 +30,19 @@ import hal
 
 PERIOD_S = 0.001  # of the servo thread: [EMCMOT] SERVO_PERIOD
 LINKS = 6
-# One sample in so many goes to the simulation, is logged, and is logged with the true tip.
+# Samples of which one goes to the simulation, is logged, and is logged with the true tip.
 FOLLOWED, LOGGED, WITH_TIP = 5, 10, 50
-# Share of the difference between a sample's time by count and by arrival that is believed: samples come in bursts.
+# Gain of the clock: share of the difference between a sample's time by count and by arrival; samples come in bursts.
 CLOCK_GAIN = 0.01
-# Beyond this difference, s, the count has had a gap.
+# Difference (s) that shows a gap of the count.
 CLOCK_GAP_S = 0.25
 END_S = 1.0
-# Of probe-contact in probe.hal.
+# Hysteresis (mm) of probe-contact in probe.hal.
 HYSTERESIS_MM = 0.002
 
 
 class ServoSample(NamedTuple):
-    """What the sampler caught in one servo period; see machine.hal."""
+    """The sampler's data of one servo period; see machine.hal."""
 
     number: int
     nominal_mm: list[float]
@@ -70,7 +70,7 @@ class Simulation:
         self._ask({"class": "FOLLOW", "commands": commands})
 
     def tip_mm(self, scale_mm: list[float]) -> list[float] | None:
-        """The true tip at these scale values; None where the links cannot meet there."""
+        """The true tip at these scale values; None if the links cannot meet there."""
         return self._ask({"class": "TIP_FOR", "scale_mm": scale_mm}).get("tip_mm")
 
     def _ask(self, message: dict[str, Any]) -> dict[str, Any]:
@@ -80,7 +80,7 @@ class Simulation:
 
 
 class SampleClock:
-    """Times of samples from their number: evenly spaced, and as late as samples arrive on the average."""
+    """Times of samples from their number: evenly spaced, with the mean delay of arrival."""
 
     def __init__(self) -> None:
         self._offset_s = math.nan
@@ -97,7 +97,7 @@ class SampleClock:
 
 
 class Probe:
-    """Names the face of the artefact that is nearest to the tip, for `probe.hal` to compare with in real time.
+    """Names the face of the artefact nearest to the tip, for the comparison in `probe.hal` in real time.
 
     The artefact is a set of calibrated corners, each the outermost in x, y and z of a cube: its three faces look
     outwards along x, y and z.
@@ -112,7 +112,7 @@ class Probe:
         self._face: tuple[int, int] | None = None
 
     def aim(self, believed_mm: list[float], true_mm: list[float]) -> None:
-        """For the tip that is truly at `true_mm` while the controller believes in `believed_mm`."""
+        """The nearest face for the true tip at `true_mm` and the controller's one at `believed_mm`."""
         number = min(range(len(self._corners_mm)), key=lambda n: math.dist(self._corners_mm[n], true_mm))
         corner_mm = self._corners_mm[number]
         axis = max(range(3), key=lambda a: true_mm[a] - corner_mm[a])
@@ -130,10 +130,10 @@ class Link:
 
     def __init__(self, directory: Path, component: Any) -> None:
         self._simulation = Simulation(directory / "control.sock")
-        # open as long as the process lives, and whole lines at once: others read it meanwhile
+        # open for the process's lifetime, written in whole lines: others read it meanwhile
         self._log: IO[str] = Path("motion.log").open("w", buffering=1)  # noqa: SIM115
         self._clock = SampleClock()
-        # one that is left alone does not heed SIGTERM, and keeps its shared memory from the next LinuxCNC
+        # an orphan ignores SIGTERM, and its shared memory blocks the next LinuxCNC
         self._sampler = subprocess.Popen(["setpriv", "--pdeathsig", "KILL", "halsampler", "-t"], stdout=subprocess.PIPE)
         self._rest = b""
         self._before: list[float] | None = None

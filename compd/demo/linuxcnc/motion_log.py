@@ -1,4 +1,4 @@
-"""What the motors were commanded along a program, and how far the true tip was from where the program wanted it."""
+"""Motor commands along a program, and the distance of the true tip from the programmed one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from compd.arrays import BoolArray, FloatArray, rms
 from compd.simulation import Mechanism
 from compd.units import UM_PER_MM
 
-# The machine is at rest when its nominal commands have been the same for so long, s.
+# Time (s) of constant nominal commands for a machine at rest.
 REST_S = 0.4
 SAME_MM = 1e-6
 
@@ -33,7 +33,7 @@ class MotionSample(NamedTuple):
 
 
 class TipErrors(NamedTuple):
-    """Distance of the true tip from where the program wanted it, along a program.
+    """Distance of the true tip from the programmed one, along a program.
 
     time_s : (N,) since the program began. error_um : (N,). at_rest : (N,) whether the commands stood still.
     """
@@ -72,7 +72,7 @@ def read_motion_log(path: Path, start_s: float = -np.inf, end_s: float = np.inf)
 
 
 def wanted_tips_mm(mechanism: Mechanism, nominal_mm: Iterable[FloatArray]) -> list[FloatArray]:
-    """Where the tip would be with these scale values, all parts as drawn: that is where the program wants it.
+    """The programmed tip: its position with these scale values, all parts as drawn.
 
     Follows the hexapod from one place to the next, from machine zero or near it.
     """
@@ -85,7 +85,7 @@ def wanted_tips_mm(mechanism: Mechanism, nominal_mm: Iterable[FloatArray]) -> li
 
 
 def tip_errors(mechanism: Mechanism, samples: Sequence[MotionSample]) -> TipErrors:
-    """Of every sample that has the true tip, but for those at which the feed was held: the program stood."""
+    """Samples with the true tip, except those during a held feed, when the program stood."""
     with_tip = [number for number, sample in enumerate(samples) if sample.tip_mm is not None and not sample.inhibited]
     wanted_mm = wanted_tips_mm(mechanism, (samples[number].nominal_mm for number in with_tip))
     true_mm = np.array([samples[number].tip_mm for number in with_tip]).reshape(-1, 3)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What stands in for LinuxCNC's screen: does what a person does there, as a program asks for on a Unix socket.
+"""Replacement of LinuxCNC's screen: carries out a person's actions on request over a Unix socket.
 
 LinuxCNC starts it as its DISPLAY, and ends when it ends. Requests and answers are JSON objects, one a line, on
 panel.sock in the working directory; `{"do": "home"}` calls `Operator.home`. Every answer has "result", and "errors":
@@ -22,13 +22,13 @@ from compd_arming import REASONS
 
 POLL_S = 0.01
 PRESS_S = 0.1
-# LinuxCNC's own answer to one command.
+# Timeout (s) of LinuxCNC's answer to one command.
 COMMAND_S = 15.0
 SOCKET = Path("panel.sock")
 
 
 class Operator:
-    """One method per thing to be done; each returns whether it came about, or what was asked for."""
+    """One method per action; each returns its success or the requested value."""
 
     def __init__(self) -> None:
         self._command = linuxcnc.command()
@@ -81,7 +81,7 @@ class Operator:
         return {name: hal.get_value(name) for name in names}
 
     def held_by(self) -> str:
-        """Why the feed is held, in the bridge's words; "" where it is not."""
+        """Reason of a held feed, in the bridge's words; "" for none."""
         if not hal.get_value("compd-inhibit"):
             return ""
         if hal.get_value("compd.armed"):
@@ -92,7 +92,7 @@ class Operator:
         return subprocess.run(["halcmd", "sets", name, value], check=False).returncode == 0
 
     def press(self, name: str) -> bool:
-        """Let a switch go, and press it again, as slowly as a finger: a rising edge for everybody."""
+        """Release a switch, and press it again, as slowly as a finger: a visible rising edge."""
         if not self.set_signal(name, "0"):
             return False
         time.sleep(PRESS_S)

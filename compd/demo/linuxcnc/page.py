@@ -1,4 +1,4 @@
-"""What the demonstration in LinuxCNC gained: a table for the terminal, a sentence, and a page with a picture."""
+"""Result of the demonstration in LinuxCNC: a table for the terminal, a sentence, and a page with a picture."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def summarise_linuxcnc(demo: LinuxCncDemo) -> TerminalTable:
     return table
 
 
-def linuxcnc_verdict(demo: LinuxCncDemo) -> str:
-    """The result in one sentence. The whole program counts where it has no rests."""
+def verdict(demo: LinuxCncDemo) -> str:
+    """The result in one sentence, for the rests or, without rests, for the whole program."""
     errors = demo.errors.values()
     resting = all(len(run.at_rest_um) for run in errors)
     parts = [

@@ -1,4 +1,4 @@
-"""How seldom a gauge is asked that does not answer, and whose silence makes the others on its line stale.
+"""Polling interval of an unresponsive gauge whose silence makes the others on its line stale.
 
 A gateway before a serial bus serves nobody while it waits for a unit that does not answer, whatever the line's timeout
 is. What such a request has cost is known when the next gauge answers. Where that gauge's reading has gone stale
@@ -14,18 +14,18 @@ from compd.live.acquisition.polled_gauge import PolledGauge
 
 log = structlog.get_logger()
 
-# A gauge that is absent may take 1 % of its line's time.
+# An absent gauge takes at most 1 % of its line's time: the rest after a missed reply, in times of its cost.
 TIMES_COST = 100
-# One reply may get lost; the second miss in a row is an absence.
+# Missed replies in a row that count as an absence; a single reply may get lost.
 MISSES = 2
 
 
 class AbsentGauges:
-    """Of one line; used by the line's thread."""
+    """Absent gauges of one line; used by the line's thread."""
 
     def __init__(self) -> None:
-        self._asked_s: dict[PolledGauge, float] = {}  # missed since any other answered: when they were asked
-        self._misses: dict[PolledGauge, int] = {}  # in a row, that cost another one its reading
+        self._asked_s: dict[PolledGauge, float] = {}  # time of a poll without an answer since another gauge answered
+        self._misses: dict[PolledGauge, int] = {}  # consecutive misses that made another gauge's reading stale
 
     def missed(self, gauge: PolledGauge, asked_s: float) -> None:
         """`gauge` was asked at the monotonic time `asked_s` (s), and did not answer."""
@@ -36,7 +36,7 @@ class AbsentGauges:
         self._misses.pop(gauge, None)
         self._asked_s.pop(gauge, None)
         if self._asked_s:
-            # those that were asked behind the first may have waited for it in the gateway's queue
+            # gauges polled after the first may have waited behind it in the gateway's queue
             absent, asked_s = next(iter(self._asked_s.items()))
             if gauge.fresh(asked_s) and not gauge.fresh(now_s):
                 self._count(absent, now_s - asked_s, now_s)
@@ -49,4 +49,4 @@ class AbsentGauges:
         rest_s = TIMES_COST * cost_s
         absent.rests_until_s = now_s + rest_s
         if misses == MISSES:
-            log.warning("gauge is asked seldom", gauge=absent.name, cost_s=round(cost_s, 3), rest_s=round(rest_s, 1))
+            log.warning("gauge is polled seldom", gauge=absent.name, cost_s=round(cost_s, 3), rest_s=round(rest_s, 1))

@@ -88,16 +88,16 @@ class LineThread:
         self._thread = threading.Thread(target=self._run, name=f"line {name}", daemon=True)
 
     def start(self) -> None:
-        """Start to poll; return at once, whether or not the line can be opened."""
+        """Start polling and return at once, even if the line cannot be opened yet."""
         self._thread.start()
 
     @property
     def thread_id(self) -> int | None:
-        """Of the line's thread, as the kernel counts; None before its start."""
+        """Kernel id of the line's thread; None before its start."""
         return self._thread.native_id
 
     def stop(self) -> None:
-        """Ask the thread to end, which it does after its current poll."""
+        """Ask the thread to end after its current poll."""
         self._stop.set()
 
     def join(self, timeout_s: float) -> bool:
@@ -106,7 +106,7 @@ class LineThread:
         return not self._thread.is_alive()
 
     def status(self) -> dict[str, Any]:
-        """The line's part of STATUS, as plain data; what is not known is left out."""
+        """The line's part of STATUS as plain data, without unknown values."""
         line = self._line
         status: dict[str, Any] = {"state": self.state, "opened": self.opened, "lost": self.lost}
         if self.detail:
@@ -128,9 +128,9 @@ class LineThread:
                     self._round.take(self._line)
             except LineFault as fault:  # LINE_LOST alone: a round handles every other fault
                 self._mark_lost(fault.detail)
-            except MemoryError:  # it is the whole process that has none left
+            except MemoryError:  # the whole process has run out of them
                 raise
-            except Exception as error:  # a port's library may raise anything; it must not end the line's thread
+            except Exception as error:  # a port's library may raise anything; the line's thread must go on
                 if self.state != "lost":
                     log.exception("line failed", line=self.name)
                 self._mark_lost(f"{type(error).__name__}: {error}")

@@ -1,4 +1,4 @@
-"""The judgement of one gauge's readings: which polls are asked twice, and what of them is published."""
+"""Plausibility check of one gauge: when to poll again, what to publish."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
 from compd.live.acquisition.quantity_trust import QuantityTrust
 from compd.live.acquisition.reading_trust import ReadingTrust
 
-# Of a length, and of any other quantity.
+# The judge of a length, and that of any other quantity.
 Judge: TypeAlias = ReadingTrust | QuantityTrust
 
 
@@ -26,10 +26,10 @@ class GaugeTrust:
         self._first: Sequence[Reading | None] = ()
         self._shortest_s = math.inf
         self._window_s = 0.0
-        self._surprising: dict[int, Reading] = {}  # by place: came unasked, and waits for the next
+        self._surprising: dict[int, Reading] = {}  # waiting unsolicited readings, by index of the channel
 
     def read(self, ask: Callable[[], Sequence[Reading]]) -> Sequence[Reading]:
-        """The readings of one poll by `ask`, or of a second one where a value is not where its last readings lead.
+        """The readings of one poll by `ask`, or of a second poll if a value is outside its predicted range.
 
         They are not judged yet. Raises what `ask` raises.
         """
@@ -42,7 +42,7 @@ class GaugeTrust:
         return readings
 
     def _asked(self, ask: Callable[[], Sequence[Reading]]) -> tuple[Sequence[Reading], float]:
-        """Readings, and how much longer than the shortest poll theirs has taken, s.
+        """Readings, and the duration (s) of their poll beyond that of the shortest one.
 
         So late the device may have sampled: it does so at the same time after each request, but for delays on the way.
         """
@@ -53,7 +53,7 @@ class GaugeTrust:
         return readings, duration_s - self._shortest_s + WINDOW_S
 
     def judge(self, readings: Sequence[Reading], now_s: float) -> list[Reading]:
-        """The readings of the last poll, one per channel, as they may be published."""
+        """The readings of the last poll that may be published, one per channel."""
         firsts = self._first or [None] * len(readings)
         judged = []
         for channel, reading, first in zip(self._channels, readings, firsts, strict=True):
@@ -65,8 +65,8 @@ class GaugeTrust:
             judged.append(reading)
         return judged
 
-    def hear(self, place: int, reading: Reading, window_s: float, now_s: float) -> Reading:
-        """A reading of the channel number `place` that came unasked, as it may be published.
+    def receive(self, place: int, reading: Reading, window_s: float, now_s: float) -> Reading:
+        """The reading to publish for an unsolicited one of channel number `place`.
 
         Nobody can ask again: where a value is not where its last readings lead, the next reading is the second answer.
         window_s : by how much later than its time it may have been measured, s.

@@ -1,4 +1,4 @@
-"""How what a length gauge measures moves, by its own last readings.
+"""Motion of the length that a gauge measures, estimated from its last readings.
 
 The speed is the slope over as many of the last readings as it takes for the length to change by more than its readings
 scatter: over the last interval while the machine travels, over up to a second of slow drift. So little noise enters,
@@ -31,32 +31,32 @@ from compd.live.acquisition.possible_motion import GaugeSample
 from compd.reading import ROUNDS_UNTIL_DUE
 from compd.stated_noise import DIFFERENCE_SIGMAS
 
-# Over longer, s, no speed is measured: a drift that is older says little of now.
+# Longest window (s) of a speed; an older drift says little about the present.
 LONGEST_WINDOW_S = 1.0
-# From one window to the next a speed that counts grows at most by this factor: the limit of a slope limiter that keeps
-# it from overshooting (P. K. Sweby, SIAM J. Numer. Anal. 21 (1984) 995-1011).
+# Largest growth of a speed from one window to the next: the factor at which a slope limiter does not overshoot (P. K.
+# Sweby, SIAM J. Numer. Anal. 21 (1984) 995-1011).
 LARGEST_GROWTH = 2.0
-# A reading is replaced one round after it was made, and one that waits for the end of its round after two.
+# Age (rounds) at which a reading is replaced: one round, or two for a reading that waits for the end of its round.
 HORIZON_ROUNDS = 2.0
-# Of the last rounds the median is the usual one.
+# The usual round time is the median of this many last rounds.
 _USUAL_ROUNDS = 5
-# A part that turns round shows one round without motion, and not two.
+# Rounds without motion that show a rest; a part that reverses shows one of them.
 _CALM_ROUNDS = 2
-# Drives come to rest from their full speed within 0.1 to 0.3 s: for longer than this, s, no motion is taken to go on.
+# Longest time (s) that a motion is assumed to continue; drives stop from full speed within 0.1 to 0.3 s.
 LONGEST_HORIZON_S = 0.15
 # Width of a uniform distribution over its standard deviation (GUM, 4.3.7).
 _UNIFORM = math.sqrt(12.0)
-# Windows are as long as the last one but for the scatter of polls.
+# Least duration of a window as a share of the last one; polls scatter.
 _AS_LONG = 0.9
-# A recording has each of them as text: 1 pm/s and 1 us are less than anybody knows of them.
+# Rounded to 1 pm/s and 1 us, below every uncertainty, since a recording has each of them as text.
 _DECIMALS_MM, _DECIMALS_S = 9, 6
-# To see a rest every fourth reading is kept, which looks back on 128 of them: some 2 s of a scale, 6 s of a slow line.
+# Every fourth reading is kept to detect a rest. They cover 128 readings: some 2 s of a scale, 6 s of a slow line.
 _KEPT_EVERY, _KEPT = 4, 32
 UNKNOWN = ReadingMotion(0.0, 0.0, math.nan, 0.0)
 
 
 def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> ReadingMotion:
-    """The motion at the last of these readings, which are in the order of time.
+    """The motion at the last of these readings, which are ordered by time.
 
     tolerance_mm : by which two readings of the same value may differ, mm.
     """
@@ -84,7 +84,7 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
     u = math.hypot(
         max(changes, default=abs(now)), tolerance_mm / DIFFERENCE_SIGMAS / duration_s, abs(now) * late_s / duration_s
     )
-    if recent < math.inf:  # how fast it was before that says nothing any more
+    if recent < math.inf:  # the speed before that no longer counts
         u = min(u, max(recent, abs(now)))
     before = slopes[1] if len(slopes) > 1 else 0.0
     if now * before <= 0.0 or _has_stopped(history, now, tolerance_mm):
@@ -100,7 +100,7 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
 
 
 def _window_start(history: Sequence[GaugeSample], last: int, tolerance_mm: float) -> int:
-    """Where the shortest window begins in which the length has changed; the longest window where it has not."""
+    """Start of the shortest window in which the length has changed, or of the longest window."""
     newest = history[last]
     start = last - 1
     for k in range(last - 1, -1, -1):
@@ -113,7 +113,7 @@ def _window_start(history: Sequence[GaugeSample], last: int, tolerance_mm: float
 
 
 def _recent_speed(history: Sequence[GaugeSample], tolerance_mm: float) -> float:
-    """The size of the speed (mm/s) over the last two rounds, where neither shows motion; inf where one does."""
+    """The absolute speed (mm/s) over the last two rounds if neither shows motion; else inf."""
     if len(history) <= _CALM_ROUNDS:
         return math.inf
     newest = history[-1]

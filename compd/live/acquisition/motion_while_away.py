@@ -1,4 +1,4 @@
-"""What the other length gauges say of the time in which one of them was not read: has the machine moved meanwhile?"""
+"""Motion of the machine during the absence of one length gauge, from the other ones."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from compd.live.memory import Doubt, TrustMemory
 
-# Where all gauges were away, s, until those that are back are compared without those that are not.
+# Wait (s) for the missing gauges after an absence of all; then those that are back are compared alone.
 _WAIT_FOR_OTHERS_S = 2.0
 
 
 def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -> tuple[int | None, bool]:
-    """Number of a channel that has moved since channel `i` was last believed, and whether enough could be compared.
+    """Number of a channel that has moved since channel `i` was last believed, and whether enough were compared.
 
     What counts are the channels that have been good all the time, as far as they have been read since `i` was lost.
     Where there are none, because everything was off, half of those that are back are enough to say that the machine
@@ -39,7 +39,7 @@ def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -
 
 
 def stood_still(memory: TrustMemory, i: int) -> bool:
-    """Whether every channel beside `i` that can be compared shows what it showed when `i` was last believed.
+    """Whether every comparable channel beside `i` has kept its value since `i` was last believed.
 
     False where there is none.
     """
@@ -51,7 +51,7 @@ def stood_still(memory: TrustMemory, i: int) -> bool:
 
 
 def scales_stood(memory: TrustMemory, i: int) -> bool:
-    """Whether every scale that is believed shows what it showed when `i` was last believed; False where none is."""
+    """Whether every believed scale has kept its value since `i` was last believed; False without a believed scale."""
     compared = 0
     for scale in range(memory.scales):
         if memory.doubt[scale] != Doubt.NONE or math.isnan(before := memory.witness[i, scale]):
@@ -63,7 +63,7 @@ def scales_stood(memory: TrustMemory, i: int) -> bool:
 
 
 def all_back(memory: TrustMemory, i: int, since_s: float) -> bool:
-    """Whether every channel beside `i` that is believed has been read since a monotonic time (s)."""
+    """Whether every believed channel beside `i` has been read since a monotonic time (s)."""
     n = memory.lengths
     good = (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(memory.value[:n])
     return bool((memory.time_s[:n][good] >= since_s).all())

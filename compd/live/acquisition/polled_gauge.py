@@ -1,4 +1,4 @@
-"""A gauge as its line's thread sees it: where its readings go, the counts of its polls, when it is asked next."""
+"""One gauge on its line: the slots of its readings, the counts of its polls, the time of its next poll."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from compd.pushed_gauge import Heard
 log = structlog.get_logger()
 
 _NO_TRUST: Mapping[str, Judge] = {}
-# Faults of the wire: the next poll may well be answered, and the last good reading says what it said.
-MAY_PASS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
-# Faults of a reply that came. The line is silent again soon; so many in a row are no interference.
+# Faults of the wire. The next poll is likely to succeed, and the last good reading stays valid.
+TRANSIENT_FAULTS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
+# Damaged replies in a row, above which the cause is more than interference.
 MOST_DAMAGED = 10
 DAMAGED = (Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
-# A gauge on a line that is open rests at most so long, s: what a fault has cost is known again within a second.
+# Longest rest (s) of a gauge on an open line: it is polled again within a second of a fault.
 LONGEST_REST_S = 0.9
-# How far ahead of now, s, the time of a reading may be: `send` returns when the last bit will have left. One further
-# ahead is of another clock.
-AHEAD_S = 0.05
+# Largest lead (s) of a reading's time over now: `send` returns before its last bit has left. A larger lead comes from
+# another clock.
+MAX_CLOCK_AHEAD_S = 0.05
 
 
 class BackOff:
-    """Waiting times after failures: `first_s`, then twice as long each time up to `longest_s`; s."""
+    """Waiting times (s) after failures: `first_s`, then doubled each time up to `longest_s`."""
 
     def __init__(self, first_s: float, longest_s: float) -> None:
         self._first_s = first_s
@@ -39,7 +39,7 @@ class BackOff:
         self._next_s = first_s
 
     def failed(self) -> float:
-        """Count one failure; the time to wait now, s."""
+        """Count one failure; return the time to wait (s)."""
         wait_s = self._next_s
         self._next_s = min(2 * wait_s, self._longest_s)
         return wait_s
@@ -50,7 +50,7 @@ class BackOff:
 
 
 class PolledGauge:
-    """One gauge on its line, with its slots in `Latest` and the counts of its polls; used by the line's thread.
+    """One gauge on its line with its slots in `Latest` and its poll counts; used by the line's thread.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class PolledGauge:
         self.ok = 0
         self.faults: dict[Quality, int] = dict.fromkeys(
             Quality, 0
-        )  # all keys now, since STATUS reads it on another thread
+        )  # all keys from the start, since STATUS reads it on another thread
         self.quality = Quality.NEVER_READ
         self.detail = ""
         self.last_ok_s = math.nan
@@ -95,11 +95,11 @@ class PolledGauge:
         self._slots = [latest.index[channel] for channel in channels]
         self._trust = GaugeTrust([trust.get(channel) for channel in channels], clock)
         self._published = [bad(-math.inf, Quality.NEVER_READ)] * len(self._slots)
-        self._heard = list(self._published)  # the newest of each channel, where they come unasked
+        self._received = list(self._published)  # the newest reading of each channel, for unsolicited ones
         self._logged = Quality.NEVER_READ
 
     def read(self, line: Any, latched_s: float | None = None) -> Sequence[Reading]:
-        """Poll the device; twice where a value is not where its last readings lead. Raises what the driver raises.
+        """Poll the device; poll again if a value is outside its predicted range. Raises the driver's exceptions.
 
         latched_s : when the round trigger has latched it, monotonic time (s); None without one.
         """
@@ -119,22 +119,22 @@ class PolledGauge:
             self._publish_unless_kept(place, reading, now_s)
         self._count(readings, readings, now_s)
 
-    def hear(self, heard: Sequence[Heard], now_s: float) -> None:
-        """Publish what its device has sent unasked, for some of its channels, and count it as a poll.
+    def receive(self, received: Sequence[Heard], now_s: float) -> None:
+        """Publish unsolicited readings of some channels, and count them as a poll.
 
         A value that is too old to be used when it comes is stale. Raises ValueError as `put` does.
         """
-        if not heard:
+        if not received:
             return
-        for each in heard:
+        for each in received:
             _check(each.reading, now_s)
         judged = []
-        for each in heard:
-            reading = self._trust.hear(each.place, self._if_young(each.reading, now_s), each.window_s, now_s)
-            self._heard[each.place] = reading
+        for each in received:
+            reading = self._trust.receive(each.place, self._if_young(each.reading, now_s), each.window_s, now_s)
+            self._received[each.place] = reading
             self._publish_unless_kept(each.place, reading, now_s)
             judged.append(reading)
-        self._count(judged, self._heard, now_s)
+        self._count(judged, self._received, now_s)
 
     def _if_young(self, reading: Reading, now_s: float) -> Reading:
         age_s = now_s - reading.time_s
@@ -159,7 +159,7 @@ class PolledGauge:
     def fail(self, quality: Quality, detail: str, now_s: float) -> None:
         """Count a poll that failed as a whole, at the monotonic time `now_s` (s).
 
-        A reading that is still good stays after a fault that may pass (`MAY_PASS`); every other channel takes
+        A reading that is still good stays after a fault that may pass (`TRANSIENT_FAULTS`); every other channel takes
         `quality`. After a missing reply, more than MOST_DAMAGED damaged ones in a row, or the second other fault, the
         gauge rests for one timeout of the line, then for twice as long each time: a late reply has time to come and go,
         and the others are not slowed.
@@ -184,17 +184,17 @@ class PolledGauge:
         return f"{type(error).__name__}: {error}"
 
     def lose(self, quality: Quality, detail: str, now_s: float) -> None:
-        """Give every channel `quality`, without a poll: the line is lost."""
+        """Give every channel `quality` without a poll, for a lost line."""
         self._trust.fail(quality, now_s)
         self.faults[quality] += 1
         for place in range(len(self._slots)):
-            self._heard[place] = bad(now_s, quality, detail)
-            self._publish(place, self._heard[place])
+            self._received[place] = bad(now_s, quality, detail)
+            self._publish(place, self._received[place])
         self._note(quality, detail)
         self._log_change()
 
     def fresh(self, now_s: float) -> bool:
-        """Whether a value that it has published may still be used at the monotonic time `now_s` (s)."""
+        """Whether any published value may still be used at the monotonic time `now_s` (s)."""
         return any(self._is_fresh(reading, now_s) for reading in self._published)
 
     def resume(self) -> None:
@@ -202,9 +202,9 @@ class PolledGauge:
         self.rests_until_s = -math.inf
 
     def _publish_unless_kept(self, place: int, reading: Reading, now_s: float) -> bool:
-        """Publish a reading, but no fault that may pass while the last reading is good; whether that was kept."""
+        """Publish a reading; keep a good last reading through a transient fault. Returns whether it was kept."""
         last = self._published[place]
-        if reading.quality in MAY_PASS and self._is_fresh(last, now_s):
+        if reading.quality in TRANSIENT_FAULTS and self._is_fresh(last, now_s):
             return True
         self._publish(place, reading)
         return False
@@ -228,7 +228,7 @@ class PolledGauge:
             log_change("gauge", gauge=self.name, quality=str(quality), was=str(was), detail=self.detail)
 
     def status(self) -> dict[str, Any]:
-        """The gauge's part of STATUS, as plain data; what is not known is left out."""
+        """The gauge's part of STATUS as plain data, without unknown values."""
         status: dict[str, Any] = {
             "quality": str(self.quality),
             "polls": self.polls,
@@ -243,8 +243,8 @@ class PolledGauge:
 
 
 def _check(reading: Reading, now_s: float) -> None:
-    """Raises ValueError for a reading that cannot be: a defect of the driver."""
-    if not reading.time_s <= now_s + AHEAD_S:
+    """Raises ValueError for an impossible reading, which is a defect of the driver."""
+    if not reading.time_s <= now_s + MAX_CLOCK_AHEAD_S:
         raise ValueError(f"reading of time {reading.time_s}, it is {now_s}")
     if reading.ok and not math.isfinite(reading.value):
         raise ValueError(f"{reading.value} given as ok")

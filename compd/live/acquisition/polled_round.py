@@ -1,4 +1,4 @@
-"""A round of polls: every gauge of a line is asked in turn, and its readings are published or thrown away.
+"""A round of polls: every gauge of a line is polled in turn, its readings are published or discarded.
 
 A gauge that does not answer rests for a short time, so that an absent unit does not slow the others on its line, and
 for a longer one where it makes them stale (`compd.live.acquisition.absent_gauges`). Where replies do not say whose they
@@ -24,18 +24,18 @@ from compd.live.acquisition.reply_order import ReplyOrder
 from compd.live.acquisition.round_trigger import RoundBuffer, send_trigger
 from compd.live.memory import PollRequests
 
-# Shortest time from one round of polls to the next, s. Modbus TCP answers in 0.1 ms: polled without a pause, it would
-# take the interpreter from the other lines, and a processor from everybody.
+# Shortest period (s) of polling rounds. Modbus TCP answers in 0.1 ms; polling it without a pause would starve the other
+# lines of the interpreter and keep a processor busy.
 FASTEST_ROUND_S = 2e-3
-# In place of a round trigger's time, where it could not be sent.
+# Stands for the time of a round trigger that could not be sent.
 NOT_LATCHED_S = -math.inf
-# Faults after which no byte of a reply can follow. After all others the line is drained, or the rest of a reply would
-# be taken for the answer to the next request.
-NOTHING_UNDER_WAY = (Quality.LINE_LOST, Quality.DEVICE_ERROR, Quality.SILENT)
+# Faults after which no byte of a reply can follow. After any other fault the line is drained, so that the rest of a
+# reply is not taken for the answer to the next request.
+NO_REPLY_PENDING = (Quality.LINE_LOST, Quality.DEVICE_ERROR, Quality.SILENT)
 
 
 class OpenLine(Protocol):
-    """What acquisition itself needs of a line; the rest is between the line and the driver."""
+    """The part of a line that acquisition uses; the driver uses the rest."""
 
     @property
     def last_request_s(self) -> float:
@@ -43,21 +43,21 @@ class OpenLine(Protocol):
 
     @property
     def unexpected_bytes(self) -> int:
-        """Bytes that came without a request, since the line was opened."""
+        """Unsolicited bytes since the line was opened."""
 
     @property
     def request_came_back(self) -> bool:
-        """Whether the first bytes that came after the last request are that request."""
+        """Whether the first bytes after the last request repeat it."""
 
     def drain(self, quiet_s: float | None = None) -> bytes:
-        """Wait until nothing has come for `quiet_s`, the line's timeout if None; what came."""
+        """Wait for `quiet_s` of silence (the line's timeout if None); return the bytes received meanwhile."""
 
     def close(self) -> None:
         """Close the line."""
 
 
 class PolledRound:
-    """The gauges of one line that are polled in turn; used by its thread.
+    """The gauges of one line, polled in turn; used by its thread.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class PolledRound:
         self._back_off = back_off
         self._order = ReplyOrder([gauge.driver for gauge in gauges], settings.timeout_s)
         self._waiting: list[tuple[PolledGauge, Sequence[Reading], float]] = []  # with the time from request to reply, s
-        self._dropped_before = 0  # bytes that nobody had asked for, at the start of the round
+        self._dropped_before = 0  # unsolicited bytes at the start of the round
         self._absent = AbsentGauges()
         self._poll_requests = poll_requests
         self._requested = {gauge.name: poll_requests.count(gauge.name) for gauge in gauges}
@@ -98,7 +98,7 @@ class PolledRound:
         self._order.opened(self._clock.monotonic())
 
     def lost(self) -> None:
-        """The line is lost: what waits does not count, and the gauges' faults are published."""
+        """The line is lost: discard the waiting readings and publish the gauges' faults."""
         self._waiting.clear()
         self._publish()
 
@@ -122,7 +122,7 @@ class PolledRound:
             self._clock.wait(self._stop, wake_s - end_s)
 
     def _heed_requests(self, now_s: float) -> None:
-        """End the rest of every gauge that a client wants to be polled; a short one ends soon by itself."""
+        """End the rest of every gauge that a client wants polled; a short rest ends by itself."""
         for gauge in self._gauges:
             count = self._poll_requests.count(gauge.name)
             if count != self._requested[gauge.name]:
@@ -135,7 +135,7 @@ class PolledRound:
             self._buffer.publish()
 
     def _latch(self, due: Sequence[PolledGauge], line: OpenLine) -> float | None:
-        """Send the round trigger: its time (s); None where the line has none, NOT_LATCHED_S where it failed.
+        """Send the round trigger; return its time (s), None for a line without one, NOT_LATCHED_S if it failed.
 
         The gauges of that round have no value then: they would show what they have latched before. Raises LineFault
         (LINE_LOST).
@@ -163,7 +163,7 @@ class PolledRound:
             now_s = self._clock.monotonic()
             self._back_off.succeeded()
             self._absent.answered(gauge, now_s)
-            # a device that speaks unasked has no late replies
+            # a device that sends unsolicited readings has no late replies
             asked_s = line.last_request_s
             if asked_s > before_s and self._order.in_doubt(now_s):
                 self._waiting.append((gauge, readings, now_s - asked_s))
@@ -175,7 +175,7 @@ class PolledRound:
             self._absent.missed(gauge, start_s)
 
     def _ask(self, gauge: PolledGauge, line: OpenLine, latched_s: float | None) -> Sequence[Reading]:
-        """The gauge's answer; after a missed reply its second one, where `ReplyOrder` wants that."""
+        """The gauge's answer, or its second one if `ReplyOrder` asks for it after a missed reply."""
         now_s = self._clock.monotonic()
         self._order.asked(now_s)
         if not (gauge.fresh(now_s) and self._order.asks_twice()):
@@ -188,10 +188,10 @@ class PolledRound:
         return readings
 
     def _publish_waiting(self, line: OpenLine) -> None:
-        """Publish the readings that wait, if nothing more comes. Raises LineFault (LINE_LOST)."""
+        """Publish the waiting readings if the line stays silent. Raises LineFault (LINE_LOST)."""
         if not self._waiting:
             return
-        # what came just before a request was dropped: the reply before it may have been another one's
+        # bytes before a request were dropped: the previous reply may belong to another request
         dropped = line.unexpected_bytes - self._dropped_before
         in_step = self._order.in_step
         listen_s = self._order.listen_s(self._clock.monotonic() - line.last_request_s)
@@ -216,7 +216,7 @@ class PolledRound:
                 gauge.put(readings, self._clock.monotonic())
 
     def _discard_waiting(self, why: str) -> None:
-        """Count the polls whose readings wait as failed: they may be those of other requests."""
+        """Count the polls of the waiting readings as failed: they may answer other requests."""
         now_s = self._clock.monotonic()
         waiting, self._waiting = self._waiting, []
         for gauge, _, _ in waiting:
@@ -225,7 +225,7 @@ class PolledRound:
 
     @contextmanager
     def _faults_of(self, gauge: PolledGauge, line: OpenLine) -> Iterator[None]:
-        """Count what goes wrong with a gauge, and leave the line without anything under way, so far as that can be.
+        """Count a gauge's faults, and leave the line without a pending reply as far as possible.
 
         Raises LineFault (LINE_LOST).
         """
@@ -235,7 +235,7 @@ class PolledRound:
             if fault.quality is Quality.LINE_LOST:
                 raise
             self._fail(gauge, line, fault.quality, explained(fault, line).detail)
-        except MemoryError:  # it is the whole process that has none left
+        except MemoryError:  # the whole process has run out of them
             raise
         except Exception as error:  # noqa: BLE001  of a driver; it must not end the line's thread
             self._fail(gauge, line, Quality.DRIVER_ERROR, gauge.driver_error(error))
@@ -243,7 +243,7 @@ class PolledRound:
     def _fail(self, gauge: PolledGauge, line: OpenLine, quality: Quality, detail: str) -> None:
         """Raises LineFault (LINE_LOST)."""
         failed_s = self._clock.monotonic()
-        if quality in NOTHING_UNDER_WAY:
+        if quality in NO_REPLY_PENDING:
             gauge.fail(quality, detail, failed_s)
             return
         # A silence as long as the timeout has been kept already. It is kept once more where nothing else would tell a
@@ -262,4 +262,4 @@ class PolledRound:
                 line.drain()
         gauge.fail(quality, detail, failed_s)
         if len(self._gauges) == 1 and gauge.fresh(failed_s):
-            gauge.resume()  # asked again at once: it delays nobody, and a late reply is noticed
+            gauge.resume()  # polled again at once: no gauge waits for it, and a late reply is noticed

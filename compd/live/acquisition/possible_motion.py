@@ -1,4 +1,4 @@
-"""Whether what a gauge measures can have moved as its readings say, with a limited acceleration and speed.
+"""Whether a motion with limited acceleration and speed explains a gauge's readings.
 
 The time of a sample is known to within a window: a reply that took longer than others may have been sampled later. So
 the mean speed between two readings is known as an interval, and so is every speed that can follow from it. Readings are
@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-# Over this time, s, the speed is measured that the measured part had before: long beside the time that a reply takes.
+# Baseline (s) of the previous speed estimate; much longer than one reply.
 BASE_S = 0.02
-# Of a reply that took no longer than others.
+# Sampling-time uncertainty (s) of a reply with normal latency.
 WINDOW_S = 1e-3
 
 
 class GaugeSample(NamedTuple):
-    """A reading as a sample of motion: value (mm), time (s), and by how much it may have been later (s)."""
+    """A reading as a sample of motion: value (mm), time (s), and its largest delay (s)."""
 
     value: float
     time_s: float
@@ -25,20 +25,20 @@ class GaugeSample(NamedTuple):
 
 
 class MotionLimits(NamedTuple):
-    """What the measured part can do: speed (mm/s), acceleration (mm/s2); inf where no limit is given."""
+    """Limits of the measured part: speed (mm/s), acceleration (mm/s2); inf for no limit."""
 
     speed: float = math.inf
     acceleration: float = math.inf
 
 
 class Interval(NamedTuple):
-    """Numbers from `low` to `high`; empty where low > high."""
+    """Numbers from `low` to `high`; empty if low > high."""
 
     low: float
     high: float
 
     def widened(self, by: float) -> Interval:
-        """All numbers that are at most `by` away."""
+        """The interval widened by `by` on either side."""
         return Interval(self.low - by, self.high + by)
 
     def common(self, other: Interval) -> Interval:
@@ -51,7 +51,7 @@ class Interval(NamedTuple):
 
 
 def mean_speed(start: GaugeSample, end: GaugeSample, tolerance_mm: float) -> Interval:
-    """The mean speeds, mm/s, that two readings allow, each of them uncertain by half of `tolerance_mm`."""
+    """The mean speeds (mm/s) allowed by two readings, each uncertain by half of `tolerance_mm`."""
     shortest_s = max(0.0, end.time_s - start.time_s - start.window_s)
     longest_s = end.time_s - start.time_s + end.window_s
     change_mm = end.value - start.value
@@ -95,7 +95,7 @@ def is_possible(
 
 
 def rest_to_rest_mm(limits: MotionLimits, duration_s: float, tolerance_mm: float) -> float:
-    """How far a part can move, mm, that readings show at rest before and after `duration_s` (s).
+    """Largest motion (mm) within `duration_s` (s) of a part at rest before and after it.
 
     Half of the time it accelerates, half of it it brakes: a t^2 / 4. It may have begun earlier and end later, by the
     time in which it moves by no more than the readings' tolerance.
@@ -107,7 +107,7 @@ def rest_to_rest_mm(limits: MotionLimits, duration_s: float, tolerance_mm: float
 
 
 def unseen_jump_mm(limits: MotionLimits, poll_s: float, tolerance_mm: float) -> float:
-    """The largest jump of a part at rest that may be motion, mm; inf without limits.
+    """Largest jump (mm) of a part at rest that motion can explain; inf without limits.
 
     poll_s : from one reading to the next, s.
     """

@@ -1,4 +1,4 @@
-"""A line's thread and devices that speak by themselves: it waits, publishes what comes, and notes silence."""
+"""Devices that push their readings: the line's thread waits, publishes them, and notes silence."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from compd.pushed_gauge import Heard, Message, PushedGauge, PushedLine
 
 log = structlog.get_logger()
 
-# A node or topic that was refused may be there later: it is asked for again after so long, s.
+# Interval (s) of new requests for a refused node or topic, which may exist later.
 SUBSCRIBE_EVERY_S = 2.0
-# The thread looks so often, s, whether it is to end.
+# Longest wait (s) before the thread checks whether it is to end.
 LONGEST_WAIT_S = 0.1
 
 
 @dataclass
 class _Listener:
-    """One channel that wants an address.
+    """One channel that waits for messages of an address.
 
-    heard_s : when it was heard last, or its silence counted, monotonic, s. quality : of what it read last.
+    received_s : monotonic time (s) of its last message or counted silence. quality : of its last reading.
     """
 
     gauge: PolledGauge
@@ -33,12 +33,12 @@ class _Listener:
     place: int
     address: str
     stale_after_s: float
-    heard_s: float = math.nan
+    received_s: float = math.nan
     quality: Quality = Quality.NEVER_READ
 
 
 class PushedRound:
-    """The gauges of one line that speaks by itself; used by its thread.
+    """The gauges of one line with pushed readings; used by its thread.
 
     Silence: where a value has been followed by nothing for `stale_after_s`, the channel has a timeout. A device that
     said that it has no value has not to repeat it.
@@ -57,27 +57,27 @@ class PushedRound:
         message ends."""
         self._clock = clock
         self._back_off = back_off
-        self._subscribe_s = -math.inf  # when what was refused is asked for again
+        self._subscribe_s = -math.inf  # time of the next request for refused addresses
         self._listeners = [
             _Listener(gauge, gauge.driver, place, address, stale_after_s[gauge.name])
             for gauge in gauges
             if isinstance(gauge.driver, PushedGauge)
             for place, address in enumerate(gauge.driver.addresses)
         ]
-        self._noted: dict[str, bool] = {}  # by gauge: whether its clock was wrong
+        self._noted: dict[str, bool] = {}  # whether the clock was wrong, by gauge
 
     def opened(self) -> None:
-        """The line has been opened: nothing is subscribed to, and nothing was heard on it."""
+        """The line has been opened: no subscription yet, no message received."""
         self._subscribe_s = -math.inf
         now_s = self._clock.monotonic()
         for listener in self._listeners:
-            listener.heard_s, listener.quality = now_s, Quality.NEVER_READ
+            listener.received_s, listener.quality = now_s, Quality.NEVER_READ
 
     def lost(self) -> None:
-        """The line is lost; nothing waits to be published."""
+        """The line is lost; no reading waits to be published."""
 
     def take(self, line: PushedLine) -> None:
-        """Publish what has come, or comes soon. Raises LineFault (LINE_LOST)."""
+        """Publish the messages that have arrived or arrive soon. Raises LineFault (LINE_LOST)."""
         now_s = self._clock.monotonic()
         if now_s >= self._subscribe_s:
             line.subscribe([listener.address for listener in self._listeners])
@@ -94,24 +94,24 @@ class PushedRound:
         for gauge, driver in {id(each.gauge): (each.gauge, each.driver) for each in listeners}.values():
             now_s = self._clock.monotonic()
             try:
-                heard = driver.hear(message)
-                gauge.hear(heard, now_s)
-            except MemoryError:  # it is the whole process that has none left
+                received = driver.receive(message)
+                gauge.receive(received, now_s)
+            except MemoryError:  # the whole process has run out of them
                 raise
             except Exception as error:  # noqa: BLE001  of a driver; it must not end the line's thread
                 gauge.fail(Quality.DRIVER_ERROR, gauge.driver_error(error), now_s)
                 continue
-            self._note_clock(gauge, heard)
+            self._note_clock(gauge, received)
             for listener in listeners:
-                for each in heard:
+                for each in received:
                     if listener.gauge is gauge and listener.place == each.place:
-                        listener.heard_s, listener.quality = now_s, each.reading.quality
+                        listener.received_s, listener.quality = now_s, each.reading.quality
 
-    def _note_clock(self, gauge: PolledGauge, heard: Sequence[Heard]) -> None:
-        """Log once that the clock of a source is wrong, and once that it is right again."""
-        if not heard or not heard[-1].reading.ok:
+    def _note_clock(self, gauge: PolledGauge, received: Sequence[Heard]) -> None:
+        """Log once when the clock of a source goes wrong, and once when it is right again."""
+        if not received or not received[-1].reading.ok:
             return
-        note = heard[-1].note
+        note = received[-1].note
         if bool(note) != self._noted.get(gauge.name, False):
             self._noted[gauge.name] = bool(note)
             log_change = log.warning if note else log.info
@@ -120,11 +120,11 @@ class PushedRound:
     def _note_silence(self) -> None:
         now_s = self._clock.monotonic()
         for listener in self._listeners:
-            if now_s - listener.heard_s <= listener.stale_after_s:
+            if now_s - listener.received_s <= listener.stale_after_s:
                 continue
-            listener.heard_s = now_s
+            listener.received_s = now_s
             if listener.quality in (Quality.OK, Quality.NEVER_READ, Quality.TIMEOUT):
                 hint = listener.driver.silence_hint
                 text = f"nothing new on {listener.address} for {listener.stale_after_s:g} s{'; ' if hint else ''}{hint}"
-                listener.gauge.hear([Heard(listener.place, bad(now_s, Quality.TIMEOUT, text))], now_s)
+                listener.gauge.receive([Heard(listener.place, bad(now_s, Quality.TIMEOUT, text))], now_s)
                 listener.quality = Quality.TIMEOUT

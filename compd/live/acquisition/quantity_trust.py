@@ -21,20 +21,20 @@ from compd.gauge import Quality, Reading, bad
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.memory import Doubt, TrustMemory
 
-# So long a quantity may be implausible, s: longer than a burst of interference, shorter than the usual `loop.hold_s`.
+# Longest time (s) that a quantity may be implausible: beyond a burst of interference, below the usual `loop.hold_s`.
 LASTING_S = 1.0
-# One reading counts as at most so much of it, s, however seldom the gauge is asked.
+# Largest share (s) of that time that one reading counts for, also for a gauge that is polled seldom.
 _LONGEST_SHARE_S = LASTING_S / 5
-# A quantity begins at the median of so many readings, or of those that come within this time, s: so that one of them
-# does not count for all that follow. So long its neighbours are waited for, too.
+# A quantity begins at the median of this many readings, or of those within this time (s), so that a single reading does
+# not decide for all that follow. Its neighbours are awaited for the same time.
 _FEWEST_FIRST, _LONGEST_START_S = 5, 1.0
-# What a neighbour showed longer ago, s, says nothing.
+# Age (s) from which a neighbour's reading no longer counts.
 _OLD_S = 60.0
 _FEWEST_NEIGHBOURS = 2
 
 
 class QuantityLimits(NamedTuple):
-    """What readings of a quantity are plausible, in its unit; infinite where nothing is known.
+    """Plausible readings of a quantity in its unit; infinite where unknown.
 
     low, high : its range. fastest_per_s : its fastest change, per second. apart : the largest difference from its
     neighbours. tolerance : by which two readings of the same value may differ.
@@ -48,7 +48,7 @@ class QuantityLimits(NamedTuple):
 
 
 class _Fault(NamedTuple):
-    """Why a reading is not plausible, as `TrustMemory` keeps it, and in words."""
+    """Reason why a reading is implausible, as `TrustMemory` keeps it and in words."""
 
     doubt: Doubt
     amount: float
@@ -65,15 +65,15 @@ class QuantityTrust:
         self._unit = memory.unit(i)
         same = [j for j in range(memory.lengths, len(memory.channels)) if j != i and memory.unit(j) == self._unit]
         self._neighbours = np.array(same, dtype=np.int64)
-        self._expected = math.nan  # follows the readings by no more than the fastest change
+        self._expected = math.nan  # follows the readings at the fastest change at most
         self._expected_s = math.nan
         self._implausible_s = 0.0
         self._judged_s = math.nan
         self._begun_s = math.nan
-        self._first: list[Reading] = []  # the last ones since `_begun_s`
+        self._first: list[Reading] = []  # the last readings since `_begun_s`
 
     def surprises(self, sample: GaugeSample) -> bool:
-        """Whether a second answer is needed: a good reading is not plausible, or follows none."""
+        """Whether a second answer is needed, for a good reading that is implausible or the first one."""
         memory, i = self._memory, self._i
         if memory.accepted[i] != memory.obeyed[i]:
             return True
@@ -92,8 +92,8 @@ class QuantityTrust:
         memory.show(i, reading.value, reading.time_s)
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
             return self._accepted(reading, first)
-        if memory.voted[i] != memory.heard[i]:
-            memory.heard[i] = memory.voted[i]
+        if memory.voted[i] != memory.handled[i]:
+            memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
         if Doubt(int(memory.doubt[i])).until_accepted:
             return bad(reading.time_s, Quality.DISTRUSTED, memory.explanation(i))
@@ -103,7 +103,7 @@ class QuantityTrust:
         faults = [self._fault(each.value, each.time_s) for each in candidates]
         for each, fault in zip(candidates, faults, strict=True):
             if fault is None:
-                if not any(faults):  # one of two answers that is plausible says nothing of the next poll
+                if not any(faults):  # one plausible answer of two does not predict the next poll
                     self._implausible_s = max(0.0, self._implausible_s - share_s)
                 if not known:
                     return self._begin(each, candidates)
@@ -117,7 +117,7 @@ class QuantityTrust:
     def _recall(self) -> bool:
         """Whether a reading is known that the next one follows; that of another process counts, too."""
         memory, i = self._memory, self._i
-        if memory.doubt[i] == Doubt.LOST:  # since a daemon has ended: nobody knows for how long
+        if memory.doubt[i] == Doubt.LOST:  # since a daemon has ended; the time since then is unknown
             memory.value[i], memory.doubt[i] = math.nan, Doubt.NONE
             self._expected = math.nan
         elif math.isnan(self._expected) and not math.isnan(memory.value[i]):
@@ -125,14 +125,14 @@ class QuantityTrust:
         return not math.isnan(self._expected)
 
     def _accepted(self, reading: Reading, first: Reading) -> Reading:
-        """The readings after a person's acceptance: whatever was before, but plausible, and two that agree."""
+        """The readings after a person's acceptance: two plausible ones must agree, whatever came before."""
         memory, i = self._memory, self._i
         self._expected, self._implausible_s = math.nan, 0.0
         fault = self._fault(reading.value, reading.time_s)
         if fault is None and (unconfirmed := self._unconfirmed((reading, first))):
             return unconfirmed
         memory.end_order(i)
-        memory.heard[i] = memory.voted[i]
+        memory.handled[i] = memory.voted[i]
         return self._distrusted(reading, fault) if fault else self._from(reading.value, reading)
 
     def _begin(self, reading: Reading, answers: tuple[Reading, ...]) -> Reading:
@@ -156,14 +156,14 @@ class QuantityTrust:
         return self._from(float(np.median(values)), reading)
 
     def _scattering(self, reading: Reading, scatter: float) -> Reading:
-        """Readings that scatter from the start on: those that agree after a while do so by chance."""
+        """Readings that scatter from the start: a later agreement is chance."""
         self._implausible_s += min(reading.time_s - self._first[-2].time_s, _LONGEST_SHARE_S)
         if self._implausible_s >= LASTING_S:
             return self._distrusted(reading, _Fault(Doubt.JUMPED, scatter, ""))
         return bad(reading.time_s, Quality.MISMATCH, f"its first readings scatter by {scatter:.3g} {self._unit}")
 
     def _unconfirmed(self, answers: tuple[Reading, ...]) -> Reading | None:
-        """Why two answers, the last one first, do not confirm each other; None where they do."""
+        """Reason why two answers, the last one first, disagree; None if they agree."""
         reading = answers[0]
         if len(answers) < 2:
             return bad(reading.time_s, Quality.MISMATCH, f"{reading.value:g} is not confirmed by a second answer")
@@ -186,7 +186,7 @@ class QuantityTrust:
         return reading._replace(value=self._expected)
 
     def _held(self, reading: Reading) -> Reading:
-        """A plausible reading among others that are not: of a quantity that is noisy or runs away, it is chance."""
+        """A plausible reading among implausible ones: chance, for a noisy quantity or one that runs away."""
         self._expected_s = reading.time_s
         self._memory.believe(self._i, self._expected, reading.time_s)
         return reading._replace(value=self._expected)
@@ -197,12 +197,12 @@ class QuantityTrust:
         return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i))
 
     def _share_s(self, time_s: float) -> float:
-        """For how long a reading speaks, s."""
+        """Time (s) that a reading counts for."""
         passed_s, self._judged_s = time_s - self._judged_s, time_s
         return min(max(passed_s, 0.0), _LONGEST_SHARE_S) if math.isfinite(passed_s) else 0.0
 
     def _fault(self, value: float, time_s: float) -> _Fault | None:
-        """Why a value at this time is not plausible; None where it is."""
+        """Reason why a value at this time is implausible; None if it is plausible."""
         limits, unit = self._limits, self._unit
         if not limits.low <= value <= limits.high:
             text = f"{value:g} {unit}, plausible {limits.low:g} to {limits.high:g} {unit}"
@@ -217,12 +217,12 @@ class QuantityTrust:
         return None
 
     def _possible_change(self, time_s: float, since_s: float) -> float:
-        """By how much it can have changed between two times, s."""
+        """Largest possible change between two times (s), in the quantity's unit."""
         fastest = self._limits.fastest_per_s
         return math.inf if math.isinf(fastest) else fastest * max(0.0, time_s - since_s)
 
     def _apart(self, value: float, time_s: float) -> _Fault | None:
-        """Where more than half of the neighbours, and two at least, are far away.
+        """Contradiction by more than half of the neighbours, and at least two.
 
         A neighbour that is not believed has no voice.
         """

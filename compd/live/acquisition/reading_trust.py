@@ -1,4 +1,4 @@
-"""Whether the readings of one length channel are believed: they must not jump, nor come back with another value.
+"""Plausibility check of one length channel: no jumps, and the same value after an absence.
 
 A reading that is not where the last ones lead is asked for once more. If the second answer is where they lead, the
 first one was damaged. If it agrees with the first, the measured part has moved, where its acceleration and speed allow
@@ -35,34 +35,35 @@ from compd.live.acquisition.steps import Steps
 from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
 from compd.live.memory import Doubt, TrustMemory
 
-# After a gap, s, until the others have been read that have begun to move at the same time.
+# Wait (s) after a gap until the other gauges of the same motion have been read,
 _WAIT_FOR_MOTION_S = 0.3
-# Or for so many gaps as long as its own polls may have, where that is longer.
+# or this many of the channel's own longest gaps, if that is longer.
 _WAIT_FOR_POLLS = 2.0
-# In tolerances: less than that, a gauge may move in a short gap while no other shows it.
+# Motion (tolerances) below which a gauge may move in a short gap unnoticed by the others.
 LEAST_MOTION = 10.0
-# In a gap that is no longer, s, a scale with 300 mm/s2 goes from rest to rest by less than 1 mm; no display restarts.
+# Longest interval (s) that is no gap: a scale with 300 mm/s2 moves less than 1 mm from rest to rest, and no display
+# restarts.
 SHORTEST_GAP_S = 0.1
-# A gap is also so many times as long as usual from one reading to the next.
+# A gap is also this many times as long as the usual interval between readings.
 _GAP = 2.0
 _USUAL_OF = 8
-# An interpolator that loses counts loses whole signal periods, or quarters of them: the least that counts as a step.
+# Smallest step (signal periods): an interpolator that loses counts loses whole periods or quarters of them.
 LEAST_PERIODS = 0.25
 # Samples of motion that are kept.
 _HISTORY = 32
-# Two answers show the same value where they differ by less than this share of the jump that they show.
+# Two answers agree if they differ by less than this share of the jump that they show.
 _AGREEMENT = 0.2
-# From one poll to the next a speed changes by at most this factor, where no limit of acceleration is given.
+# Largest ratio of the speeds of two successive polls, without a limit of acceleration.
 _SPEED_RATIO = 5.0
-# By so many of its last digits a display goes to and fro by itself.
+# Flicker of a display at rest, in last digits.
 _DIGITS = 2.0
-# How much of the acceleration that is there already is no surprise.
+# Allowed growth of an acceleration that is already present (factor).
 _ACCELERATION_MARGIN = 2.0
 
 
 @dataclass(frozen=True)
 class TrustSettings:
-    """How far the readings of a channel are believed.
+    """Degree of trust in the readings of a channel.
 
     limits : what the measured part can do. returns_by_itself : the device shows the same value again when it is back.
     stale_after_s : age from which a last reading is lost. signal_period_mm : of a scale, where it is known; nan.
@@ -85,10 +86,10 @@ class ReadingTrust:
         self._tolerance_mm = float(memory.tolerance_mm[self._i])
         self._settings = settings
         self._history: deque[GaugeSample] = deque(maxlen=_HISTORY)
-        self._candidate: GaugeSample | None = None  # the last answer, where nothing is believed yet
-        self._back_s = math.nan  # since when a gauge that was away answers again
+        self._candidate: GaugeSample | None = None  # the last answer before any reading is believed
+        self._back_s = math.nan  # time at which an absent gauge answered again
         self._missed = False  # whether a poll has failed since its last reading
-        self._after: list[GaugeSample] = []  # what it shows since a gap, and waits for evidence
+        self._after: list[GaugeSample] = []  # its value since a gap, waiting for evidence
         self._scatter = RestScatter(self._tolerance_mm)
         self._latest = LatestScatter(self._tolerance_mm)
         self._motion = MotionEstimate(self._tolerance_mm)
@@ -97,7 +98,7 @@ class ReadingTrust:
         self._steps = None if math.isnan(period_mm) else Steps(least_mm, self._tolerance_mm)
 
     def surprises(self, sample: GaugeSample) -> bool:
-        """Whether a second answer is needed: a good reading is not where the last ones lead, or follows none."""
+        """Whether a second answer is needed, for a good reading outside its predicted range or a first one."""
         memory, i = self._memory, self._i
         if memory.accepted[i] != memory.obeyed[i]:
             return True
@@ -119,7 +120,7 @@ class ReadingTrust:
         self._after.clear()
 
     def judge(self, reading: Reading, window_s: float, first: Reading | None = None) -> Reading:
-        """The reading as it may be published: itself, the first answer, or one without a value.
+        """The reading to publish: itself, the first answer, or one without a value.
 
         Parameters
         ----------
@@ -132,15 +133,15 @@ class ReadingTrust:
         memory.show(i, sample.value, sample.time_s)
         self._scatter.note(sample)
         memory.scatter_mm[i] = self._scatter.mm
-        # one that was accepted while it was asked is asked twice at the next poll
+        # a channel accepted during a poll is polled twice the next time
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
             begun = self._begin(reading, sample, first)
             if begun.ok or memory.suspected[i]:
                 memory.end_order(i)
-                memory.heard[i] = memory.voted[i]
+                memory.handled[i] = memory.voted[i]
             return begun
-        if memory.voted[i] != memory.heard[i]:
-            memory.heard[i] = memory.voted[i]
+        if memory.voted[i] != memory.handled[i]:
+            memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
         back_s = self._after[0].time_s if self._after else sample.time_s
         if memory.doubt[i] == Doubt.NONE and back_s - memory.time_s[i] > self._settings.stale_after_s:
@@ -155,14 +156,14 @@ class ReadingTrust:
         return self._continued(reading, sample, first)
 
     def _recall(self) -> bool:
-        """Whether there is a reading that the next one follows; those of another process count, too."""
+        """Whether the next reading has a predecessor, in this process or another one."""
         if not self._history:
             recent = self._memory.recent(self._i)
             self._history.extend(GaugeSample(float(value), float(time_s), WINDOW_S) for time_s, value in recent)
         return bool(self._history)
 
     def _begin(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
-        """Believe a reading whatever was before it, where two answers agree."""
+        """Believe a reading without regard to earlier ones if two answers agree."""
         if first is None:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
         earlier = GaugeSample(first.value, first.time_s, sample.window_s)
@@ -170,7 +171,7 @@ class ReadingTrust:
         if abs(sample.value - earlier.value) > self._tolerance_mm and not (
             before is not None and self._goes_on(before, earlier, sample)
         ):
-            self._candidate = sample  # of a part that moves, the next poll shows more
+            self._candidate = sample  # for a moving part the next poll shows more
             return bad(
                 reading.time_s, Quality.MISMATCH, f"two answers disagree: {first.value:.4f}, {sample.value:.4f} mm"
             )
@@ -190,7 +191,7 @@ class ReadingTrust:
         return reading._replace(motion=motion._replace(scatter_mm=self._scatter_mm()))
 
     def _scatter_mm(self) -> float:
-        """The larger one of what windows of readings and the last few show; nan where neither does."""
+        """The larger scatter of windows of readings and of the last few; nan if neither shows one."""
         known = [mm for mm in (self._scatter.mm, self._latest.mm) if not math.isnan(mm)]
         return max(known, default=math.nan)
 
@@ -212,7 +213,7 @@ class ReadingTrust:
             memory, i = self._memory, self._i
             memory.stepped_mm[i] += 0.0 if step.is_seen else step.height_mm
             memory.stepped_s[i] = step.time_s
-            memory.stepped[i] += 1  # last: it tells that the others are there
+            memory.stepped[i] += 1  # last: it marks the others as complete
 
     def _refused(self, reading: Reading) -> Reading:
         limits = self._limits_text() if self._memory.doubt[self._i] == Doubt.JUMPED else ""
@@ -247,7 +248,7 @@ class ReadingTrust:
         return self._begin(reading, sample, first)
 
     def _continued(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
-        """A reading that follows others, of a gauge that was never away.
+        """A reading with predecessors, of a gauge without an absence.
 
         The second answer of a gauge that was latched is the same sample once more: it says whether the first one was
         damaged, and nothing of motion.
@@ -286,7 +287,7 @@ class ReadingTrust:
         return bad(reading.time_s, Quality.MISMATCH, f"no two of three values agree: {values} mm{self._limits_text()}")
 
     def _limits_text(self) -> str:
-        """Which keys of the gauge limit its motion: one that is too small looks like a gauge that jumps."""
+        """Keys of the gauge that limit its motion; too small a limit makes motion look like jumps."""
         limits = self._settings.limits
         set_to = {"fastest_mm_per_s": limits.speed, "acceleration_mm_per_s2": limits.acceleration}
         keys = ", ".join(f"`{key}: {limit:g}`" for key, limit in set_to.items() if math.isfinite(limit))
@@ -300,13 +301,13 @@ class ReadingTrust:
         return self._missed or bool(self._after) or sample.time_s - last.time_s > max(SHORTEST_GAP_S, self._gap_s())
 
     def _gap_s(self) -> float:
-        """How long, s, an interval between two readings is that is longer than usual."""
+        """Shortest interval (s) between two readings that counts as longer than usual."""
         times = [sample.time_s for sample in self._history][-_USUAL_OF - 1 :]
         intervals = sorted(later - earlier for earlier, later in pairwise(times))
         return _GAP * intervals[len(intervals) // 2] if intervals else 0.0
 
     def _compared(self, reading: Reading, earlier: GaugeSample, sample: GaugeSample) -> Reading:
-        """A value that is possible after a gap: believed where others have moved, a scale where they say how far.
+        """A possible value after a gap: believed if others have moved, for a scale if they say how far.
 
         It has no value until they have been read, too, and have moved on for a moment.
         """
@@ -342,7 +343,7 @@ class ReadingTrust:
         return self._believed(reading, sample)
 
     def _is_from_rest_to_rest(self, before: Interval, first: GaugeSample, second: GaugeSample) -> bool:
-        """Whether the part was at rest before, and two answers show it at rest again."""
+        """Whether the part was at rest before and two answers show it at rest again."""
         rested = math.isfinite(before.low) and before.low <= 0.0 <= before.high
         return rested and abs(second.value - first.value) <= self._tolerance_mm
 
@@ -356,7 +357,7 @@ class ReadingTrust:
         return max(low, slowest) <= min(high, fastest)
 
     def _is_expected(self, sample: GaugeSample) -> bool:
-        """Whether the reading is where the last ones lead, as far as noise and the acceleration that is there allow."""
+        """Whether the reading is within its predicted range, given the noise and the present acceleration."""
         last = self._history[-1]
         before, base_s = self._speed_before()
         passed_s = sample.time_s - last.time_s
@@ -389,7 +390,7 @@ class ReadingTrust:
         return mean_speed(start, last, self._tolerance_mm), last.time_s - start.time_s
 
     def _acceleration(self, speed: float, base_s: float) -> float:
-        """Size of the acceleration that the samples show, mm/s2: from the speed before to `speed`, over `base_s`."""
+        """Acceleration (mm/s2, absolute) shown by the samples: from the speed before to `speed`, over `base_s`."""
         base = self._base()
         if base is None or base == 0:
             return 0.0

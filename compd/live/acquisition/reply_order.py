@@ -1,4 +1,4 @@
-"""Whether the replies on a line belong to the requests for which they were taken.
+"""Check that the replies on a line belong to the requests to which they were assigned.
 
 Most gauges on a line of bytes answer with a bare number, which says neither whose it is nor when it was asked for. A
 reply that comes long after its timeout then passes for the answer to the request that is waiting, the true answer for
@@ -27,30 +27,30 @@ import numpy as np
 
 from compd.gauge import Gauge, replies_tell_whose
 
-# Polls of the line of which the longest is kept in mind: some ten rounds.
+# Polls of the line whose longest duration is remembered: some ten rounds.
 POLLS_IN_MIND = 256
-# Until so many are known, and one of each gauge, a reply may take as long as the line's timeout.
+# Fewest polls, at least one of each gauge, before a reply must be faster than the line's timeout.
 FEWEST_POLLS = 4
-# A device may take this much longer than it ever did within the polls in mind, and
+# Largest duration of a reply, relative to the longest remembered one; and
 SLOWER = 1.25
-# so much longer, s: an adapter hands over what has come once a millisecond.
+# its largest excess (s): an adapter hands over received bytes once a millisecond.
 LATER_S = 2e-3
-# A line with one gauge is in doubt only after a reply was missed, and after it was opened: what was asked before may
-# still be answered. A reply that is later than this, s, has been lost.
+# Latest arrival (s) of a reply; a later one is lost. A line with one gauge is in doubt after a missed reply and after
+# its opening, since earlier requests may still be answered.
 LATEST_REPLY_S = 10.0
-# After a missed reply the line is listened to for at most so long, s: requests are as far apart at most, but for gauges
-# that are asked seldom.
+# Longest time (s) to listen after a missed reply: the largest interval of requests, except for gauges that are polled
+# seldom.
 LONGEST_LISTEN_S = 2.0
-# Part of the answers that come quickly: the others waited for the device, or for this computer.
+# Share of quick answers; the others waited for the device or for this computer.
 NEARLY_EVERY = 0.9
-# Requests are close together where the next one follows within so many times the time of a quick answer.
+# Requests are close together if the next one follows within this many times the time of a quick answer.
 CLOSE = 2.0
-# By how much more two late replies may be apart than their requests, s.
+# Largest excess (s) of the interval of two late replies over that of their requests.
 JITTER_S = 10e-3
 
 
 class ReplyOrder:
-    """Of one line; used by the line's thread."""
+    """Order of the replies on one line; used by the line's thread."""
 
     def __init__(self, gauges: Sequence[Gauge[Any]], timeout_s: float) -> None:
         """`timeout_s`: of the line."""
@@ -58,25 +58,25 @@ class ReplyOrder:
         self._several = self._on_bytes and len(gauges) > 1 and not replies_tell_whose(gauges)
         self._one = self._on_bytes and len(gauges) == 1
         received = [length for gauge in gauges for _, length in gauge.traffic() or [(0, 0)]]
-        self._shortest = min(received, default=0)  # of the replies, bytes; 0 where that is not known
+        self._shortest = min(received, default=0)  # length of the replies in bytes; 0 if unknown
         self._timeout_s = timeout_s
         self._durations_s: deque[float] = deque(maxlen=POLLS_IN_MIND)
         self._fewest_polls = max(FEWEST_POLLS, len(gauges))
         self._in_doubt_until_s = -math.inf
         self._in_step = False
-        self._asked_s = math.nan  # when the last request was made
-        self._apart_s = 0.0  # the longest time between two requests since the line was in step
-        self._closest_s = math.inf  # and the shortest
-        self._quick = False  # whether a gauge that was asked again at once has answered as quickly as ever
+        self._asked_s = math.nan  # time of the last request
+        self._apart_s = 0.0  # longest interval of requests since the line was in step
+        self._closest_s = math.inf  # and the shortest one
+        self._quick = False  # whether a gauge polled again at once has answered as quickly as ever
 
     @property
     def guarded(self) -> bool:
-        """Whether a late reply is found by one that is too many, and not by what stands in it."""
+        """Whether a late reply is found by a surplus reply, not by its content."""
         return self._several or self._one
 
     @property
     def in_step(self) -> bool:
-        """Whether no reply to an earlier request can be under way any more, even where one was lost."""
+        """Whether every reply to an earlier request has arrived or is lost."""
         return self._in_step or self._quick
 
     def in_doubt(self, now_s: float) -> bool:
@@ -97,7 +97,7 @@ class ReplyOrder:
         return min(self._timeout_s, max(SLOWER * max(self._durations_s) - passed_s, 0.0) + LATER_S)
 
     def asks_twice(self) -> bool:
-        """Whether the next answer is to be thrown away and the gauge asked again at once, after a `pause_s`."""
+        """Whether to discard the next answer and poll the gauge again at once, after a `pause_s`."""
         if not self._one or self._in_step or len(self._durations_s) < self._fewest_polls:
             return False
         return self.pause_s() < min(self._closest_s, self._timeout_s)
@@ -111,18 +111,18 @@ class ReplyOrder:
         self._quick = duration_s <= self._quickly_s()
 
     def _quickly_s(self) -> float:
-        """Time (s) within which an answer comes as quickly as nearly every one."""
+        """Time (s) of a quick answer: nearly every answer arrives within it."""
         return SLOWER * float(np.quantile(self._durations_s, NEARLY_EVERY)) + LATER_S
 
     def asked(self, now_s: float) -> None:
-        """A request is made now."""
+        """Note a request made now."""
         if not self._in_step and not math.isnan(self._asked_s):
             self._apart_s = max(self._apart_s, now_s - self._asked_s)
             self._closest_s = min(self._closest_s, now_s - self._asked_s)
         self._asked_s = now_s
 
     def opened(self, now_s: float) -> None:
-        """The line is new: what it was asked before, and when, is not known."""
+        """The line is new: its earlier requests and their times are unknown."""
         self.missed(now_s)
         self._asked_s, self._apart_s, self._closest_s = math.nan, 0.0, 0.0
 
@@ -131,7 +131,7 @@ class ReplyOrder:
         self._durations_s.append(duration_s)
 
     def missed(self, now_s: float, absent: bool = False) -> None:
-        """A reply did not come, or not whole, and may come later.
+        """A reply is missing or incomplete, and may come later.
 
         absent : of a gauge that did not answer before either, while others on its line may: the line is not late.
         """
@@ -140,7 +140,7 @@ class ReplyOrder:
         self._quick = False
 
     def damaged(self, now_s: float) -> None:
-        """A reply came damaged, and after it nothing more within `rest_s`.
+        """A damaged reply came, then silence for `rest_s`.
 
         Where the line was in step it was that of the last request, and the line still is. Readings wait as after a
         missed reply, in case that it was noise, and the reply is later than any before.
@@ -160,6 +160,6 @@ class ReplyOrder:
         return self.listen_s(passed_s) if self._in_step else self._timeout_s
 
     def kept_silent(self) -> None:
-        """After an answer nothing more came for `listen_s`: no reply is under way any more."""
+        """Silence for `listen_s` after an answer: no reply is pending any more."""
         self._in_step, self._quick = True, False
         self._apart_s, self._closest_s = 0.0, math.inf

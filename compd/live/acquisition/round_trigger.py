@@ -1,9 +1,8 @@
 """The round trigger: one message latches all gauges of a line, so that they are measured at the same time.
 
-It is sent once before the gauges of a round are read, and every reading of that round has its time, also where a gauge
-is missing. The devices latch no earlier than its last bit has left. Whether they have heard it, nobody says. The
-readings are published together when the round has ended: a snapshot that mixed two rounds would be further apart than
-without a trigger.
+It is sent once before the gauges of a round are read, and every reading of that round has its time, even if a gauge is
+missing. The devices latch no earlier than its last bit has left, and do not confirm it. The readings are published
+together at the end of the round: a snapshot of two mixed rounds would be further apart than without a trigger.
 """
 
 from __future__ import annotations
@@ -32,20 +31,20 @@ def send_trigger(trigger: TriggerBytes | TriggerWrite, line: Any) -> float:
 
 
 def stamped(readings: Sequence[Reading], latched_s: float | None) -> Sequence[Reading]:
-    """The readings with the time (s) of the trigger that has latched them; None: as they are, without a trigger."""
+    """The readings with the time (s) of the trigger that latched them; unchanged without a trigger (None)."""
     if latched_s is None:
         return readings
     return [reading._replace(time_s=latched_s) for reading in readings]
 
 
 def read_latched(gauge: Gauge[Any], line: Any, trigger: TriggerBytes | TriggerWrite | None) -> Sequence[Reading]:
-    """One poll of a gauge by itself, behind the trigger of its line where there is one. Raises LineFault."""
+    """One poll of a single gauge, after its line's trigger if it has one. Raises LineFault."""
     latched_s = None if trigger is None else send_trigger(trigger, line)
     return stamped(gauge.read(line), latched_s)
 
 
 class RoundBuffer:
-    """In the place of `Latest` for the gauges of a line with a round trigger: keeps their readings until `publish`."""
+    """Stands for `Latest` on a line with a round trigger: keeps the readings until `publish`."""
 
     def __init__(self, latest: Latest) -> None:
         self.index: Mapping[str, int] = latest.index
@@ -57,7 +56,7 @@ class RoundBuffer:
         self._readings[index] = reading
 
     def publish(self) -> None:
-        """Publish what was put, all at once."""
+        """Publish the kept readings at once."""
         readings, self._readings = self._readings, {}
         if readings:
             self._latest.put_all(readings)

@@ -1,4 +1,4 @@
-"""How far the readings of a length scatter while it stands, by themselves: nothing that is declared enters.
+"""Scatter of a length's readings at rest, from the readings alone, without declared values.
 
 The standard deviation about a straight line in windows of a second or more, so that a drift does not count, without
 single readings that are damaged. A window counts where the readings stay within their tolerance, or go to and fro about
@@ -22,29 +22,29 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.live.acquisition.possible_motion import GaugeSample
 
-# A window has at least so many readings, and lasts so long, s. The error of a standard deviation from 32 is 13 %.
+# Fewest readings and shortest duration (s) of a window. A standard deviation from 32 readings has an error of 13 %.
 FEWEST = 32
 WINDOW_S = 1.0
-# Windows of which the median counts, and how many of them there must be.
+# Windows whose median counts, and the fewest of them.
 _WINDOWS = 5
 _FEWEST_WINDOWS = 2
-# How often readings go from one side of the line to the other, each time by half a standard deviation beyond it: three
-# periods. The residual of a move with one reversal has three or four such changes, that of noise 0.3 for each reading.
+# Fewest changes from one side of the line to the other, each by half a standard deviation beyond it: three periods. The
+# residual of a move with one reversal has three or four such changes, that of noise 0.3 for each reading.
 _FEWEST_CHANGES = 6
 _BEYOND = 0.5
-# About one place, where the line goes no further than so many standard deviations.
+# Largest length of the line, in standard deviations, for readings about one place.
 _STAYS = 2.0
-# A reading so many medians of the deviations from the middle is damaged: of noise 7 is 5 sigma, of hum 1.4 is the most.
+# A reading this many median deviations from the middle is damaged. For noise 7 is 5 sigma; hum reaches 1.4.
 _DAMAGED = 7.0
-# Of so many of the last readings turns and changes count, and so many turns are no machine's.
+# Last readings whose turns and changes count, and the fewest turns that no machine makes.
 _LAST = 32
 _FEWEST_TURNS = 2
-# A recording has it as text: 1 pm is less than anybody knows of it.
+# Rounded to 1 pm, below its uncertainty, since a recording has it as text.
 _DECIMALS_MM = 9
 
 
 class RestScatter:
-    """Of one length.
+    """Scatter of one length in windows of readings.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class RestScatter:
     """
 
     def __init__(self, tolerance_mm: float) -> None:
-        """`tolerance_mm`: readings that differ by no more stand."""
+        """`tolerance_mm`: largest difference of readings at rest."""
         self.mm = math.nan
         self._tolerance_mm = tolerance_mm
         self._times_s: list[float] = []
@@ -60,7 +60,7 @@ class RestScatter:
         self._windows: deque[float] = deque(maxlen=_WINDOWS)
 
     def note(self, sample: GaugeSample) -> None:
-        """A reading, in the order of time."""
+        """Add a reading; readings come in the order of time."""
         self._times_s.append(sample.time_s)
         self._values_mm.append(sample.value)
         if len(self._times_s) < FEWEST or sample.time_s - self._times_s[0] < WINDOW_S:
@@ -84,19 +84,19 @@ class RestScatter:
 
 
 class LatestScatter:
-    """Of the last readings of one length, whether believed or not, as far as no motion explains how they differ."""
+    """Scatter of the last readings of one length, believed or not, that motion does not explain."""
 
     def __init__(self, tolerance_mm: float) -> None:
-        """`tolerance_mm`: readings that differ by no more do not turn round."""
+        """`tolerance_mm`: largest difference that is no turn."""
         self._tolerance_mm = tolerance_mm
         self._value = self._change = math.nan
         self._count = 0
-        # of each turn and change, the number of its reading, and how far, mm
+        # each turn and change: the number of its reading, and its size (mm)
         self._turns: deque[tuple[int, float]] = deque()
         self._changes: deque[tuple[int, float]] = deque()
 
     def note(self, value: float, unexplained_mm: float = 0.0) -> None:
-        """A reading. unexplained_mm : by how much it has changed while the machine stood."""
+        """Add a reading. unexplained_mm : its change while the machine stood."""
         change, before = value - self._value, self._change
         self._value, self._change = value, change
         self._count += 1
@@ -110,7 +110,7 @@ class LatestScatter:
 
     @property
     def mm(self) -> float:
-        """The scatter that they show, mm; nan where they show none.
+        """The scatter (mm); nan if the readings show none.
 
         The mean size of turns is 1.0 standard deviations of noise, and 1.06 of hum. Of changes the largest counts: a
         single one may be all that is known.

@@ -1,4 +1,4 @@
-"""Steps of a length: it stands, then stands elsewhere, and no reading shows it on the way.
+"""Steps of a length: a change from rest to rest without a reading in between.
 
 A count that is lost looks so. A part that moves by 20 um takes 16 ms with 300 mm/s2, and many times that with the
 acceleration that drives have for so short a way: of several such motions, readings show one on the way. Such a one
@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 from compd.live.acquisition.possible_motion import GaugeSample
 
-# It stands where so many readings in a row, over so long (s), agree.
+# A length is at rest if this many readings in a row, over this time (s), agree.
 _FEWEST = 3
 _STANDS_S = 0.05
-# Where readings are further apart, s, one on the way may just be missing.
+# Largest interval (s) of readings for a step; in a longer one a reading on the way may be missing.
 _LONGEST_GAP_S = 0.1
 
 

@@ -1,4 +1,4 @@
-"""How far a scale must have moved in a gap of its readings, by the motion of the other links and by its own before.
+"""Motion of a scale in a gap of its readings, from the other links' motion and its own before.
 
 A machine whose links follow one path moves them in proportion: the ratio between two links is that before the gap, or
 that after it, and at a corner in the gap the way is a sum of both. So the ways of the other links in the gap, and the
@@ -18,20 +18,21 @@ from numpy.typing import NDArray
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.memory import Doubt, TrustMemory
 
-# Over this time, s, before and after a gap the ratio of the links' ways is taken: some polls, and little of a curve.
+# Time (s) before and after a gap over which the ratio of the links' paths is taken: several polls, a nearly straight
+# path.
 SIDE_S = 0.06
-# A link that has moved by less, mm, has no direction: readings are late by 1 ms, in which a link moves by some 0.05 mm.
+# Least motion (mm) that gives a direction: readings are late by 1 ms, in which a link moves some 0.05 mm.
 LEAST_WAY_MM = 0.1
-# What the ways of other links leave open of a way: links turn while they move, and readings are late.
+# Relative uncertainty of a path from those of other links: links turn while they move, and readings are late.
 WAY_SHARE = 0.1
-# Two ways whose ratios differ by less, as the sine of an angle, are one straight path.
+# Two paths are one straight path if their ratios differ by less than this, as the sine of an angle.
 _ONE_PATH = 0.2
-# An interval that is so many times as long as usual is a gap.
+# A gap is this many times as long as the usual interval.
 _GAP = 2.0
 
 
 class ExpectedWay(NamedTuple):
-    """A way in a gap, mm, and by how much it may be wrong, mm."""
+    """Motion (mm) in a gap and its uncertainty (mm)."""
 
     way_mm: float
     u_mm: float
@@ -74,7 +75,7 @@ def way_by_links(
     left_mm = float(np.linalg.norm(directions @ lengths - gap_mm))
     way_mm = float(np.array([unit[0] for unit in units]) @ lengths)
     if left_mm > WAY_SHARE * np.linalg.norm(gap_mm) + LEAST_WAY_MM:
-        return None  # not one path, nor two
+        return None  # neither one path nor two
     return ExpectedWay(way_mm, WAY_SHARE * float(np.abs(lengths).max()) + LEAST_WAY_MM)
 
 
@@ -107,7 +108,7 @@ def _side_end(after: Sequence[GaugeSample]) -> GaugeSample | None:
 
 
 class _Path:
-    """Where a link was at any time, by its last readings."""
+    """Position of a link at any time, from its last readings."""
 
     def __init__(self, readings: NDArray[np.float64]) -> None:
         """`readings`: (k, 2) time (s) and value (mm)."""
@@ -115,7 +116,7 @@ class _Path:
 
     @property
     def start_s(self) -> float:
-        """Time of the first reading that is known, s."""
+        """Time (s) of the first known reading."""
         return float(self._time_s[0])
 
     @property
@@ -124,7 +125,7 @@ class _Path:
         return float(self._time_s[-1])
 
     def at(self, time_s: float) -> float:
-        """In mm; in a gap of its own as far as the readings on the nearer side lead."""
+        """Position (mm); in a gap of its own, extrapolated from the readings on the nearer side."""
         times, values = self._time_s, self._value_mm
         k = min(max(int(np.searchsorted(times, time_s)), 1), len(times) - 1)
         if times[k] - times[k - 1] > _GAP * float(np.median(np.diff(times))):

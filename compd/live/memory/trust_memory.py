@@ -73,7 +73,7 @@ class TrustMemory:
     stepped, stepped_mm, stepped_s : how often it has gone from one place where it stood to the next; the sum of those
         steps that no reading shows on the way, mm; and when the last one began, s; nan before the first.
     accepted, obeyed : how often a person has accepted the channel, and how often its thread has followed.
-    voted, heard : how often a vote has named the channel, and how often its thread has followed.
+    voted, handled : how often a vote has named the channel, and how often its thread has followed.
     suspected : 1 while a vote waits for more evidence against the channel: it has no value meanwhile.
     evidence : of the votes, by channel.
     warnings : by channel: what is to be looked at, of one that is believed all the same.
@@ -103,7 +103,7 @@ class TrustMemory:
         self.step_mm[:] = math.inf
         self.scatter_mm, self.stepped, self.stepped_mm, self.stepped_s = (shared_floats(max(n, 1)) for _ in range(4))
         self.scatter_mm[:] = self.stepped_s[:] = math.nan
-        self.accepted, self.obeyed, self.voted, self.heard = (shared_counters(max(n, 1)) for _ in range(4))
+        self.accepted, self.obeyed, self.voted, self.handled = (shared_counters(max(n, 1)) for _ in range(4))
         self.suspected = shared_counters(max(n, 1))
         self.evidence, self.warnings = SharedMessage(), SharedMessage()
         self.power_lost = shared_floats(max(n, 1))

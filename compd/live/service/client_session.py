@@ -237,7 +237,7 @@ class ClientSession:
             self._unwanted.put(descriptor)
 
     @property
-    def is_heard(self) -> bool:
+    def is_served(self) -> bool:
         """Whether its requests are answered: it has not been dismissed."""
         return self.dismissed_s == math.inf
 
@@ -250,7 +250,7 @@ class ClientSession:
     def is_read(self) -> bool:
         """Whether more should be received: not as long as a line waits that a newer one does not replace."""
         newest_only = all(line.place is Place.NEWEST for line in self._lines)
-        return self.is_heard and not self.has_ended and newest_only
+        return self.is_served and not self.has_ended and newest_only
 
     def next_line(self) -> bytes | ProtocolError:
         """The line that has waited longest, or an error in the place of one that is too long.

@@ -182,7 +182,7 @@ class Publisher:
             now_s = self._clock.monotonic()
             self._next_turn_s = now_s + min(_REST_PER_TURN * (now_s - start_s), _LONGEST_REST_S)
         self._waiting = [
-            session for session in self._waiting if session.open and session.is_heard and session.has_lines
+            session for session in self._waiting if session.open and session.is_served and session.has_lines
         ]
         for session in turns:
             self._update_events(session)
@@ -195,10 +195,10 @@ class Publisher:
                 raise received
             return self._requests.answer(session, received, partial(self._answer_later, session))
         except ProtocolError as error:
-            if not session.authorized and session.is_heard:
+            if not session.authorized and session.is_served:
                 _log.warning("a client has not shown the token", client=session.name, reason=error.code)
                 session.dismissed_s = self._clock.monotonic() + WRONG_TOKEN_REST_S
-            return error.to_json() if session.is_heard else b""
+            return error.to_json() if session.is_served else b""
         finally:
             session.end_line()
 

@@ -1,4 +1,4 @@
-"""What a person has chosen in the page: as the reader and the join take it, and as a command line."""
+"""The choices made in the page, as arguments of the reader and the join, and as a command line."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Value = TypeVar("Value", str, float, int)
 
 _LONGEST_TEXT = 200
 _MOST_COLUMNS = 500
-# Of an export in the page: an answer comes within a minute or two.
+# Most rows of an export in the page, so that an answer takes at most a minute or two.
 LIMITS = ReadLimits(lines=2_000_000, cells=8_000_000, sheet_cells=1_000_000, unpacked_bytes=150_000_000)
-# Control characters, and halves of a character.
+# Control characters and surrogates.
 _NO_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")
 _DATES = ("dmy", "mdy", "ymd")
 _FRAMES = ("instrument", "machine")
@@ -28,13 +28,13 @@ _FRAMES = ("instrument", "machine")
 
 @dataclass(frozen=True)
 class Choices:
-    """read : how the export is read. join : how its rows are put beside the gauges."""
+    """read : options of the export's reader. join : options for matching its rows with the gauges."""
 
     read: ReadOptions
     join: JoinOptions
 
     def command(self, gauges: Path, export: Path, out: Path) -> str:
-        """The command line that does the same."""
+        """The equivalent command line."""
         read, join = self.read, self.join
         instrument = join.instrument
         options = {
@@ -66,7 +66,7 @@ class Choices:
 
 
 def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | None) -> Choices:
-    """The choices in a browser's order; a key that is missing, null or "" is left to be found.
+    """The choices in a browser's order; a key that is missing, null or "" is detected.
 
     Raises CompdError with every key that is of a wrong kind.
     """
@@ -127,7 +127,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
 
 
 def _is(value: Any, kind: type) -> bool:
-    """Whether a value of JSON is a short text on one line, a number that is finite, or a whole number."""
+    """Checks of a JSON value: a short text on one line, a finite number, a whole number."""
     if kind is str:
         return isinstance(value, str) and len(value) <= _LONGEST_TEXT and not _NO_TEXT.search(value)
     if isinstance(value, bool) or not isinstance(value, int | float):

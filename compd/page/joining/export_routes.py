@@ -1,4 +1,4 @@
-"""The routes of what is kept of exports: how much there is beside what is allowed, and deleting one."""
+"""Routes for stored exports: their size against the limit, and deletion."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from compd.page.requests import LOOKS_ONLY, answer, may_change, refused
 
 
 def export_routes(exports: Exports) -> list[Route]:
-    """GET /join/exports, and DELETE /join/exports/{name} for who may change files."""
+    """GET /join/exports; DELETE /join/exports/{name} for tokens that may change files."""
 
     async def usage(request: Request) -> Response:
         return answer((await asyncio.to_thread(exports.usage)).as_json())

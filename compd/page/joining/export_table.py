@@ -1,4 +1,4 @@
-"""An export as the page shows it: the first rows as a table, what each column is taken for, what there is to ask."""
+"""An export as shown in the page: the first rows as a table, the role of each column, the open questions."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from compd.files import file_stamp
 from compd.instruments import ExportPreview, ReadOptions, preview_export
 from compd.joining import choose_by
 
-# Files that are kept as they were read: two persons may look at two, and change what their columns are.
+# Parsed files in memory: two persons may look at two, and change the roles of their columns.
 _KEPT = 4
 
 
 class _Read(NamedTuple):
-    """A file at a time, read with these options."""
+    """A file at a time of change, with reading options."""
 
     path: Path
     stamp: tuple[int, int] | None
@@ -24,13 +24,13 @@ class _Read(NamedTuple):
 
 
 class ExportReader:
-    """Reads exports, the ones that were asked for last only once."""
+    """Reads exports; caches those requested last."""
 
     def __init__(self) -> None:
         self._kept: list[_Read] = []
 
     def read(self, path: Path, options: ReadOptions) -> ExportPreview:
-        """As `preview_export`."""
+        """See `preview_export`."""
         stamp = file_stamp(path)
         for known in self._kept:
             if (known.path, known.stamp, known.options) == (path, stamp, options):
@@ -41,7 +41,7 @@ class ExportReader:
 
 
 def table_contents(preview: ExportPreview) -> dict[str, Any]:
-    """What the browser shows of it. `by`: what puts the rows together without a choice; "" where that is not clear."""
+    """The preview of an export. `by`: the default way of matching rows; "" if it is ambiguous."""
     export = preview.export
     by, not_clear = "", ""
     try:

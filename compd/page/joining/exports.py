@@ -1,4 +1,4 @@
-"""Exports of instruments in the directory `exports/` beside the recordings: listed, brought by a browser, and deleted.
+"""Exports of instruments in the directory `exports/` beside the recordings: list, upload, delete.
 
 What a browser brings is kept under its name and SUFFIX: nothing imports, runs or reads a file of that suffix by itself,
 whatever its content is.
@@ -21,18 +21,18 @@ from typing import Any, NamedTuple
 from compd.errors import Problem, RecordingError
 
 SUFFIX = ".export"
-# NAME or NAME.ext, and SUFFIX where this release has brought it: a file's name on every system and never a path.
+# NAME or NAME.ext, with SUFFIX for an upload of this release: a valid file name on every system, never a path.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9]{1,8})?")
 EXPORT_NAME = re.compile(rf"{_NAME.pattern}({re.escape(SUFFIX)})?")
-# Of one file: some million rows.
+# Largest file (bytes): some million rows.
 MOST_BYTES = 64 * 2**20
-# Of all files in the directory, those that are just being brought among them.
+# Largest total (bytes) of the directory, including running uploads.
 MOST_FILES = 200
 MOST_BYTES_OF_ALL = 16 * MOST_BYTES
-# The page's group may read it, for backups; nobody runs it.
+# Mode of a file: readable by the page's group for backups, never executable.
 _MODE = 0o640
 _TEMPORARY = re.compile(r"\.[0-9a-f]{16}")
-# A file that nobody has added to for so long, s, is of a process that has ended meanwhile.
+# Age (s) of the last write from which a partial file belongs to an ended process.
 _LEFT_AFTER_S = 3600.0
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _LONGEST_STEM = 64
@@ -41,22 +41,22 @@ _NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 class Usage(NamedTuple):
-    """What the directory holds."""
+    """Contents of the directory."""
 
     files: int
     bytes: int
 
     def as_json(self) -> dict[str, int]:
-        """It, beside what is allowed."""
+        """The contents beside the limits."""
         return {**self._asdict(), "most_files": MOST_FILES, "most_bytes": MOST_BYTES_OF_ALL}
 
 
 class Exports:
-    """Those in `directory`, which need not be there yet; used by the event loop's thread alone."""
+    """Exports in `directory`, which may be created later; used by the event loop's thread alone."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
-        # Temporary name -> bytes that are written of it.
+        # temporary name -> bytes written so far
         self._arriving: dict[str, int] = {}
 
     def listed(self) -> list[str]:
@@ -65,18 +65,18 @@ class Exports:
         return [name for _, name in sorted(by_age)]
 
     def path_of(self, name: str) -> Path | None:
-        """The file of that name; None where there is none, and where it or the directory is a link."""
+        """The file of that name; None if it is missing, or if it or the directory is a link."""
         path = self.directory / name
         is_file = EXPORT_NAME.fullmatch(name) and path.is_file() and not path.is_symlink()
         return path if is_file and not self.directory.is_symlink() else None
 
     def usage(self) -> Usage:
-        """Of everything in the directory, whatever its name."""
+        """Size of everything in the directory, under any name."""
         sizes = [status.st_size for _, status in self._entries()]
         return Usage(len(sizes), sum(sizes))
 
     def delete(self, name: str) -> bool:
-        """Delete the export of that name; False where there is none. Raises RecordingError where the disk refuses."""
+        """Delete the export of that name; False if there is none. Raises RecordingError if the disk refuses."""
         if not EXPORT_NAME.fullmatch(name):
             return False
         with self._opened() as directory:
@@ -91,7 +91,7 @@ class Exports:
         return True
 
     async def keep(self, file_name: str, pieces: AsyncIterator[bytes]) -> dict[str, Any]:
-        """Write what a browser brings, and tell its `name` here and its `bytes`.
+        """Store an upload; return its `name` here and its `bytes`.
 
         file_name : the file's name on the person's computer; what cannot stand in a name here becomes "-".
 
@@ -117,37 +117,37 @@ class Exports:
         return {"name": name, "bytes": count}
 
     async def _written(self, directory: int, temporary: str, pieces: AsyncIterator[bytes]) -> int:
-        """Number of bytes that are in the new file now."""
+        """Number of bytes in the new file so far."""
         kept = self._kept_before()
         if kept.files + len(self._arriving) >= MOST_FILES:
             raise _full(kept.files + len(self._arriving), kept.bytes + sum(self._arriving.values()))
         self._arriving[temporary] = 0
         with os.fdopen(os.open(temporary, _NEW_FILE, _MODE, dir_fd=directory), "wb") as file:
-            os.fchmod(file.fileno(), _MODE)  # whatever the umask is
+            os.fchmod(file.fileno(), _MODE)  # independent of the umask
             async for piece in pieces:
                 count = self._arriving[temporary] + len(piece)
                 if count > MOST_BYTES:
                     raise _refused("export", "is too large", allowed=f"{MOST_BYTES >> 20} MB", next_step="split it")
                 self._arriving[temporary] = count
-                # one that came meanwhile is in the directory and no longer arriving: looked up again near the end
+                # a file completed meanwhile is in the directory and no longer arriving: looked up again near the end
                 self._require_room(kept)
-                await asyncio.to_thread(file.write, piece)  # the disk may be behind
+                await asyncio.to_thread(file.write, piece)  # the disk may lag
         self._require_room(self._kept_before())
         return self._arriving[temporary]
 
     def _require_room(self, kept: Usage) -> None:
-        """Raises RecordingError where what is kept and what is arriving are more than may be."""
+        """Raises RecordingError if stored and arriving files exceed the limits."""
         total = kept.bytes + sum(self._arriving.values())
         if total > MOST_BYTES_OF_ALL:
             raise _full(kept.files + len(self._arriving), total)
 
     def _kept_before(self) -> Usage:
-        """What the directory holds beside what is just arriving."""
+        """Contents of the directory without running uploads."""
         sizes = [status.st_size for name, status in self._entries() if name not in self._arriving]
         return Usage(len(sizes), sum(sizes))
 
     def _name(self, directory: int, temporary: str, name: str) -> None:
-        """Give a file its name. Nothing is ever replaced: the same bytes may come again, others need another name."""
+        """Give a file its name, never replacing another: equal bytes may come again, others need a new name."""
         try:
             os.link(temporary, name, src_dir_fd=directory, dst_dir_fd=directory, follow_symlinks=False)
         except FileExistsError:
@@ -165,19 +165,19 @@ class Exports:
                 _removed(directory, name)
 
     def _entries(self) -> Iterator[tuple[str, os.stat_result]]:
-        """Name and status of all that is in the directory; a link is itself, not what it leads to."""
+        """Name and status of every entry of the directory; a link is not followed."""
         if self.directory.is_symlink() or not self.directory.is_dir():
             return
         with os.scandir(self.directory) as entries:
             for entry in entries:
                 try:
                     yield entry.name, entry.stat(follow_symlinks=False)
-                except FileNotFoundError:  # somebody has just removed it
+                except FileNotFoundError:  # removed meanwhile
                     continue
 
     @contextmanager
     def _opened(self) -> Iterator[int]:
-        """The directory's descriptor. Raises RecordingError where there is none, or it is a link."""
+        """The directory's descriptor. Raises RecordingError if it is missing or a link."""
         try:
             descriptor = os.open(self.directory, _DIRECTORY)
         except OSError as error:
@@ -189,7 +189,7 @@ class Exports:
 
 
 def kept_name(file_name: str) -> str:
-    """The name under which a file is kept. Raises RecordingError for what is a path, or has no letter or digit."""
+    """The name under which a file is stored. Raises RecordingError for a path, or a name without letter or digit."""
     stem, dot, ending = file_name.removesuffix(SUFFIX).rpartition(".")
     if not dot:
         stem, ending = ending, ""
@@ -213,7 +213,7 @@ def _removed(directory: int, name: str) -> None:
 
 
 def _full(files: int, total: int) -> RecordingError:
-    """files, total : of all that are there and just being brought, and their bytes."""
+    """files, total : number and bytes of all files, including running uploads."""
     return _refused(
         "exports",
         "has no room for another file",

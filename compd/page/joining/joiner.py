@@ -1,4 +1,4 @@
-"""`compd join` in a worker: exports that were read, and the questions of the join wizard."""
+"""`compd join` in a worker: parsed exports, and the requests of the join wizard."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from compd.recording import write_recording
 
 
 class _Join(NamedTuple):
-    """What a browser asks for, with the files that it names. gauges, out : None where none is chosen yet."""
+    """A browser's request with the files that it names. gauges, out : None before a choice."""
 
     gauges: Path | None
     export: Path
@@ -28,7 +28,7 @@ class _Join(NamedTuple):
     choices: Choices
 
     def command(self, directory: Path) -> str:
-        """The command line; words in capitals stand for what is not chosen yet."""
+        """The command line; words in capitals stand for missing choices."""
         chosen = (self.gauges or directory / "RECORDING.csv", self.export, self.out or directory / "NAME.csv")
         return self.choices.command(*chosen)
 
@@ -45,7 +45,7 @@ class Joiner:
         self._reader = ExportReader()
 
     def table(self, keys: Mapping[str, Any]) -> dict[str, Any]:
-        """How an export is read. keys : what is chosen. Raises CompdError for what is not there, or no choice."""
+        """The preview of an export. keys : the choices. Raises CompdError for a missing file or an invalid choice."""
         join = self._join(keys)
         contents = table_contents(self._reader.read(join.export, join.choices.read))
         return {**contents, "command": join.command(self._directory)}
@@ -57,7 +57,7 @@ class Joiner:
         return tried(gauges, export, join.choices.join)
 
     def write(self, keys: Mapping[str, Any]) -> dict[str, Any]:
-        """Write the new recording. Raises as `table`, and where the rows cannot be joined."""
+        """Write the new recording. Raises as `table`, and if the rows cannot be joined."""
         join = self._join(keys)
         gauges, export = self._whole(join)
         if join.out is None:
@@ -67,7 +67,7 @@ class Joiner:
         return {"recording": join.out.stem, "path": str(join.out), "lines": summary_lines(joined)}
 
     def _join(self, keys: Mapping[str, Any]) -> _Join:
-        """Raises CompdError for what is not there, or no choice."""
+        """Raises CompdError for a missing file or an invalid choice."""
         export = self._exports.path_of(str(keys.get("export", "")))
         if export is None:
             raise missing("export", "there is no such export", "choose one, or bring one from your computer")
@@ -81,7 +81,7 @@ class Joiner:
         return _Join(gauges, export, out, read_choices(keys, machine, plan))
 
     def _whole(self, join: _Join) -> tuple[Path, InstrumentExport]:
-        """The recording and the export. Raises CompdError where one is missing, or cannot be read."""
+        """The recording and the export. Raises CompdError if one is missing or unreadable."""
         if join.gauges is None:
             raise missing("recording", "no recording of the gauges is chosen")
         preview = self._reader.read(join.export, join.choices.read)

@@ -26,7 +26,7 @@ def gauges_and_plans(directory: Path) -> tuple[list[str], list[str]]:
 
 
 def named(directory: Path, keys: Mapping[str, Any], key: str) -> Path | None:
-    """The recording or plan that a key names; None without a name. Raises RecordingError where it is not there."""
+    """The recording or plan that a key names; None without a name. Raises RecordingError if it is missing."""
     name = str(keys.get(key) or "")
     path = recording_tables(directory).get(name)
     if name and not (NAME.fullmatch(name) and path):
@@ -35,5 +35,5 @@ def named(directory: Path, keys: Mapping[str, Any], key: str) -> Path | None:
 
 
 def missing(where: str, what: str, next_step: str = "") -> RecordingError:
-    """What a request must name."""
+    """The required name in a request."""
     return RecordingError(Problem(where=where, what=what, next_step=next_step))

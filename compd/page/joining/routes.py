@@ -1,4 +1,4 @@
-"""The routes of the join wizard: what there is to join, how an export is read, a join that is tried, and written."""
+"""Routes of the join wizard: available files, preview of an export, trial of a join, and the join itself."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from compd.page.workers.workers import Workers
 
 EXPORTS = "exports"
 _JOINER = "compd.page.joining.joiner:Joiner"
-# Of each worker; two, so that one person's large file keeps nobody else waiting.
+# Limits of each worker; two workers, so that one large file does not block other persons.
 LIMITS = WorkerLimits(memory_mb=1500, opening_s=30.0, idle_s=60.0)
 WORKERS = 2
-# To read an export and to try or write a join of it.
+# Limits for reading an export, and for trying or writing a join.
 ANSWER_S = 120.0
 
 
 class JoinRoutes:
-    """Joins the recordings of a directory with the exports in `exports/` below it."""
+    """Joins recordings of a directory with the exports in its subdirectory `exports/`."""
 
     def __init__(
         self, recordings: Recordings, machine: Path | None, page: Path, workers: Workers | None = None
@@ -43,7 +43,7 @@ class JoinRoutes:
         arguments = (self._directory, self._exports.directory, machine)
         self._workers = workers or Workers()
         self._joiners = WorkerGroup(self._workers, WORKERS, "join", _JOINER, arguments, LIMITS)
-        self._writing = asyncio.Lock()  # a name is given once
+        self._writing = asyncio.Lock()  # each name is used once
 
     def routes(self) -> list[Route]:
         """All of them; /join is the page itself."""
@@ -97,7 +97,7 @@ class JoinRoutes:
         return await _answered(while_asked(request, asked))
 
     async def _write(self, request: Request) -> Response:
-        """It goes on where the browser goes: nobody wants half of it."""
+        """Write the join, even if the browser disconnects, so that it is complete."""
         if not may_change(request):
             return refused(LOOKS_ONLY, 403)
         keys = await keys_of(request)
@@ -107,7 +107,7 @@ class JoinRoutes:
 
 
 async def _answered(asked: Awaitable[bytes]) -> Response:
-    """The answer of a worker; 409 with the reason where there is none."""
+    """The answer of a worker; 409 with the reason if it fails."""
     try:
         return Response(await asked, media_type="application/json")
     except BrowserGone:

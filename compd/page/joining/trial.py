@@ -1,4 +1,4 @@
-"""A join that is tried: how many rows match and why others do not, and what a picture of it is made of."""
+"""Trial of a join: how many rows match, why others do not, and the data of its picture."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from compd.units import UM_PER_MM
 
 
 def tried(gauges: Path, export: InstrumentExport, options: JoinOptions) -> dict[str, Any]:
-    """What `match_export` puts together, for a browser; nothing is written.
+    """The result of `match_export` for a browser; no file is written.
 
     `reason` : why they cannot be put together, "" where they can. `lines` : what the command prints. `by` : what puts
     the rows together, "" where that is not clear. `time` : curve and offset. `rest` : each point with its dwell.
@@ -39,13 +39,13 @@ def tried(gauges: Path, export: InstrumentExport, options: JoinOptions) -> dict[
     if isinstance(joined, RestJoin):
         answer["rest"] = _rest(joined)
     elif answer["by"] == "time":
-        # why no offset is found is seen best in the picture
+        # the picture shows best why no offset is found
         answer["time"] = _time(gauges, export, joined.offset if joined else None)
     return answer
 
 
 def _time(gauges: Path, export: InstrumentExport, offset: ClockOffset | None) -> dict[str, Any] | None:
-    """The agreement over all offsets; None where there is none to show."""
+    """The agreement over all offsets; None if there is none."""
     try:
         recording, track = read_recording(gauges, needs_reference=False), track_of(export)
         if recording.scale_mm is None:

@@ -30,25 +30,25 @@ from compd.page.workbench.trial import Trial, trial
 from compd.text import nan_to_null
 from compd.units import UM_PER_MM
 
-# Effects are told to be alike from this cosine on: a tenth of either's square is its own.
+# Least cosine of effects that count as alike: a tenth of either's square is its own.
 LEAST_COSINE = 0.95
 MOST_ALIKE = 4
 
 
 class Candidates:
-    """The effects of a library against one comparison. What takes a second is computed when it is asked for."""
+    """The effects of a library against one comparison. Results that take a second are computed on demand."""
 
     def __init__(
         self, comparison: Comparison, library: Sequence[Effect], weighed: DiagnosisProblem | None = None
     ) -> None:
-        """weighed : of the same comparison, by which rows count as they do there; None to weigh them anew."""
+        """weighed : row weights of the same comparison; None to compute them anew."""
         self._comparison = comparison
         self._weighed = weighed
         self.library = {effect.id: effect for effect in library}
 
     @cached_property
     def _searched(self) -> Comparison:
-        """Of the rows that effects are ranked on: evenly thinned where there are very many, as for a diagnosis."""
+        """The rows that effects are ranked on: evenly thinned if very many, as for a diagnosis."""
         full = self._comparison
         thin = thinned(full.aligned, MOST_ROWS)
         return full if thin is full.aligned else compare(thin, full.fitted)
@@ -63,11 +63,11 @@ class Candidates:
 
     @cached_property
     def losses(self) -> SubsetLosses:
-        """What each leaves on rows left out."""
+        """The loss of each on rows left out."""
         return self.problem.losses(self.problem.candidates)
 
     def summary(self) -> dict[str, Any]:
-        """Every effect, ranked; and the error that the model has on rows that were left out, as plain data."""
+        """Every effect, ranked, and the model's error on rows left out, as plain data."""
         summary: dict[str, Any] = nan_to_null(
             {
                 "effects": self.ranked(),
@@ -82,7 +82,7 @@ class Candidates:
         return self.problem.unit_um * float(np.sqrt(max(loss, 0.0)))
 
     def ranked(self, steps: Sequence[DiagnosisStep] = ()) -> list[dict[str, Any]]:
-        """Every effect, the one that leaves least on rows left out first, with the reason for its place.
+        """Every effect with the reason for its rank, in the order of the error on rows left out.
 
         steps : what a diagnosis has named.
         """
@@ -102,7 +102,7 @@ class Candidates:
         }
 
     def card(self, name: str) -> dict[str, Any]:
-        """What an effect is, its numbers with their plausible ranges, and its fit alone at each choice of constants.
+        """An effect's description, its numbers with plausible ranges, and its fit alone at each choice of constants.
 
         Raises KeyError where there is no such effect.
         """
@@ -140,7 +140,7 @@ class Candidates:
         return card
 
     def trial(self, name: str, variant: int) -> Trial:
-        """The effect at one choice of its constants, by its place in `card`.
+        """The effect at one choice of its constants, by the index in `card`.
 
         Raises KeyError or IndexError where there is none.
         """
@@ -155,13 +155,13 @@ class Candidates:
         return self.problem.candidates[k]
 
     def _variants(self, name: str) -> list[int]:
-        """Places of an effect's candidates; none where it cannot be tried."""
+        """Indices of an effect's candidates; empty if it cannot be tried."""
         candidates = self.problem.candidates
         places = [k for k, candidate in enumerate(candidates) if candidate.name == name and candidate.kind == "effect"]
         return sorted(places, key=lambda k: self.losses.loss((k,)))
 
     def _alike(self, name: str) -> list[dict[str, Any]]:
-        """Effects that could do much the same on these rows, with the cosine between both, the nearest first."""
+        """Effects that are similar on these rows, with the cosine between both, the most similar first."""
         if name not in self.losses.best_variants:
             return []
         (own,) = self.losses.best_variants[name].members

@@ -1,4 +1,4 @@
-"""What the workbench does, as command lines to copy."""
+"""Actions of the workbench as command lines to copy."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from compd.configuration import Machine
 
 
 class CommandLines(NamedTuple):
-    """Those for one recording and one model file, which need not be there yet."""
+    """Command lines for one recording and one model file, which may be created later."""
 
     recording: Path
     model: Path
     machine: Machine | None
 
     def all(self, effects: Sequence[str]) -> dict[str, str]:
-        """Each by what it does; EFFECT, ROWS and REASON stand for what is chosen. effects : files of effects."""
+        """Command lines by action; EFFECT, ROWS and REASON stand for choices. effects : files of effects."""
         recording, model = str(self.recording), str(self.model)
         on = ["--recording", recording, "--model", model, *self._machine]
         words = {

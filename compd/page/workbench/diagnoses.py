@@ -1,4 +1,4 @@
-"""The diagnoses that run in one page's server: only so many at once."""
+"""The running diagnoses of one page's server, limited in number."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from compd.page.workers.workers import Workers
 if TYPE_CHECKING:
     from compd.configuration import Machine
 
-# Each takes a processor, and the memory of a process of its own; the daemon runs on the same computer.
+# Most diagnoses at once. Each takes a processor and the memory of a process, on the daemon's computer.
 MOST_RUNNING = 2
 
 
 class Diagnoses:
-    """Those that run."""
+    """The running diagnoses."""
 
     def __init__(self, workers: Workers | None = None) -> None:
         """workers : of the same server."""
@@ -30,7 +30,7 @@ class Diagnoses:
     def begin(
         self, path: Path, model_path: Path | None, machine: Machine | None, revision: int, effects: Sequence[str] = ()
     ) -> DiagnosisJob:
-        """Begin one; arguments as of `DiagnosisJob`. Raises StateError where as many run as may."""
+        """Begin one; arguments as for `DiagnosisJob`. Raises StateError if the limit is reached."""
         with self._lock:
             self._running = [job for job in self._running if not job.has_ended]
             if len(self._running) >= MOST_RUNNING:

@@ -1,4 +1,4 @@
-"""A diagnosis in a worker: the state that its questions are asked of."""
+"""A diagnosis in a worker: the state behind its questions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from compd.diagnosis import Diagnosis
 from compd.page.workbench.opened_recording import model_of
 from compd.report import evidence
 
-# Columns of the text, as on a terminal of usual width.
+# Width of the text in columns, as on a usual terminal.
 _WIDTH = 100
 
 
@@ -32,13 +32,13 @@ class Diagnosing:
         effects: Sequence[str] = (),
         kept: None = None,
     ) -> None:
-        """Arguments as of `DiagnosisJob`. Raises CompdError where the recording or the model cannot be opened."""
+        """Arguments as for `DiagnosisJob`. Raises CompdError if the recording or the model cannot be opened."""
         self._aligned, self._recorded_rows = open_whole_or_sample(path, machine)
         self._model, self._effects = model_of(model_path, self._aligned), effects
         self._diagnosis: Diagnosis | None = None
 
     def outcome(self, progress: Callable[[str], None]) -> dict[str, Any]:
-        """What it finds: `text`, `result` and `evidence`. progress : called with each step as it begins."""
+        """The findings: `text`, `result` and `evidence`. progress : called with each step as it begins."""
         self._diagnosis = diagnose(self._aligned, self._model, effects=self._effects, progress=progress)
         return {
             "text": _text(self._diagnosis),
@@ -47,8 +47,8 @@ class Diagnosing:
         }
 
     def page(self) -> bytes:
-        """The page of what was found, compressed: the script for its figures is some megabytes."""
-        from compd.report import write_diagnosis_page
+        """The page of the findings, compressed: the script for its figures is some megabytes."""
+        from compd.report.diagnosis_page import write_diagnosis_page
 
         assert self._diagnosis is not None
         is_sample = self._aligned.recording.rows < self._recorded_rows

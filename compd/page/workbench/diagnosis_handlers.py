@@ -1,4 +1,4 @@
-"""What a browser asks of the diagnosis of an open recording: to begin or cancel it, how far it is, its page."""
+"""Requests about the diagnosis of an open recording: begin, cancel, progress, page."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from compd.page.requests import keys_of, refused
 from compd.page.workbench.handlers import Handler
 from compd.page.workbench.open_workbench import OpenWorkbench
 
-# The page of a diagnosis is one file with its scripts and styles inside. In its sandbox it has no cookie of this
-# server, and it asks nothing of this server nor of any other.
+# The page of a diagnosis is one file including its scripts and styles. Its sandbox has no cookie of this server and
+# allows no request to any server.
 _PAGE_POLICY = (
     "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
     "style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -20,12 +20,12 @@ _PAGE_POLICY = (
 
 
 async def _diagnosis(request: Request, workbench: OpenWorkbench) -> Response:
-    """How far the newest is; with what it has found, unless the browser names it as that which it shows."""
+    """Progress of the newest diagnosis; with its findings, unless the browser already shows them."""
     return JSONResponse(workbench.diagnosis_summary(request.query_params.get("shown", "")))
 
 
 async def _diagnose(request: Request, workbench: OpenWorkbench) -> Response:
-    """`cancel`: end the one that runs; else begin one. It changes nothing, so that everybody may."""
+    """`cancel`: end the running one; else begin one. Allowed to everyone, since it changes nothing."""
     keys = await keys_of(request)
     if keys.get("cancel"):
         if workbench.diagnosis is not None:

@@ -1,4 +1,4 @@
-"""A diagnosis in a worker of its own: its steps as they begin, its result, and an end whenever a person wants it."""
+"""A diagnosis in a worker of its own: its steps as they begin, its result, and cancelling at any time."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from compd.configuration import Machine
 
 _STATE = "compd.page.workbench.diagnosing:Diagnosing"
-# It ends as soon as its page is drawn.
+# The worker ends as soon as its page is drawn.
 LIMITS = WorkerLimits(memory_mb=2000, idle_s=1.0)
-# The longest that was seen took some minutes.
+# Limits of a diagnosis; the longest known one took some minutes.
 DIAGNOSIS_S = 1800.0
 PAGE_S = 120.0
 
@@ -73,7 +73,7 @@ class DiagnosisJob:
 
     @property
     def has_ended(self) -> bool:
-        """Whether nothing more comes."""
+        """Whether the diagnosis has ended."""
         return self._ended.is_set()
 
     @property
@@ -82,7 +82,7 @@ class DiagnosisJob:
         return gzip.decompress(self._page) if self._page else b""
 
     def cancel(self) -> None:
-        """End it, or the drawing of its pictures; without effect after its end."""
+        """Cancel it, or the drawing of its pictures; no effect after its end."""
         if self.state == "running":
             self.state = "cancelled"
         self._worker.end()
@@ -92,7 +92,7 @@ class DiagnosisJob:
         self._ended.wait(timeout_s)
 
     def summary(self) -> dict[str, Any]:
-        """As plain data, without the result.
+        """The state as plain data, without the result.
 
         `page` : whether there is one, None while it may still come.
         """
@@ -108,7 +108,7 @@ class DiagnosisJob:
         }
 
     def outcome(self) -> dict[str, Any]:
-        """What it has found, as plain data."""
+        """The findings as plain data."""
         return {"text": self.text, "result": self.result, "evidence": self.evidence}
 
     def _note_step(self, text: str) -> None:

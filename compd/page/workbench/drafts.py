@@ -1,4 +1,4 @@
-"""Effects that are being written in a browser: tried as those of the library are, and kept nowhere."""
+"""Drafts of effects in browsers: tried like those of the library, never stored."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from compd.comparison import Comparison
 from compd.model.effects import Effect
 from compd.page.workbench.candidates import Candidates
 
-# So many browsers can write at once.
+# Most drafts: browsers that can write at once.
 MOST = 16
 _DIGITS = 12
 
 
 class Drafts:
-    """The newest drafts beside one comparison, each under a name of its content: `ram_growth@3f0c9b12a4d7`."""
+    """The newest drafts beside one comparison, each named after its content: `ram_growth@3f0c9b12a4d7`."""
 
     def __init__(self, comparison: Comparison, library: Candidates) -> None:
-        """library : the effects that are known; rows count in a draft's fit as in theirs."""
+        """library : the known effects; a draft's fit has the same row weights."""
         self._comparison, self._library = comparison, library
         self._candidates: dict[str, Candidates] = {}
 
@@ -28,7 +28,7 @@ class Drafts:
         return {name: next(iter(candidates.library.values())) for name, candidates in self._candidates.items()}
 
     def add(self, effect: Effect) -> str:
-        """Keep a draft, in place of the oldest where there are too many; its name."""
+        """Keep a draft, replacing the oldest beyond the limit; return its name."""
         text = json.dumps(effect.declared, sort_keys=True)
         name = f"{effect.id}@{hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]}"
         candidates = self._candidates.pop(name, None)
@@ -38,6 +38,6 @@ class Drafts:
         return name
 
     def find(self, name: str) -> tuple[Candidates, str]:
-        """Where an effect is tried, and its id there: a draft, or whatever else is known by that name."""
+        """The candidates that contain an effect, and its id there: a draft, or any other effect of that name."""
         candidates = self._candidates.get(name)
         return (self._library, name) if candidates is None else (candidates, name.partition("@")[0])

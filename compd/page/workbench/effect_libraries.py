@@ -1,4 +1,4 @@
-"""Files of effects for kinds of machines: those that come with compd, and those beside the page's model files."""
+"""Files of effects for kinds of machines: compd's own, and those beside the page's model files."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from pathlib import Path
 from compd.configuration import shipped_effects
 from compd.errors import Problem, StateError
 
-# Of the file of one's own effects, beside the model files.
+# Name of the file of one's own effects, beside the model files.
 OWN_NAME = "own.effects.yaml"
-# Of a file of effects beside the model files.
+# Suffix of a file of effects beside the model files.
 FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}[.-]effects\.yaml")
 
 
 class EffectLibraries:
-    """What a browser may choose from, by name. directory : of the files beside the shipped ones; need not be there."""
+    """The choices of a browser by name. directory : of the files beside the shipped ones; may be missing."""
 
     def __init__(self, directory: Path, but: str) -> None:
-        """but : the file of one's own effects, which is there in any case."""
+        """but : the file of one's own effects, which is always used."""
         self._directory, self._but = directory, but
 
     def names(self) -> list[str]:
@@ -30,7 +30,7 @@ class EffectLibraries:
         return [*shipped_effects(), *sorted(name for name in files if FILE_NAME.fullmatch(name) and name != self._but)]
 
     def sources(self, names: Iterable[str]) -> list[str]:
-        """Each as `--effects` takes it. Raises StateError for a name that is none of them."""
+        """Each as an argument of `--effects`. Raises StateError for an unknown name."""
         known = self.names()
         chosen = list(dict.fromkeys(names))
         for name in chosen:

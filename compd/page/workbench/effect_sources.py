@@ -1,4 +1,4 @@
-"""The effects that a person tries beside those of compd: of libraries that were chosen, and of one's own."""
+"""Effects tried in addition to compd's: of the chosen libraries, and one's own."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class EffectSources:
         self._gathered = self.own.version
 
     def refresh(self) -> bool:
-        """Gather anew where somebody has changed the file of one's own effects; whether it was changed."""
+        """Read again if the file of one's own effects has changed; return whether it has."""
         self.own.reload()
         if self._gathered == self.own.version:
             return False
@@ -45,7 +45,7 @@ class EffectSources:
         return True
 
     def use(self, libraries: Sequence[str]) -> bool:
-        """Choose other libraries; whether they are others. Raises CompdError where one is faulty: none changes then."""
+        """Choose libraries; return whether they differ. Raises CompdError for a faulty one; none changes then."""
         if list(libraries) == self.libraries:
             return False
         before, self.libraries = self.libraries, list(libraries)
@@ -58,14 +58,14 @@ class EffectSources:
 
     @property
     def paths(self) -> list[str]:
-        """Of every file that has effects."""
+        """Paths of all files with effects."""
         return [*self.libraries, *([str(self.own.path)] if self.own.effects else [])]
 
     def paths_of(self, effects: Collection[str]) -> list[str]:
-        """Of the files that have these effects."""
+        """Paths of the files with these effects."""
         wanted = {self.path_of(effect) for effect in effects}
         return [path for path in self.paths if path in wanted]
 
     def path_of(self, effect: str) -> str | None:
-        """Of the file that has an effect; None where it is one of compd's, or unknown."""
+        """Path of the file with an effect; None for one of compd's or an unknown one."""
         return self._source_by_effect.get(effect)

@@ -1,4 +1,4 @@
-"""The text of a file of effects, changed entry by entry: what people wrote beside an entry stays as it is.
+"""The text of a file of effects, edited entry by entry; all other text stays unchanged.
 
 The text is cut where the parser says that an entry begins and ends. A round trip through ruamel.yaml would write every
 entry anew, with other indentation and line breaks, and lose the comment before an entry that is deleted.
@@ -19,14 +19,14 @@ from compd.model.library import EFFECTS_FILE
 
 _KEY = "effects"
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-# Of a mapping that is written in one line.
+# Style of a mapping written in one line.
 _WIDTH = 110
 
 Declaration = Mapping[str, Any]
 
 
 class _QuotingDumper(yaml.SafeDumper):
-    """Texts in quotes, but for plain words: no reader of YAML takes them for numbers."""
+    """Texts in quotes except plain words, so that no YAML reader takes them for numbers."""
 
 
 def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
@@ -38,7 +38,7 @@ _QuotingDumper.add_representer(str, _represent_text)
 
 
 def entries_of(text: str, path: Path) -> list[Declaration]:
-    """The effects that a text declares; none where it holds comments alone.
+    """The effects declared by a text; none for comments alone.
 
     path : of the file, for messages. Raises ConfigurationError where it is no YAML.
     """
@@ -50,7 +50,7 @@ def entries_of(text: str, path: Path) -> list[Declaration]:
 
 
 def with_entry(text: str, declaration: Declaration, path: Path) -> str:
-    """The text with this effect: in the place of the one that has its id, or behind all others.
+    """The text with this effect: replacing the one with its id, or at the end.
 
     Raises StateError where the text is written so that an entry cannot be added.
     """
@@ -71,7 +71,7 @@ def with_entry(text: str, declaration: Declaration, path: Path) -> str:
 
 
 def without_entry(text: str, effect: str, path: Path) -> str:
-    """The text without the effect that has this id. Raises StateError where there is none, or it cannot be cut out."""
+    """The text without the effect of this id. Raises StateError if it is missing or cannot be cut out."""
     entries = entries_of(text, path)
     ids = [str(entry.get("id")) for entry in entries]
     if effect not in ids:
@@ -89,14 +89,14 @@ def _written(declaration: Declaration, indent: str) -> str:
 
 
 def _checked(text: str, wanted: Sequence[Declaration], path: Path) -> str:
-    """The text, if it declares exactly these effects; else StateError."""
+    """The text if it declares exactly these effects. Raises StateError otherwise."""
     if entries_of(text, path) != [dict(entry) for entry in wanted]:
         raise _by_hand(path)
     return text
 
 
 def _span(text: str, place: int, path: Path) -> tuple[int, int, str]:
-    """Where an entry begins and ends in the text, from its dash's line to the end of its last; and its indentation."""
+    """Start and end of an entry in the text (whole lines), and its indentation."""
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     if isinstance(root, yaml.MappingNode):
         root = next((value for key, value in root.value if key.value == _KEY), root)
@@ -111,7 +111,7 @@ def _span(text: str, place: int, path: Path) -> tuple[int, int, str]:
 
 
 def _end(node: yaml.Node) -> int:
-    """Behind the last character of a node; a collection in block style ends where the next one begins."""
+    """End of a node; a collection in block style ends at the start of the next one."""
     if isinstance(node, yaml.CollectionNode) and node.value and not node.flow_style:
         last = node.value[-1]
         return _end(last[1] if isinstance(last, tuple) else last)

@@ -1,4 +1,4 @@
-"""A formula as it is typed: every problem with the field that it concerns, and the names that are no column yet."""
+"""Check of a formula while it is typed: every problem with its field, and names that are no column yet."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FIELDS = ("id", "port", "formula", "axis", "gives", "parameters", "physics", "s
 
 
 class FieldProblem(NamedTuple):
-    """What is wrong with one field of the form.
+    """A problem with one field of the form.
 
     field : key of the declaration, "" for none. axis : of the formula. parameter, part : `low`, `unit` ... of one.
     character : in the formula, from 1; None where not known.  text : in words.
@@ -36,7 +36,7 @@ class FieldProblem(NamedTuple):
 
 
 class Checked(NamedTuple):
-    """A declaration that was looked at.
+    """A checked declaration.
 
     effect : None where it has a mistake.  problems : of its fields; of an effect without mistake, why it is not tried.
     missing : names in the formula that are neither columns nor parameters.
@@ -53,12 +53,12 @@ class Checked(NamedTuple):
 
 
 def check(declaration: Mapping[str, Any], rows: Observations, present: Sequence[str] = ()) -> Checked:
-    """Look at a declaration as it is typed. rows : of the recording. present : ids of the model's effects."""
+    """Check a declaration while it is typed. rows : of the recording. present : ids of the model's effects."""
     missing = _missing(declaration)
     effect, problems = _effect(declaration)
     if effect is None:
         if not any(_place(problem).field == "formula" for problem in problems):
-            # a field that is not filled in yet must not hide a mistake in the formula
+            # an empty field must not hide a mistake in the formula
             stand_in, further = _effect(_with_stand_ins(declaration, missing))
             problems += [problem for problem in further if _place(problem).field == "formula"]
             problems += _reasons_not_to_try(stand_in, rows) if stand_in else []
@@ -86,7 +86,7 @@ def _reasons_not_to_try(effect: Effect, rows: Observations) -> list[Problem]:
 
 
 def _with_stand_ins(declaration: Mapping[str, Any], missing: Sequence[str]) -> dict[str, Any]:
-    """The declaration's formula with nothing else that could be wrong. missing : names that will be parameters."""
+    """The declaration's formula in an otherwise valid declaration. missing : names that will be parameters."""
     parameters = declaration.get("parameters")
     names = (*(parameters if isinstance(parameters, Mapping) else ()), *missing)
     stand_in = {"unit": "", "plausible": [0.5, 1], "source": ""}
@@ -98,7 +98,7 @@ def _with_stand_ins(declaration: Mapping[str, Any], missing: Sequence[str]) -> d
 
 
 def _missing(declaration: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names in the formula that can be nothing but parameters, and are none yet."""
+    """Names in the formula that can only be parameters, and are not declared yet."""
     formula, parameters = declaration.get("formula"), declaration.get("parameters")
     texts = formula.values() if isinstance(formula, Mapping) else [formula]
     known = {*ANYWHERE, *OF_LINK, *OF_READING, *FUNCTIONS, *NUMBERS, "lag"}
@@ -128,7 +128,7 @@ def _field_problems(problems: Sequence[Problem], declaration: Mapping[str, Any])
 
 
 def words(problem: Problem, typed: Sequence[object] = ()) -> str:
-    """A problem without its place, and without what stands in the field beside it."""
+    """A problem without its location, and without the text of its field."""
     value = "" if problem.value in ("", "None") or problem.value in typed else f" ({problem.value})"
     text = f"{problem.what}{value}"
     text += f"; allowed: {problem.allowed}" if problem.allowed else ""

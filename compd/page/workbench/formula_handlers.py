@@ -1,4 +1,4 @@
-"""What a browser asks while a person writes an effect: what a formula may name, what is wrong with it, to keep it."""
+"""Requests while a person writes an effect: names for formulas, check, saving."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ async def _form(request: Request, workbench: OpenWorkbench) -> Response:
 
 
 async def _check(request: Request, workbench: OpenWorkbench) -> Response:
-    """It changes nothing, so that everybody may."""
+    """Allowed to everyone, since it changes nothing."""
     declaration = _declaration(await keys_of(request))
     return plain(await workbench.ask(f"{_QUESTIONS}checked", declaration))
 
 
 async def _save(request: Request, workbench: OpenWorkbench) -> Response:
-    """Keep an effect, or with `delete` take one out; the answer is the summary."""
+    """Save an effect, or with `delete` remove one; the answer is the summary."""
     keys = await keys_of(request)
     if not may_change(request):
         return refused(LOOKS_ONLY, 403)
@@ -39,7 +39,7 @@ async def _save(request: Request, workbench: OpenWorkbench) -> Response:
 
 
 def _declaration(keys: Mapping[str, Any]) -> dict[str, Any]:
-    """The effect in a request. Raises HTTPException for anything else, StateError for what no file can hold."""
+    """The effect in a request. Raises HTTPException for any other body, StateError for text that no file can hold."""
     declaration = keys.get("declaration")
     if not isinstance(declaration, dict):
         raise HTTPException(400, "declaration is a mapping: id, port, formula ...")

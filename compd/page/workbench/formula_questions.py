@@ -1,4 +1,4 @@
-"""Effects as a person writes them, asked of a workbench in its worker: what a formula may name, what is wrong in it."""
+"""Questions to a workbench in its worker about effects being written: names for formulas, problems."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _NUMBERS = {"pi": "3.14159...", "deg": "radians in a degree"}
 
 
 def offered(rows: Observations) -> dict[str, Any]:
-    """What a formula on this recording may consist of: ports, columns by port, functions; as plain data."""
+    """Elements of a formula on this recording: ports, columns by port, functions; as plain data."""
     known = "kinematics" in rows.available
     ports = [
         port
@@ -74,7 +74,7 @@ def _is_met(need: str, rows: Observations) -> bool:
 
 
 def form(workbench: Workbench) -> dict[str, Any]:
-    """What a formula may consist of, and the effects that are kept."""
+    """Elements of a formula, and the saved effects."""
     own = workbench.sources.own
     return {
         **offered(workbench.opened.aligned.rows),
@@ -85,7 +85,7 @@ def form(workbench: Workbench) -> dict[str, Any]:
 
 
 def checked(workbench: Workbench, declaration: dict[str, Any]) -> dict[str, Any]:
-    """What is wrong with an effect; one without mistake is tried, under the name of a draft."""
+    """Problems of an effect; a valid one is tried under the name of a draft."""
     opened = workbench.opened
     present = [fitted.effect.id for fitted in opened.model.fitted]
     result = check(declaration, opened.aligned.rows, present)
@@ -97,12 +97,12 @@ def checked(workbench: Workbench, declaration: dict[str, Any]) -> dict[str, Any]
 
 
 def saved(workbench: Workbench, declaration: dict[str, Any], replace: bool) -> dict[str, Any]:
-    """Keep an effect; the summary. Raises as `OwnEffects.save`."""
+    """Save an effect; return the summary. Raises as `OwnEffects.save`."""
     workbench.sources.own.save(declaration, replace)
     return workbench.summary()
 
 
 def deleted(workbench: Workbench, effect: str) -> dict[str, Any]:
-    """Take a kept effect out; the summary. Raises as `OwnEffects.delete`."""
+    """Remove a saved effect; return the summary. Raises as `OwnEffects.delete`."""
     workbench.sources.own.delete(effect)
     return workbench.summary()

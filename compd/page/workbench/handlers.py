@@ -1,4 +1,4 @@
-"""What a browser asks of an open recording: numbers, rows to draw, effects, trials, steps."""
+"""Requests about an open recording: numbers, rows to draw, effects, trials, steps."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from starlette.responses import Response
 from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
 from compd.page.workbench.open_workbench import OpenWorkbench
 
-# Numbers of some 100,000 rows.
+# Largest body (bytes): the numbers of some 100,000 rows.
 LONGEST_ROWS_BYTES = 1_000_000
 
 
 class Handler(NamedTuple):
-    """What answers at an address below that of an open recording."""
+    """A handler at an address below that of an open recording."""
 
     path: str
     answer: Callable[[Request, OpenWorkbench], Awaitable[Response]]
@@ -28,7 +28,7 @@ async def _summary(request: Request, workbench: OpenWorkbench) -> Response:
 
 
 async def _rows(request: Request, workbench: OpenWorkbench) -> Response:
-    """Those that pictures show; `all`: every row, to choose from."""
+    """Rows shown in pictures; `all`: every row, for selection."""
     return _numbers(await workbench.ask("rows", "all" in request.query_params))
 
 
@@ -45,7 +45,7 @@ async def _trial(request: Request, workbench: OpenWorkbench) -> Response:
 
 
 async def _step(request: Request, workbench: OpenWorkbench) -> Response:
-    """`dry_run`: what it would do. Else it is done, and the answer is the summary."""
+    """`dry_run`: preview the step. Else make it; the answer is the summary."""
     keys: Any = await keys_of(request)
     kind, effect, revision = str(keys.get("kind")), str(keys.get("effect", "")), keys.get("revision")
     if keys.get("dry_run"):

@@ -1,4 +1,4 @@
-"""Changes of the model from the page: what a step would do, as for `--dry-run`, then the step itself."""
+"""Changes of the model from the page: preview of a step, as with `--dry-run`, then the step itself."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from compd.text import nan_to_null
 
 
 def proposed(opened: OpenedRecording, kind: str, effect: str, library: Mapping[str, Effect]) -> OpenedRecording:
-    """The recording with the model after a step that is not written yet.
+    """The recording with the model after a proposed step.
 
     kind : "add", "remove" or "fit".  effect : the id that is added or removed.
     Raises CompdError where the step cannot be made, StateError for another kind.
@@ -37,12 +37,12 @@ def proposed(opened: OpenedRecording, kind: str, effect: str, library: Mapping[s
 
 
 def write(opened: OpenedRecording) -> None:
-    """Keep a proposed model. Raises StateError where the disk refuses."""
+    """Write a proposed model. Raises StateError if the disk refuses."""
     opened.model.write(opened.model_path)
 
 
 def undone(opened: OpenedRecording) -> OpenedRecording:
-    """Take the last step back, in the file. Raises StateError where there is none."""
+    """Undo the last step in the file. Raises StateError if there is none."""
     path = opened.model_path
     if not path.exists():
         raise StateError(Problem(where=str(path), what="has no step to undo"))

@@ -1,4 +1,4 @@
-"""What is open in the page: a workbench in a worker, a second one that plans, and the newest diagnosis."""
+"""Open files of the page: a workbench in a worker, a second one for plans, and the newest diagnosis."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _WORKBENCH = "compd.page.workbench.workbench:Workbench"
 # Opening of 500,000 rows took 7 s on two busy processors.
 LIMITS = WorkerLimits(memory_mb=2000, opening_s=120.0, idle_s=600.0)
 PLANNER_LIMITS = WorkerLimits(memory_mb=2000, opening_s=120.0, idle_s=300.0)
-# For a comparison, candidates, a card, a trial or a step, and for a plan.
+# Limits for a comparison, candidates, a card, a trial or a step, and for a plan.
 ANSWER_S, PLAN_S = 60.0, 300.0
 
 
@@ -30,7 +30,7 @@ class OpenWorkbench:
     def __init__(
         self, workers: Workers, diagnoses: Diagnoses, path: Path, model_path: Path, machine: Path | None
     ) -> None:
-        """diagnoses : those that run in the same server. machine : the page's configuration."""
+        """diagnoses : the running ones of the same server. machine : the page's configuration."""
         self._path = path
         self._diagnoses = diagnoses
         self.diagnosis: DiagnosisJob | None = None
@@ -40,12 +40,12 @@ class OpenWorkbench:
 
     @property
     def libraries(self) -> list[str]:
-        """Files of effects that were chosen."""
+        """The chosen files of effects."""
         return [] if self.worker.kept is None else list(self.worker.kept["libraries"])
 
     @property
     def is_busy(self) -> bool:
-        """Whether somebody waits for it."""
+        """Whether a request waits for it."""
         runs = self.diagnosis is not None and not self.diagnosis.has_ended
         return runs or self.worker.questions + self.planner.questions > 0
 
@@ -62,11 +62,11 @@ class OpenWorkbench:
         return await self.worker.ask(_full_name(question), *given, seconds=seconds)
 
     async def ask_planner(self, question: str, *given: Any, seconds: float = ANSWER_S) -> bytes:
-        """As `ask`, of a workbench of its own: plans take minutes, and are cancelled."""
+        """As `ask`, in a second workbench: plans take minutes, and are cancelled."""
         return await self.planner.ask(_full_name(question), *given, seconds=seconds)
 
     async def diagnose(self) -> None:
-        """Begin a diagnosis, unless one runs. Raises StateError where too many run in the server."""
+        """Begin a diagnosis unless one runs. Raises StateError if too many run in the server."""
         last = self.diagnosis
         if last is not None and last.state == "running":
             return
@@ -80,7 +80,7 @@ class OpenWorkbench:
         self.diagnosis = self._diagnoses.begin(self._path, model, machine, self._revision, diagnosed["effects"])
 
     def diagnosis_summary(self, shown: str = "") -> dict[str, Any]:
-        """The newest: how many changes it is `behind`, and what it has found; `state` is "none" before the first.
+        """The newest diagnosis: findings, changes since then (`behind`); `state` is "none" before the first.
 
         shown : id of that whose outcome the browser has already, which is left out.
         """

@@ -1,4 +1,4 @@
-"""A recording that is open in the page, with its machine's model: what a browser shows of both."""
+"""An open recording with its machine's model, as data for a browser."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from compd.page.packed import packed
 from compd.plugins import NO_CODE
 from compd.text import nan_to_null
 
-# Pictures have about so many rows at most; numbers are always of all rows.
+# Approximate limit of rows in pictures; numbers always use all rows.
 MOST_PICTURED = 5000
-# What became of a row, in the order of their numbers.
+# States of a row, in the order of their codes.
 ROW_STATES = ("used", "outlier", "left out")
 _SEED = 1
 
@@ -46,7 +46,7 @@ class OpenedRecording:
 
     @cached_property
     def pictured(self) -> IntArray:
-        """(R,) rows that pictures show, rising: all, or evenly drawn among them."""
+        """(R,) rows shown in pictures, ascending: all, or an even selection."""
         count = len(self.aligned.rows)
         if count <= MOST_PICTURED:
             return np.arange(count)
@@ -56,7 +56,7 @@ class OpenedRecording:
 
     @property
     def places_mm(self) -> FloatArray:
-        """(N, 3) where the tip is without effects, mm."""
+        """(N, 3) tip positions without effects, mm."""
         return self.aligned.nominal_tip_mm
 
     def summary(self) -> dict[str, Any]:
@@ -100,7 +100,7 @@ class OpenedRecording:
         return plain
 
     def rows(self, *, every: bool = False) -> bytes:
-        """What pictures show of each row: its number, time, place, residual, state, session and quantities.
+        """Data of each row for pictures: number, time, position, residual, state, session and quantities.
 
         every : of all rows, and not only of those that are pictured.
         """
@@ -123,7 +123,7 @@ class OpenedRecording:
 
 
 def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) -> OpenedRecording:
-    """Open a recording and the model of its machine, which is begun where the file is not there.
+    """Open a recording and the model of its machine; a missing model file gives a new model.
 
     Of a recording that is too long for the memory a sample is opened, spread evenly.
     Raises CompdError with every problem of either.
@@ -133,7 +133,7 @@ def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) 
 
 
 def model_of(path: Path | None, aligned: AlignedRecording) -> ModelFile:
-    """The model of a recording's machine: of the file, or begun where it is not there.
+    """The model of a recording's machine, from the file or new if that is missing.
 
     Raises CompdError, also where an effect is code: a browser can bring a model file, and the page runs none.
     """

@@ -1,4 +1,4 @@
-"""Effects of one's own beside the page's model files: one file that people write, and the page."""
+"""Effects of one's own beside the page's model files: one file, written by people and by the page."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from compd.model.formula import formula_effect
 from compd.model.library import gather_effects, load_library
 from compd.page.workbench.effects_text import Declaration, entries_of, with_entry, without_entry
 
-# An effect that is searched in more combinations of its constants, or has more numbers, takes a page's time.
+# Most combinations of searched constants, and most numbers, of an effect: more would take too long in a page.
 MOST_COMBINATIONS = 100
 MOST_NUMBERS = 36
 
-# Several workbenches may have the same file.
+# Lock of the file, since several workbenches may have it open.
 _WRITING = threading.Lock()
 
 
 class OwnEffects:
-    """Those in one file, which need not be there.
+    """The effects in one file, which may be missing.
 
     Attributes
     ----------
@@ -79,13 +79,13 @@ class OwnEffects:
             self._write(with_entry(self._text(), declaration, self.path))
 
     def delete(self, effect: str) -> None:
-        """Take an effect out of the file; the file as well where nothing is left in it. Raises StateError as `save`."""
+        """Remove an effect from the file, and the file if it is empty then. Raises StateError as `save`."""
         with _WRITING:
             self._refuse_faulty()
             self._write(without_entry(self._text(), effect, self.path))
 
     def _refuse_faulty(self) -> None:
-        """Raise StateError where somebody wrote a mistake into the file, which this page must not write over."""
+        """Raise StateError for a faulty file, which this page must not overwrite."""
         self.reload()
         if self.problems and not self.declarations:
             raise StateError(self.problems)
@@ -105,7 +105,7 @@ class OwnEffects:
 
 
 def library_id_problems(name: object, where: str) -> list[Problem]:
-    """One where the id is that of an effect that comes with compd."""
+    """A problem if the id is that of an effect of compd's library."""
     if not isinstance(name, str) or name not in load_library():
         return []
     what, step = "this id is taken, by the library of compd", "give it another one"
@@ -113,7 +113,7 @@ def library_id_problems(name: object, where: str) -> list[Problem]:
 
 
 def too_large(effect: Effect, where: str) -> list[Problem]:
-    """Why a page does not try an effect: it would take a person's patience."""
+    """Reasons why a page does not try an effect: it would take too long."""
     problems = []
     combinations = math.prod(len(constant.grid) for constant in effect.constants)
     if combinations > MOST_COMBINATIONS:

@@ -1,6 +1,6 @@
-"""How the files of a plan end, by their format."""
+"""Suffixes of a plan's files by format."""
 
 from __future__ import annotations
 
-# As the guide on planned measurements calls them.
+# Names as in the guide on planned measurements.
 ENDINGS = {"plan": "plan.csv", "sa": "targets.txt", "csv": "targets.csv", "gcode": "plan.ngc"}

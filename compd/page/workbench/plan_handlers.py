@@ -1,4 +1,4 @@
-"""What a browser asks to plan the next measurement: what there is to choose, the plan, and its files."""
+"""Requests for planning the next measurement: the choices, the plan, and its files."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _QUESTIONS = "compd.page.workbench.plan_questions:"
 
 
 async def _form(request: Request, workbench: OpenWorkbench) -> Response:
-    """`rivals`: ids with commas, of which the limits of a machine of an external model depend."""
+    """`rivals`: ids with commas; the limits of a machine with an external model depend on them."""
     names = [name for name in request.query_params.get("rivals", "").split(",") if name]
     return plain(await workbench.ask(f"{_QUESTIONS}form", names))
 
 
 async def _plan(request: Request, workbench: OpenWorkbench) -> Response:
-    """It changes nothing, so that everybody may. It is cancelled by closing the connection."""
+    """Allowed to everyone, since it changes nothing. Closing the connection cancels it."""
     keys = await keys_of(request)
     planned = workbench.ask_planner(f"{_QUESTIONS}planned", workbench.libraries, keys, seconds=PLAN_S)
     return plain(await while_asked(request, planned))
@@ -45,7 +45,7 @@ async def _file(request: Request, workbench: OpenWorkbench) -> Response:
 
 
 def _query_number(request: Request, name: str, least: float) -> float | None:
-    """A number of the address; None where it has none. Raises CompdError for anything else."""
+    """A number in the address; None if absent. Raises CompdError for anything else."""
     text = request.query_params.get(name, "")
     if not text:
         return None

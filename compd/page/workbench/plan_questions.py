@@ -1,4 +1,4 @@
-"""The next measurement, asked of a workbench in its worker: what there is to choose, the plan, and its files."""
+"""Questions to a workbench in its worker about the next measurement: the choices, the plan, and its files."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from compd.page.workbench.workbench import Workbench
 from compd.plan_file import TIP_COLUMNS
 from compd.planning import DWELL_S, MeasurementPlan, PlanFormat, recorded_limits, recorded_settings
 
-# Plans whose files can still be downloaded.
+# Most plans whose files can still be downloaded.
 _MOST_KEPT = 8
 
 
 def form(workbench: Workbench, names: Sequence[str]) -> dict[str, Any]:
-    """Effects to choose from, and limits. names : ids of rivals, of which those of an external model depend."""
+    """Effects to choose from, and limits. names : ids of rivals, on which the limits of an external model depend."""
     library = workbench.candidates.library
     effects = [entry["effect"] for entry in workbench.candidates.ranked() if entry["status"] != "not_testable"]
     chosen = [library[name] for name in names if name in effects]
@@ -32,7 +32,7 @@ def form(workbench: Workbench, names: Sequence[str]) -> dict[str, Any]:
 
 
 def limits_of(aligned: AlignedRecording, effects: list[Effect]) -> dict[str, Any]:
-    """Within what the recording stayed, by the fields of the form; of an external model by column."""
+    """Ranges of the recording by the fields of the form; by column for an external model."""
     if aligned.model is None:
         columns = recorded_settings(aligned, effects) if effects else {}
         return {"columns": {name: [float(np.nanmin(v)), float(np.nanmax(v))] for name, v in columns.items()}}
@@ -46,7 +46,7 @@ def limits_of(aligned: AlignedRecording, effects: list[Effect]) -> dict[str, Any
 
 
 def planned(workbench: Workbench, libraries: Sequence[str], keys: dict[str, Any]) -> dict[str, Any]:
-    """The plan, or what is wrong with each field. libraries : that are chosen. keys : what a browser asks for."""
+    """The plan, or the problems of each field. libraries : the chosen ones. keys : of the browser's request."""
     workbench.look_again(libraries)
     try:
         asked = read_request(keys, workbench.candidates.library)
@@ -70,7 +70,7 @@ def planned(workbench: Workbench, libraries: Sequence[str], keys: dict[str, Any]
 
 
 def _plan_contents(plan: MeasurementPlan, workbench: Workbench, asked: PlanRequest) -> dict[str, Any]:
-    """The plan as plain data; its files can be had under `key`."""
+    """The plan as plain data; `key` gives access to its files."""
     columns = list(plan.rows[0]) if plan.rows else []
     key = hashlib.sha256(repr((plan.rivals, plan.rows)).encode()).hexdigest()[:16]
     workbench.plans.pop(key, None)
@@ -101,7 +101,7 @@ def _plan_contents(plan: MeasurementPlan, workbench: Workbench, asked: PlanReque
 
 
 def file(workbench: Workbench, key: str, shape: PlanFormat, feed: float | None, dwell_s: float | None) -> bytes:
-    """A plan as a file. feed : mm/min, and dwell_s : s, of G-code. Raises KeyError where it is not kept any more."""
+    """A plan as a file. feed : mm/min, and dwell_s : s, of G-code. Raises KeyError if it is no longer kept."""
     plan = workbench.plans[key]
     if not plan.rows:
         raise KeyError(key)

@@ -1,4 +1,4 @@
-"""A plan as a browser asks for it: rivals, rows and limits, each problem with its field, and the command line."""
+"""A browser's request for a plan: rivals, rows and limits, each problem with its field, and the command line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _FIELDS = {"workspace_M_mm": "workspace", "temperature_degC": "temperature", "th
 
 
 class PlanRequest(NamedTuple):
-    """What `plan_measurement` is given; None for what is left as in the recording."""
+    """Arguments of `plan_measurement`; None keeps the value of the recording."""
 
     rivals: list[str]
     beside: list[str]
@@ -43,7 +43,7 @@ class PlanRequest(NamedTuple):
 
 
 def read_request(keys: Mapping[str, Any], known: Collection[str]) -> PlanRequest:
-    """The request in an order's keys. known : ids of the effects that may be named.
+    """The request in an order's keys. known : ids of the available effects.
 
     Raises CompdError with every problem.
     """
@@ -75,7 +75,7 @@ _NAMES = ("rivals", "beside", "rows", "force_N", "speed_mm_per_s")
 
 
 class _Reader:
-    """Reads values that may be anything; what is wrong goes to `problems`."""
+    """Reads values of any type; adds faults to `problems`."""
 
     def __init__(self, keys: Mapping[str, Any], known: Collection[str]) -> None:
         self._keys, self._known = keys, known
@@ -141,5 +141,5 @@ class _Reader:
 
 
 def _text(*values: float) -> str:
-    """Numbers as an option takes them, all digits."""
+    """Numbers in the form of an option, with all digits."""
     return ",".join(str(int(value)) if value.is_integer() else repr(value) for value in values)

@@ -1,4 +1,4 @@
-"""The routes of the workbench: recordings to open, what a browser draws of one, trials, steps of the model."""
+"""Routes of the workbench: recordings to open, data to draw, trials, steps of the model."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from compd.page.workers.answering import CLIENT_GONE, BrowserGone
 from compd.page.workers.limits import too_many
 from compd.page.workers.workers import Workers
 
-# A model file that the page may begin.
+# Name of a model file that the page may create.
 MODEL_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\.model\.yaml")
-# What is open takes memory, and is named by whoever opens it.
+# Most open workbenches: each takes memory, and any browser can open one.
 MOST_OPEN = 32
 _NOT_OPEN = "it is not open any more: open it again"
 
@@ -36,7 +36,7 @@ _BASE = "/workbench/{recording}/{model}"
 
 
 class WorkbenchRoutes:
-    """What is open, by recording and model file; used by the event loop's thread alone."""
+    """Open workbenches by recording and model file; used by the event loop's thread alone."""
 
     def __init__(
         self,
@@ -95,7 +95,7 @@ class WorkbenchRoutes:
             return refused(str(error), 409)
 
     def _named_libraries(self, names: object) -> list[str] | None:
-        """Files of effects by their names; None where nothing is said of them. Raises HTTPException, StateError."""
+        """Files of effects by their names; None if the request omits them. Raises HTTPException, StateError."""
         if names is None:
             return None
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
@@ -103,7 +103,7 @@ class WorkbenchRoutes:
         return self._libraries.sources(names)
 
     async def _opened(self, key: str, path: Path, model_path: Path, libraries: list[str] | None) -> Response:
-        """The summary of what is open by that key now.
+        """The summary of the workbench with that key.
 
         Raises CompdError with every problem of the recording, its machine, the model and the libraries.
         """
@@ -111,7 +111,7 @@ class WorkbenchRoutes:
         if workbench is None:
             closed = self._close_oldest()
             workbench = OpenWorkbench(self._workers, self._diagnoses, path, model_path, self._machine)
-            self._open[key] = workbench  # before anything is awaited: the next request finds it
+            self._open[key] = workbench  # before any await, so that the next request finds it
         try:
             if closed is not None:
                 await asyncio.to_thread(closed.rest)
@@ -122,8 +122,7 @@ class WorkbenchRoutes:
                 await asyncio.to_thread(workbench.rest)
 
     def _close_oldest(self) -> OpenWorkbench | None:
-        """What was used longest ago, open no more, where as many are open as may be. Raises StateError where all are
-        busy."""
+        """Close the least recently used workbench if the limit is reached. Raises StateError if all are busy."""
         if len(self._open) < MOST_OPEN:
             return None
         idle = [key for key, workbench in self._open.items() if not workbench.is_busy]
@@ -132,7 +131,7 @@ class WorkbenchRoutes:
         return self._open.pop(min(idle, key=lambda key: self._open[key].worker.used_s))
 
     def _of_open(self, handler: Handler) -> Callable[[Request], Awaitable[Response]]:
-        """The handler with the workbench that the address names."""
+        """The handler with the workbench of the address."""
 
         async def handled(request: Request) -> Response:
             workbench = self._open.get("{recording}/{model}".format(**request.path_params))

@@ -1,4 +1,4 @@
-"""An effect that is tried by hand: by how much each of its numbers moves the residual.
+"""Trial of an effect by hand: the change of the residual by each of its numbers.
 
 An effect is linear in its numbers theta: the residual beside it is ``r - J theta``. A browser has J for the rows that
 it draws, and the sums over all rows that the error is computed from::
@@ -43,14 +43,14 @@ class Trial:
         return float(np.sqrt(max(left, 0.0) / self.values))
 
     def pack(self, rows: IntArray, header: Mapping[str, Any]) -> bytes:
-        """For a browser: the sums, and the columns of some rows (R,)."""
+        """Data for a browser: the sums, and the columns of some rows (R,)."""
         sums = {"square": self.square, "values": self.values, "constants": dict(self.constants)}
         arrays = {"gram": self.gram, "moment": self.moment, "columns": self.columns_um[rows]}
         return packed({**header, **sums}, arrays)
 
 
 def trial(comparison: Comparison, fitted_along: FloatArray, columns_um: FloatArray, constants: ConstantValues) -> Trial:
-    """Of an effect with these columns (N, m, P), um.
+    """The trial of an effect with these columns (N, m, P), um.
 
     fitted_along : (N, m, Q) columns of what every fit contains, um.
     """
@@ -63,7 +63,7 @@ def trial(comparison: Comparison, fitted_along: FloatArray, columns_um: FloatArr
 
 
 def _beside(fitted_along: FloatArray, columns_um: FloatArray, counted: BoolArray) -> FloatArray:
-    """(N, m, P) columns without what is fitted along makes of them on the rows that count."""
+    """(N, m, P) columns without their part that jointly fitted terms explain on the rows that count."""
     if not fitted_along.shape[2]:
         return columns_um
     along = fitted_along[counted].reshape(-1, fitted_along.shape[2])

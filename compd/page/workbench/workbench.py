@@ -1,4 +1,4 @@
-"""One recording and one model file in the page, for every browser that has them open. It lives in a worker."""
+"""One recording and one model file in the page, shared by all browsers that have them open. Lives in a worker."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from compd.recording import exclude_rows, include_rows
 
 
 class Workbench:
-    """What is open, and how often it has changed: a browser that shows an older state is told so.
+    """The open recording and the number of its changes: a browser with an older state is told so.
 
     Attributes
     ----------
@@ -42,8 +42,10 @@ class Workbench:
     def __init__(
         self, path: Path, model_path: Path, machine: Path | None, kept: Mapping[str, Any] | None = None
     ) -> None:
-        """machine : the page's configuration, which counts where the recording is of it. kept : of a workbench of the
-        same files that has ended, in whose place this one comes."""
+        """machine : the page's configuration, used for recordings of its machine.
+
+        kept : of an ended workbench of the same files, which this one replaces.
+        """
         self._path, self._model_path, self._machine = path, model_path, machine_of(path, machine)
         self.revision = 0
         self.sources = EffectSources(OwnEffects(model_path.parent / OWN_NAME))
@@ -54,18 +56,18 @@ class Workbench:
             self._go_on(kept)
 
     def _go_on(self, kept: Mapping[str, Any]) -> None:
-        """Let browsers go on with the revision that they know, where nothing has changed since."""
+        """Continue with the revision that browsers know if nothing has changed since."""
         is_same = kept["stamps"] == self._read
         try:
             if self.sources.use(kept["libraries"]):
                 self._set_candidates()
-        except CompdError:  # a library has got a mistake meanwhile
+        except CompdError:  # a library has become faulty meanwhile
             is_same = False
         self.revision = kept["revision"] + (not is_same)
 
     @property
     def kept(self) -> dict[str, Any]:
-        """From which another goes on: `revision`, `stamps` of the files, `libraries`."""
+        """The state from which a successor continues: `revision`, `stamps` of the files, `libraries`."""
         return {"revision": self.revision, "stamps": self._read, "libraries": self.sources.libraries}
 
     def _open(self) -> None:
@@ -80,12 +82,12 @@ class Workbench:
         self.revision += 1
 
     def refresh(self) -> None:
-        """Open it again where a command has changed one of its files meanwhile. Raises CompdError."""
+        """Open it again if a command has changed one of its files meanwhile. Raises CompdError."""
         if self._stamps() != self._read:
             self._open()
 
     def _stamps(self) -> list[tuple[int, int] | None]:
-        """When each file was last written, and its length; None where it is not there."""
+        """Time of the last write and length of each file; None for a missing one."""
         paths = (self._path, self._path.with_suffix(".yaml"), self._model_path)
         return [file_stamp(path) for path in paths]
 
@@ -96,7 +98,7 @@ class Workbench:
         self.drafts = Drafts(self.opened.comparison, self.candidates)
 
     def use_libraries(self, libraries: Sequence[str]) -> None:
-        """Try the effects of these files, too, as `--effects` takes them. Raises CompdError where one is faulty."""
+        """Also try the effects of these files, as with `--effects`. Raises CompdError for a faulty one."""
         if self.sources.use(libraries):
             self._set_candidates()
             self._proposal = None
@@ -111,7 +113,7 @@ class Workbench:
             self._set_candidates()
 
     def open_again(self, key: str, libraries: Sequence[str] | None) -> dict[str, Any]:
-        """For a browser that opens it: the summary, with the `key` of its address. Raises as `look_again`."""
+        """The summary for a browser that opens it, with the `key` of its address. Raises as `look_again`."""
         self.look_again(libraries)
         return {"key": key, **self.summary()}
 
@@ -129,7 +131,7 @@ class Workbench:
         }
 
     def diagnosed(self) -> dict[str, Any]:
-        """What a diagnosis is of: files `model` and `machine`, None for none; `effects`, files of effects."""
+        """Input of a diagnosis: files `model` and `machine`, None for none; `effects`, files of effects."""
         return {
             "model": str(self._model_path) if self._model_path.exists() else None,
             "machine": None if self._machine is None else str(self._machine),
@@ -171,13 +173,13 @@ class Workbench:
         return self.trial(name, variant).pack(self.opened.pictured, {"revision": self.revision})
 
     def propose(self, kind: str, effect: str) -> dict[str, Any]:
-        """What a step would do; nothing is written. Raises CompdError where it cannot be made."""
+        """Preview of a step; no file is written. Raises CompdError for an impossible step."""
         after = proposed(self.opened, kind, effect, {**self.candidates.library, **self.drafts.effects})
         self._proposal = (kind, effect, after)
         return step_summary(self.opened, after)
 
     def make(self, kind: str, effect: str, revision: int) -> dict[str, Any]:
-        """Make the step that was proposed, and write the model file; its summary.
+        """Make the proposed step, and write the model file; return the summary.
 
         revision : that of which the browser knows. Raises StateError where somebody else was quicker.
         """
@@ -192,7 +194,7 @@ class Workbench:
         return self.summary()
 
     def undo(self, revision: int) -> dict[str, Any]:
-        """Take the last step back; the summary. Raises StateError as `make`, and where there is no step."""
+        """Undo the last step; return the summary. Raises StateError as `make`, and if there is no step."""
         self._check(revision)
         after = undone(self.opened)
         self._read = self._stamps()
@@ -200,25 +202,25 @@ class Workbench:
         return self.summary()
 
     def exclude(self, rows: Sequence[int], reason: str, revision: int) -> dict[str, Any]:
-        """Leave rows out, with the reason in the sidecar; the summary.
+        """Leave rows out, with the reason in the sidecar; return the summary.
 
         Raises CompdError where they cannot be left out, StateError where somebody else was quicker.
         """
         self._check(revision)
         known = set(self.opened.aligned.recording.row.tolist())
-        if strangers := [row for row in rows if row not in known]:
+        if unknown_rows := [row for row in rows if row not in known]:
             raise RecordingError(
-                Problem(where=f"row {strangers[0]}", what="is not in the recording", allowed="rows of the recording")
+                Problem(where=f"row {unknown_rows[0]}", what="is not in the recording", allowed="rows of the recording")
             )
         return self._with_other_rows(lambda: exclude_rows(self._path, rows, reason))
 
     def include(self, rows: Sequence[int], revision: int) -> dict[str, Any]:
-        """Let rows count again; the summary. Raises as `exclude`."""
+        """Let rows count again; return the summary. Raises as `exclude`."""
         self._check(revision)
         return self._with_other_rows(lambda: include_rows(self._path, rows))
 
     def _with_other_rows(self, change: Callable[[], None]) -> dict[str, Any]:
-        """The summary after a change of the sidecar, which is taken back where nothing could be compared then."""
+        """The summary after a change of the sidecar; the change is undone if no comparison is possible then."""
         sidecar = self._path.with_suffix(".yaml")
         before = sidecar.read_bytes()
         change()
@@ -235,7 +237,7 @@ class Workbench:
             raise StateError(
                 Problem(
                     where="workbench",
-                    what="somebody else has changed the model or the rows meanwhile",
-                    next_step="look at what is there now, then do it again",
+                    what="the model or the rows were changed elsewhere meanwhile",
+                    next_step="check the present state, then repeat it",
                 )
             )

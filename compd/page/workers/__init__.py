@@ -1,1 +1,1 @@
-"""Work that takes long, in processes of its own with limits, beside the page's server."""
+"""Long computations in separate, limited processes beside the page's server."""

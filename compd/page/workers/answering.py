@@ -1,4 +1,4 @@
-"""A request that waits for a worker: it ends when its browser goes."""
+"""A request that waits for a worker; it ends when its browser disconnects."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from collections.abc import Awaitable
 
 from starlette.requests import Request
 
-# nginx's for a client that closed the connection; nobody reads it.
+# nginx's status for a client that closed the connection; it reaches no reader.
 CLIENT_GONE = 499
 
 
 class BrowserGone(Exception):
-    """Nobody waits for the answer any more."""
+    """The client has left before the answer."""
 
 
 async def while_asked(request: Request, answer: Awaitable[bytes]) -> bytes:
-    """The answer; the request's body must have been read. Raises BrowserGone where the browser goes before."""
+    """The answer; the request's body must have been read. Raises BrowserGone if the browser leaves before."""
     answering = asyncio.ensure_future(answer)
     going = asyncio.ensure_future(_gone(request))
     try:

@@ -1,4 +1,4 @@
-"""What one worker may take: memory, and time for an answer; and what a person is told who asked for more."""
+"""Limits of one worker: memory, and time for an answer; and the messages about exceeding them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _ELSEWHERE = "take less at once; or use the command line, which has no such limi
 
 @dataclass(frozen=True)
 class WorkerLimits:
-    """Of one worker.
+    """Limits of one worker.
 
     memory_mb : beyond what a new process has, MB. opening_s : to open its state, beside the time of the question.
     idle_s : without a question after which its process ends, so that its memory returns.
@@ -23,37 +23,37 @@ class WorkerLimits:
 
 
 def too_long(where: str, allowed_s: float) -> StateError:
-    """Of a question that was ended. allowed_s : for its answer, s."""
+    """The problem of a question beyond its time limit. allowed_s : for its answer, s."""
     what = "it took longer than it may, and was ended"
     return StateError(Problem(where=where, what=what, allowed=f"{allowed_s:g} s", next_step=_ELSEWHERE))
 
 
 def too_large(where: str, memory_mb: float) -> StateError:
-    """Of a process that ran out of memory."""
+    """The problem of a process that ran out of memory."""
     what = f"it needs more than {memory_mb:g} MB, and was ended"
     return StateError(Problem(where=where, what=what, allowed=f"{memory_mb:g} MB", next_step=_ELSEWHERE))
 
 
 def killed(where: str, memory_mb: float) -> StateError:
-    """Of a process that has ended without a word."""
+    """The problem of a process that has ended without a message."""
     what = f"its process was killed, as the system does where memory is short; it may use {memory_mb:g} MB"
     return StateError(Problem(where=where, what=what, next_step="try it again"))
 
 
 def cancelled(where: str) -> StateError:
-    """Of a question that nobody waits for any more."""
+    """The problem of an abandoned question."""
     return StateError(Problem(where=where, what="it was cancelled"))
 
 
 def too_many(where: str, most: int) -> StateError:
-    """Where everything that may run, or be open, is busy."""
+    """The problem of a reached limit: all that may run, or be open, is busy."""
     what = "the page computes as much as it may already"
     step = "wait until something has ended, or cancel it where it was begun"
     return StateError(Problem(where=where, what=what, allowed=f"{most} at once", next_step=step))
 
 
 def none_left(where: str) -> StateError:
-    """Where the system lets the page start no further thread or process."""
+    """The problem of a system that allows the page no further thread or process."""
     what = "the system lets the page start no further process"
     step = "wait until something has ended; in systemd, see `TasksMax` and `MemoryMax` of the page's unit"
     return StateError(Problem(where=where, what=what, next_step=step))

@@ -1,4 +1,4 @@
-"""A worker: a process that holds a state, and answers questions about it one after another, within limits."""
+"""A worker: a process that holds a state and answers questions about it in turn, within limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from compd.page.workers.limits import WorkerLimits
 
 # A process closes its connection just before its end.
 _ENDS_WITHIN_S = 5.0
-# Code with which a process ends on an exception that nobody expected.
+# Exit code of a process after an unexpected exception.
 _FAULT = 1
 
 
@@ -34,8 +34,9 @@ class Starter(Protocol):
 
 
 class Worker:
-    """Its process starts with the first question. Where it was ended - idle, killed, beyond a limit - the next question
-    starts another, which opens the state again.
+    """Its process starts with the first question. After its end the next question starts another.
+
+    It ends when idle, killed or beyond a limit; its successor opens the state again.
 
     Attributes
     ----------
@@ -47,7 +48,7 @@ class Worker:
     def __init__(
         self, starter: Starter, name: str, opening: str, arguments: Sequence[Any], limits: WorkerLimits
     ) -> None:
-        """starter : of its process. opening, arguments : see `worker_process.serve`."""
+        """starter : starts its process. opening, arguments : see `worker_process.serve`."""
         self._starter, self._limits = starter, limits
         self._opening, self._arguments = opening, arguments
         self.name = name
@@ -62,23 +63,23 @@ class Worker:
 
     @property
     def pid(self) -> int | None:
-        """Of its process; None where there is none."""
+        """Id of its process; None without a process."""
         process = self._process
         return None if process is None else process.pid
 
     @property
     def questions(self) -> int:
-        """How many are asked and not answered."""
+        """Number of unanswered questions."""
         with self._changed:
             return len(self._waiting) + (self._current is not None)
 
     def ask(self, question: str, *given: Any, seconds: float) -> Coroutine[Any, Any, bytes]:
-        """The answer, to be awaited. When the caller is cancelled, the question is, too.
+        """The answer, to be awaited. Cancelling the caller cancels the question, too.
 
         Raises what the state raises of CompdError, KeyError, IndexError and FileNotFoundError; StateError where a limit
         is met, or the process was killed.
         """
-        # counted at once, so that the next one who asks finds another worker free
+        # counted at once, so that the next request takes another worker
         return self._awaited(self.submit(question, *given, seconds=seconds))
 
     async def _awaited(self, asked: Asked) -> bytes:
@@ -107,7 +108,7 @@ class Worker:
         return asked
 
     def cancel(self, asked: Asked) -> None:
-        """End a question, and the process with it where it works on it; without effect once there is an answer."""
+        """Cancel a question, with the process that works on it; no effect once there is an answer."""
         asked.answer.cancel()
         with self._changed:
             asked.is_cancelled = True
@@ -123,7 +124,7 @@ class Worker:
         self.rest()
 
     def rest(self) -> bool:
-        """End the process unless it works on a question; whether there is none now."""
+        """End the process unless it works on a question; return whether there is none now."""
         with self._changed:
             if self._current is not None:
                 return False
@@ -132,16 +133,16 @@ class Worker:
         return True
 
     def _answer_all(self) -> None:
-        """In the worker's own thread: as long as there is a process, and until nothing was asked of it for a while."""
+        """Loop of the worker's thread: runs while there is a process, until it has been idle for a while."""
         while (asked := self._next()) is not None:
-            # a question that was cancelled while it waited is not begun
+            # skip a question that was cancelled while waiting
             if asked.answer.set_running_or_notify_cancel():
                 tell: Callable[[], None]
                 try:
                     tell = partial(asked.answer.set_result, self._answer(asked))
-                except Exception as error:  # noqa: BLE001  whoever waits hears of it
+                except Exception as error:  # noqa: BLE001  passed to the waiting caller
                     tell = partial(asked.answer.set_exception, error)
-                with self._changed:  # whoever has the answer may let the process rest
+                with self._changed:  # the receiver of the answer may end the process
                     self._current = None
                 tell()
 
@@ -178,7 +179,7 @@ class Worker:
         return answer
 
     def _without_a_word(self, asked: Asked) -> CompdError:
-        """Why the process has ended. Raises RuntimeError for a fault of compd, which the log has."""
+        """Reason of the process's end. Raises RuntimeError for a fault of compd, which is in the log."""
         with self._changed:
             process = self._process
         if process is not None:
@@ -189,14 +190,14 @@ class Worker:
         return limited.killed(self.name, self._limits.memory_mb)
 
     def _ended(self, error: CompdError) -> CompdError:
-        """`error`, with the process ended."""
+        """End the process and return `error`."""
         with self._changed:
             process = self._detached()
         _wait_for_end(process)
         return error
 
     def _started(self, asked: Asked) -> tuple[Connection, bool]:
-        """The connection to the process, and whether it is a new one. Raises StateError where none can be started."""
+        """The connection to the process, and whether it is new. Raises StateError if none can be started."""
         with self._changed:
             if self._process is not None and not self._process.is_alive():
                 self._detached()
@@ -207,7 +208,7 @@ class Worker:
             self._starter.make_room(self)
             try:
                 process, messages = self._starter.start(arguments)
-            except (OSError, EOFError) as error:  # the process that they are forked from has ended, or cannot fork
+            except (OSError, EOFError) as error:  # the fork server has ended, or cannot fork
                 raise limited.none_left(self.name) from error
             with self._changed:
                 self._process, self._messages = process, messages
@@ -216,7 +217,7 @@ class Worker:
         return messages, True
 
     def _detached(self) -> ForkServerProcess | None:
-        """The process, which is being killed and is not the worker's any more; with `_changed` held."""
+        """Detach the process, which is being killed; call with `_changed` locked."""
         process, messages = self._process, self._messages
         self._process = self._messages = None
         if process is not None:
@@ -228,7 +229,7 @@ class Worker:
 
 
 def _wait_for_end(process: ForkServerProcess | None) -> None:
-    """Until its memory has returned; without any lock, as the system may take its time."""
+    """Wait until its memory is free; without any lock, since that may take long."""
     if process is not None:
         process.join(_ENDS_WITHIN_S)
 

@@ -1,4 +1,4 @@
-"""A few workers of one kind, so that two persons do not wait for each other."""
+"""A few workers of one kind, so that two persons can work at once."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from compd.page.workers.workers import Workers
 
 
 class WorkerGroup:
-    """Whatever one of them keeps in its memory, another makes again."""
+    """Each worker has caches of its own."""
 
     def __init__(
         self, workers: Workers, count: int, name: str, opening: str, arguments: Sequence[Any], limits: WorkerLimits
     ) -> None:
-        """count : of workers. The others as of `Worker`."""
+        """count : of workers. The others as for `Worker`."""
         self._members = [workers.worker(name, opening, arguments, limits) for _ in range(count)]
         self._last_about: dict[Worker, str] = {}
 
     def free(self, about: str) -> Worker:
-        """The one with the fewest questions; of several, that which was asked about the same last, or is running."""
+        """The worker with the fewest questions; among equals the one last asked about the same, or a running one."""
 
         def order(worker: Worker) -> tuple[int, bool, bool]:
             return worker.questions, self._last_about.get(worker) != about, worker.pid is None

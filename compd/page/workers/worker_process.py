@@ -1,4 +1,4 @@
-"""What runs in a worker's process: its state is opened at the first question, and answers until nobody asks any more.
+"""Main function of a worker's process: opens its state at the first question, and answers until the end of input.
 
 A message to it is (question, arguments, whether steps are told); a question is the name of a function that gets the
 state first. Messages from it are (kind, content, kept): "step" with a text; "answer" with bytes; "error" with the
@@ -23,9 +23,9 @@ from compd.live.system import limit_memory
 from compd.text import nan_to_null
 
 _NICE = 10
-# The system ends a worker first where memory is short: at most 1000.
+# OOM score adjustment (at most 1000): the system ends a worker first if memory is short.
 _KILLED_FIRST = "700"
-# What an answer may be instead: a problem for a person, what is not there, a file that has gone.
+# Exceptions that stand for an answer: a problem for a person, a missing key, a missing file.
 ERRORS = (CompdError, KeyError, IndexError, FileNotFoundError)
 
 
@@ -35,7 +35,7 @@ def serve(messages: Connection, opening: str, arguments: Sequence[Any], kept: An
     opening : "package.module:Class" of the state. arguments : of the class, before `kept`. kept : `kept` of the state
     in whose place this one comes, None for none. memory_mb : see `WorkerLimits`.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to every process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all its processes
     threading.Thread(target=end_with_the_parent, daemon=True).start()
     _step_back()
     limit_memory(memory_mb)
@@ -64,7 +64,7 @@ def ready_to_send(answer: Any) -> bytes:
 
 
 def end_with_the_parent() -> None:
-    """The page's server may be killed, and then ends nobody."""
+    """End with the page's server, even if that is killed."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])
@@ -72,7 +72,7 @@ def end_with_the_parent() -> None:
 
 
 def _step_back() -> None:
-    """Let the daemon and the page have the processor and the memory first."""
+    """Give the daemon and the page precedence for processor and memory."""
     os.setpriority(os.PRIO_PROCESS, 0, max(_NICE, os.getpriority(os.PRIO_PROCESS, 0)))
     os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     Path("/proc/self/oom_score_adj").write_text(_KILLED_FIRST, encoding="ascii")

@@ -1,4 +1,4 @@
-"""The workers of one page's server: only so many processes at once, forked from one which has their imports."""
+"""The workers of one page's server: a limited number of processes, forked from one with their imports."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from compd.page.workers.limits import WorkerLimits, too_many
 from compd.page.workers.worker import Worker
 from compd.page.workers.worker_process import serve
 
-# Processes with their states in memory. The daemon runs on the same computer.
+# Most processes with their states in memory, on the daemon's computer.
 MOST_PROCESSES = 8
-# What they need, and the server's own process does not; in this order.
+# Imports of the workers that the server's own process does without, in this order.
 PRELOADED = [
     "compd.page.workers.single_thread",
     "compd.page.joining.joiner",
@@ -28,13 +28,12 @@ PRELOADED = [
     "compd.page.workbench.formula_questions",
     "compd.page.workbench.plan_questions",
 ]
-# The process that workers are forked from ends with the thread that started it, so that one lives as long as this
-# process does.
+# Thread that starts the fork server; it lives as long as this process, since the fork server ends with it.
 _STARTER = ThreadPoolExecutor(1, "workers")
 
 
 class Workers:
-    """Those that there are.
+    """All workers.
 
     Attributes
     ----------
@@ -42,7 +41,7 @@ class Workers:
     """
 
     def __init__(self, most: int = MOST_PROCESSES) -> None:
-        """most : processes at once."""
+        """most : limit of processes at once."""
         self._context = multiprocessing.get_context("forkserver")
         self._most = most
         self._workers: WeakSet[Worker] = WeakSet()
@@ -51,7 +50,7 @@ class Workers:
 
     def prepare(self) -> None:
         """Start the process that workers are forked from, unless it runs. It imports what they need, which takes
-        seconds; this does not wait for it. Whoever only looks at the machine needs none."""
+        seconds; this does not wait for it. Looking at the machine needs no worker."""
         with suppress(OSError):  # the start of a worker says it
             _STARTER.submit(self._ensure_running).result()
 
@@ -68,7 +67,7 @@ class Workers:
         return worker
 
     def make_room(self, wanting: Worker) -> None:
-        """End the idle process that was used longest ago where as many run as may. Raises StateError if all work."""
+        """End the least recently used idle process if the limit is reached. Raises StateError if all are busy."""
         with self._lock:
             workers = list(self._workers)
         running = [worker for worker in workers if worker.pid is not None and worker is not wanting]

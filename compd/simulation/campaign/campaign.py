@@ -30,7 +30,7 @@ from compd.simulation.truth.strengths import Strengths
 from compd.simulation.truth.workspace import posture_at_scales
 from compd.simulation.truth.world import World
 
-# Longest step in which time passes between sessions, for causes with a memory.
+# Longest step (s) of the time between sessions, for causes with a memory.
 LONGEST_WAIT_S = 300.0
 
 
@@ -115,15 +115,14 @@ class Campaign:
         self._touch(item.point - 1)
 
     def _touch(self, point: int) -> None:
-        """Bring the tip to what it touches at a point (from 0); nothing where it touches nothing."""
+        """Bring the tip to the object that it touches at a point (from 0), if there is one."""
         target_M, guess = self._target_M(point), self._postures[point]
         if target_M is not None:
             for scale_mm in probing_steps_mm(self._world, target_M, guess):
                 self._move(scale_mm, guess, PROBING_STEP_S)
 
     def _target_M(self, point: int) -> FloatArray | None:
-        """(3,) where the tip comes to rest by touch at a point (from 0), with the touch's noise; None where it does not
-        touch anything."""
+        """(3,) rest position of the tip at a point (from 0), with the touch's noise; None at a point without touch."""
         if self._balls_M is not None:
             return self._reference.measure(self._balls_M[point], self._rng)
         if self._places is None or not self._places.touched:
@@ -168,7 +167,7 @@ class Campaign:
 
 
 def steady_speed_mm_per_s(start_mm: FloatArray, end_mm: FloatArray, speed_mm_per_s: float) -> float:
-    """This speed; where the way is too short to get up to it, one that is held for half of the way."""
+    """This speed, or one that is held for half of a way too short to reach it."""
     way_mm = float(np.abs(end_mm - start_mm).max())
     if speed_mm_per_s**2 < ACCELERATION_MM_PER_S2 * way_mm:
         return speed_mm_per_s

@@ -17,7 +17,8 @@ from compd.simulation.truth.workspace import draw_points_mm
 SESSIONS = 4
 POINTS = 48
 VISITS_PER_SESSION = 96
-# A pass goes out and half the way back, with rows on the move: it shows reversals and the influence of speed.
+# Length (mm) of a pass. It goes out and half the way back, with rows in motion: it shows reversals and the influence of
+# speed.
 PASSES_PER_SESSION = 3
 PASS_MM = 24.0
 PASS_SPEEDS_MM_PER_S = (2.0, 5.0, 10.0, 20.0)

@@ -1,4 +1,4 @@
-"""A planned measurement for the simulated machine: its file read, and checked against what the machine can do."""
+"""A planned measurement for the simulated machine: reads the file and checks it against the machine's limits."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.warm_up import PARTS
 from compd.simulation.truth.workspace import STROKE_SHARE
 
-# What can be held by heaters and coolers in a laboratory, by a climate chamber and by a loading device; pressure: the
-# lowest and highest at sea level on record (WMO).
+# Limits of heaters and coolers in a laboratory, of a climate chamber and of a loading device; pressure: the lowest and
+# highest at sea level on record (WMO).
 _LIMITS_BY_UNIT = {"degC": (0.0, 60.0), "hPa": (870.0, 1085.0), "pct": (0.0, 100.0), "N": (-1000.0, 1000.0)}
 
 
@@ -63,7 +63,7 @@ def read_plan(path: Path, mechanism: Mechanism, measured: Collection[str] | None
 
 
 def _unmeasured(file: PlanFile, names: Collection[str], measured: Collection[str]) -> list[Problem]:
-    """A problem for every quantity that is to be held but that no gauge measures."""
+    """A problem for every held quantity that no gauge measures."""
     return [
         Problem(
             where=f"{file.path}:1 column {name}",
@@ -107,7 +107,7 @@ def _planned_rows(
 def _scale_mm(
     file: PlanFile, line: PlanLine, tip_M_mm: Sequence[float], mechanism: Mechanism, problems: list[Problem]
 ) -> FloatArray:
-    """(n,) for a tip in {M}, with the attitude of machine zero, all parts as drawn; nan where that is not known."""
+    """(n,) scale values for a tip in {M}, with the attitude of machine zero, all parts as drawn; nan where unknown."""
     unknown = np.full(mechanism.links, math.nan)
     if not all(map(math.isfinite, tip_M_mm)):
         return unknown

@@ -66,7 +66,7 @@ class RowLog:
         self._world, self._rng = world, rng
         self._reference = reference
         self._indicated = IndicatedTip(world.mechanism, wiring) if reference.sigma_um == 0 else None
-        # machine zero averages for a second, which leaves next to nothing of a thermometer's noise
+        # machine zero averages for a second, which removes nearly all noise of a thermometer
         self.rows = LoggedRows(quantities_at_zero=world.quantities())
 
     def add(self, session: int, visit: int, point: int | None, direction: FloatArray, measured: bool = True) -> None:
@@ -124,7 +124,7 @@ class RowLog:
         }
 
     def _from_fixed_place(self, places: FixedPlaces, point: int) -> dict[str, float]:
-        """The fixed end at which a point is measured, and of a ballbar how long it is there."""
+        """The fixed end at which a point is measured, and the length of a ballbar there."""
         end = float(places.end_of_point[point - 1] + 1)
         if self._reference.kind != "ballbar":
             return {self._reference.kind: end}

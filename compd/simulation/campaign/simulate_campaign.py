@@ -1,4 +1,4 @@
-"""A simulated measuring campaign as files: the recording with its sidecar, and what was hidden, under seal."""
+"""A simulated measuring campaign as files: recording, sidecar, and the sealed answer of the hidden causes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from compd.table_file import written_path
 
 @dataclass(frozen=True)
 class CampaignFiles:
-    """What a simulated campaign wrote.
+    """Files and figures of a simulated campaign.
 
     Attributes
     ----------

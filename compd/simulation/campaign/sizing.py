@@ -15,7 +15,7 @@ from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
 from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
 
-# One of so many visits and passes is run to measure the size of the error.
+# Number of visits and passes of which one is run to measure the size of the error.
 KEEP_ONE_IN = 6
 FIRST_SHARE = 0.2
 GOOD_ENOUGH = 0.05
@@ -79,7 +79,7 @@ class CauseSizer:
             largest = CAUSES[name].max_strength
             strength = FIRST_SHARE * largest
             floors = self.error_in_floors(self._build(name, strength))
-            # one that does next to nothing here is not made stronger than it can be anywhere
+            # a cause with a negligible effect here keeps its largest plausible strength
             causes.append(self._build(name, min(strength * WEAK_FLOORS / floors, largest) if floors > 0 else strength))
         return causes
 

@@ -84,7 +84,7 @@ def write_answer(path: Path, hidden: Sequence[SizedCause], weak: Sequence[Cause]
 
 
 def answer(hidden: Sequence[SizedCause], weak: Sequence[Cause]) -> dict[str, object]:
-    """What is hidden, how strong it is, how large it makes the tip's error; `weak` : disturbances in addition."""
+    """The hidden causes, their strengths and the tip's error that they cause; `weak` : additional disturbances."""
     causes = [sized.cause for sized in hidden]
     return {
         "effects": {cause.id: _strengths(cause) for cause in causes},
@@ -98,7 +98,7 @@ def answer(hidden: Sequence[SizedCause], weak: Sequence[Cause]) -> dict[str, obj
 
 
 def _strengths(cause: Cause) -> float | list[float]:
-    """Six digits; a number where the cause has a single strength."""
+    """Six digits; a plain number for a cause with a single strength."""
     values = [float(f"{value:.6g}") for value in cause.values]
     return values[0] if len(values) == 1 else values
 

@@ -1,4 +1,4 @@
-"""Causes for which the effect library has no effect: a diagnosis of these must name none of its effects."""
+"""Causes outside the effect library: a diagnosis of these must name none of its effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Causes in the reference instrument: it stands on the surface plate and shows another place than the tip's."""
+"""Causes in the reference instrument on the surface plate: it shows a place other than the tip's."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from compd.simulation.truth.weather import REFERENCE_degC
 MS = 1e-3
 # Signal period of the usual exposed scale, where the drawing states none.
 DEFAULT_PERIOD_MM = 0.020
-# Elements of the Iwan chain; the hysteresis loop has so many corners per branch.
+# Elements of the Iwan chain: corners per branch of the hysteresis loop.
 SLIDERS = 8
 
 

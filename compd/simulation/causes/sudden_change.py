@@ -11,7 +11,7 @@ from compd.simulation.truth.warm_up import WarmUp
 
 
 class NoCause(Cause):
-    """Adds nothing: what there is before a cause begins."""
+    """Stands for a cause before its beginning: adds nothing."""
 
     id = "nothing"
     unit = "1"

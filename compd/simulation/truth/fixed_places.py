@@ -14,7 +14,7 @@ from compd.simulation.truth.workspace import HEIGHT_SHARE, RADIUS_SHARE, STROKE_
 
 # Nominal length of the ballbar, mm: the shortest that is sold, which a machine of half a metre can carry around.
 BALLBAR_MM = 100.0
-# By how much more than its nominal length it really has: nobody calibrated it.
+# Excess (mm) of its true over its nominal length: it is not calibrated.
 BALLBAR_ERROR_MM = 0.008
 # A calibrated ball of 25 mm, and the ball of the probe that touches it.
 TOUCHED_RADIUS_MM = 12.5
@@ -27,7 +27,7 @@ RING_SHARE = 0.6
 
 @dataclass(frozen=True)
 class FixedPlaces:
-    """Where something fixed is touched or measured from.
+    """Positions of fixed objects that are touched or measured from.
 
     end_M : (E, 3) balls or pins. end_of_point : (P,) index of the end of each of the plan's points.
     tip_M : (P, 3) where the tip is nominally. scale_mm : (P, n) for that, as a controller without compensation knows.

@@ -20,14 +20,14 @@ STANDING_MM_PER_S = 0.02
 
 
 class MotorCommand(NamedTuple):
-    """Where the links are to be, (n,) mm, at the time `time_s` of the controller's clock, whichever that is."""
+    """Commanded link lengths, (n,) mm, at the time `time_s` of the controller's own clock."""
 
     time_s: float
     scale_mm: FloatArray
 
 
 class FollowMotion:
-    """The links go where a controller commands them, in a straight line from one command to the next.
+    """Motion along a controller's commands, straight from one command to the next.
 
     There is no limit of speed: that is the controller's matter, and a jump of its commands must be seen as one. Only
     the stream's own pauses, which a wire to a drive does not have, are smoothed: time on the controller's clock passes
@@ -37,10 +37,10 @@ class FollowMotion:
     point = None
 
     def __init__(self, start_mm: FloatArray) -> None:
-        """start_mm : (n,) where the links stand until the first command."""
+        """start_mm : (n,) positions of the links until the first command."""
         self._here_mm = start_mm
         self._speeds_mm_per_s: FloatArray = np.zeros_like(start_mm)
-        self._time_s: float | None = None  # where the motion is, on the controller's clock
+        self._time_s: float | None = None  # progress of the motion on the controller's clock
         self._before: MotorCommand | None = None
         self._ahead: deque[MotorCommand] = deque()
 

@@ -106,7 +106,7 @@ class Approach:
 
 
 def stopping_place_mm(start_mm: FloatArray, start_mm_per_s: FloatArray) -> FloatArray:
-    """(n,) where links stand that brake from now on."""
+    """(n,) stopping positions of links that brake from now on."""
     return start_mm + start_mm_per_s * np.abs(start_mm_per_s) / (2 * ACCELERATION_MM_PER_S2)
 
 
@@ -178,7 +178,7 @@ class SetpointMotion:
 
     @property
     def setpoint_mm(self) -> FloatArray:
-        """(n,) where the links drive to."""
+        """(n,) targets of the links."""
         return self._approach.end_mm
 
     @setpoint_mm.setter

@@ -134,7 +134,7 @@ class PlanMotion:
         return moved_s
 
     def progress(self) -> Mapping[str, Any]:
-        """For the TRUTH message: row of how many, its purpose, the present stage, and whether all is done."""
+        """Data for the TRUTH message: row and number of rows, purpose, present stage, and whether the plan is done."""
         doing = self._stage.purpose if self._stage else "done"
         return {
             "row": self._row.number,

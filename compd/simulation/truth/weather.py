@@ -40,25 +40,25 @@ class Weather:
     """An air-conditioned laboratory: sums of slow waves with seeded phases.
 
     at_zero : at time 0.
-    held : quantities that a climate chamber holds, by name with unit; they replace the waves.
+    controlled : values held by a climate chamber, by name with unit; they replace the waves.
     """
 
     def __init__(self, swing_K: float, rng: np.random.Generator, at_zero: AirAtZero = STANDARD_AIR) -> None:
         """swing_K : amplitude of the daily wave of the room's temperature."""
         self.at_zero = at_zero
-        self.held: Mapping[str, float] = {}
+        self.controlled: Mapping[str, float] = {}
         self._temperature = _phased([(period, share * swing_K) for period, share in _TEMPERATURE_WAVES], rng)
         self._pressure = _phased(_PRESSURE_WAVES_hPa, rng)
         self._humidity = _phased(_HUMIDITY_WAVES_pct, rng)
 
     def room_degC(self, time_s: float) -> float:
-        return self.held.get("temperature_room_degC", self.at_zero.temperature_degC + self._room_K(time_s))
+        return self.controlled.get("temperature_room_degC", self.at_zero.temperature_degC + self._room_K(time_s))
 
     def pressure_hPa(self, time_s: float) -> float:
-        return self.held.get("pressure_hPa", self.at_zero.pressure_hPa + self._over_zero_hPa(time_s))
+        return self.controlled.get("pressure_hPa", self.at_zero.pressure_hPa + self._over_zero_hPa(time_s))
 
     def humidity_pct(self, time_s: float) -> float:
-        return self.held.get("humidity_pct", self.at_zero.humidity_pct + self._over_zero_pct(time_s))
+        return self.controlled.get("humidity_pct", self.at_zero.humidity_pct + self._over_zero_pct(time_s))
 
     # --- departures from time 0 -----------------------------------------------------------------------
 

@@ -27,8 +27,8 @@ from compd.simulation.truth.warm_up import Heat, WarmUp
 from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero, Weather
 from compd.simulation.truth.workspace import STROKE_SHARE, draw_points_mm
 
-# What a real part's thermometer shows at most, K/s: 94 W in each kilogram of steel. One that a water jacket holds 20 K
-# away begins with ten times as much.
+# Fastest change (K/s) at a real part's thermometer: 94 W in each kilogram of steel. A part held 20 K away by a water
+# jacket begins ten times as fast.
 _FASTEST_K_PER_S = 0.2
 _FASTEST_HELD_K_PER_S = 20.0 / HELD_TIME_CONSTANT_S
 
@@ -81,7 +81,7 @@ class World:
             standing(np.zeros(self._mechanism.links))
         )
         self._rows = rows
-        self._unsolved_s = 0.0, 0.0  # since the last `advance`, and how much of it the links moved
+        self._unsolved_s = 0.0, 0.0  # time (s) since the last `advance`, and the part of it with moving links
         self.time_s = 0.0
         self.force_M_N: FloatArray = np.zeros(3)
         self.mode: Mode = "zero"
@@ -107,7 +107,7 @@ class World:
         self._readings = self._read_gauges()
 
     def move(self, time_s: float) -> None:
-        """Advance the motion alone by `time_s`; what bends and warms up with it follows with the next `advance`."""
+        """Advance the motion alone by `time_s`; bending and warming up follow with the next `advance`."""
         self.time_s += time_s
         if self.mode == "zero":
             zero_s = min(time_s, self.zero_hold_s)
@@ -152,7 +152,7 @@ class World:
 
     @property
     def unnatural_K_per_s(self) -> float:
-        """How fast its parts warm up at most, K/s, where that is faster than in nature; 0 where it is not."""
+        """Fastest warm-up (K/s) of its parts if faster than in nature; else 0."""
         natural = _FASTEST_HELD_K_PER_S if self._rows else _FASTEST_K_PER_S
         return 0.0 if natural * self._speedup <= _FASTEST_K_PER_S else natural * self._speedup
 
@@ -162,9 +162,9 @@ class World:
         Quantities that are not named are not held; a load component that is not named is 0.
         """
         parts_degC = {name: degC for name, degC in quantities.items() if name.startswith("temperature_")}
-        parts_degC.pop("temperature_room_degC", None)  # held by the weather
+        parts_degC.pop("temperature_room_degC", None)  # controlled: the weather has it
         self._warm.hold({name[len("temperature_") : -len("_degC")]: degC for name, degC in parts_degC.items()})
-        self._weather.held = quantities
+        self._weather.controlled = quantities
         self.force_M_N = np.array([quantities.get(f"force_{axis}_N", 0.0) for axis in "xyz"])
 
     def command(self, scale_mm: Sequence[float]) -> None:
@@ -181,7 +181,7 @@ class World:
         self.mode, self.zero_hold_s = "commanded", 0.0
 
     def follow(self, commands: Sequence[MotorCommand]) -> None:
-        """Go where a controller commands its drives, in a stream of commands, oldest first, without a limit of speed.
+        """Follow a controller's stream of commands, oldest first, without a limit of speed.
 
         Raises CompdError for a wrong number of values, or beyond the stroke; the machine then follows none of them.
         """
@@ -294,7 +294,7 @@ class World:
         return float(self._sensors.scale_mm(scale_mm)[int(name.removeprefix("scale_")) - 1])
 
     def look(self) -> EquilibriumState:
-        """The state where the motion is now; that of the last `advance` where the links cannot meet there."""
+        """The state at the present motion; that of the last `advance` if the links cannot meet there."""
         if self.phase == "dwelling" and np.array_equal(self._motion.position_mm, self._state.scale_mm):
             return self._state
         try:
@@ -303,7 +303,7 @@ class World:
             return self._state
 
     def quantities(self) -> dict[str, float]:
-        """What thermometers, barometer, hygrometer and load cell show without noise, by name."""
+        """Readings of thermometers, barometer, hygrometer and load cell without noise, by name."""
         return {**self._warm.thermometers_degC(), **self._air_and_load()}
 
     @property
@@ -321,14 +321,14 @@ class World:
         self._state = self._solve(scale_mm, guess)
 
     def _braking(self) -> Approach:
-        """How the links come to rest from now on."""
+        """The motion that brings the links to rest from now on."""
         return braking(self._motion.position_mm, self._motion.speeds_mm_per_s)
 
     def _leave_plan(self) -> None:
         """Release what the plan holds, except for a load."""
         if self.plan_motion:
             self._warm.hold({})
-            self._weather.held = {}
+            self._weather.controlled = {}
 
     def _solve(self, scale_mm: FloatArray, guess: Posture) -> EquilibriumState:
         return self._equilibrium.solve(scale_mm, guess, self.force_M_N)

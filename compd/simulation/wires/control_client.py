@@ -14,7 +14,7 @@ class ControlClient:
     """A connection to the control socket at `path`; a context manager that closes it."""
 
     def __init__(self, path: Path) -> None:
-        """Raises DaemonError where no simulated machine answers."""
+        """Raises DaemonError if no simulated machine answers."""
         self._path = path
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:

@@ -14,9 +14,9 @@ from compd.files import check_replaceable, write_files
 from compd.simulation.wires.simulation_directory import DAEMON_SOCKET, STATE, WRITTEN_BY
 from compd.simulation.wires.tcp_port import ANY, LOOPBACK
 
-# What a pty does not have, and a simulated line does not do; nor does anybody log in to a simulated machine.
+# Keys of a line without meaning for a simulated one: a pty lacks them, and it needs no login.
 NOT_SIMULATED = ("dtr", "rts", "rs485", "echo", "security", "tls", "user", "password_file", "client_id")
-# A plan may hold parts at any temperature, K from one another.
+# Temperature difference (K) of parts that a plan may hold.
 _HELD_APART_K = 60.0
 Port = str | tuple[str, int]
 

@@ -23,11 +23,11 @@ class SimulatedByteDevice(ABC):
         self.sense = sense
 
     @abstractmethod
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         """Receive bytes, in pieces of any size; returns the reply to complete requests, or b""."""
 
     def speak(self) -> bytes:
-        """What it says where no bytes ask it: unasked, time after time, or to a pulse of DTR; b"" where it does not.
+        """The device's next unsolicited reading, or its answer to a pulse of DTR; b"" for a device that is polled.
 
         `compd driver test` plays both. On the ptys and ports of a simulated machine it is not heard.
         """
@@ -61,7 +61,7 @@ class SimulatedRegisterDevice(ABC):
 
 
 class SimulatedPushedDevice(ABC):
-    """A device that speaks by itself; its line sends what it says.
+    """A device that pushes its values; its line sends them.
 
     period_s : how often it has something to say, s; None: as the line does.
     """

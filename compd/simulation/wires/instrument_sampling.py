@@ -1,4 +1,4 @@
-"""What a simulated instrument has seen, look by look: as a track, at a constant rate, or one point per dwell."""
+"""Samples of a simulated instrument: as a track, at a constant rate, or one point per dwell."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem
 from compd.instruments import LENGTH_AXES, POSITION_AXES, Samples
 
-# A dwell that was seen less often gives no point: an instrument takes the mean of some readings.
+# Fewest samples of a dwell that gives a point: an instrument takes the mean of some readings.
 LEAST_LOOKS = 3
 
 
@@ -38,16 +38,16 @@ class Looks:
 
     @property
     def instrument(self) -> str:
-        """What looks, in words."""
+        """The instrument in words."""
         return "tracker" if self._link is None else f"interferometer along link {self._link}"
 
     @property
     def seconds(self) -> float:
-        """Time from the first look to the last."""
+        """Time (s) from the first sample to the last."""
         return self._time_s[-1] - self._time_s[0] if self._time_s else 0.0
 
     def check_links(self, links: int) -> None:
-        """Raise CompdError where the machine has no such link. links : how many it has."""
+        """Raise CompdError if the machine has no such link. links : number of its links."""
         if self._link is not None and self._link > links:
             raise CompdError(
                 Problem(
@@ -64,18 +64,18 @@ class Looks:
         self._moving.append(measured["moving"])
 
     def track(self, unit: str = "mm", start: datetime | None = None) -> Samples:
-        """Every look, on a clock that begins at 0."""
+        """Every sample, on a clock that begins at 0."""
         return Samples(self.axes, np.array(self._values_mm), self._from_zero(), unit=unit, start=start)
 
     def at_rate(self, rate_hz: float, unit: str = "mm", start: datetime | None = None) -> Samples:
-        """Samples at equal distances in time, for files whose rows have no time; linear between looks."""
+        """Samples at equal intervals, for files without times; linear interpolation."""
         time_s = self._from_zero()
         grid_s = np.arange(int(time_s[-1] * rate_hz) + 1) / rate_hz
         columns = [np.interp(grid_s, time_s, column) for column in np.array(self._values_mm).T]
         return Samples(self.axes, np.column_stack(columns), grid_s, unit=unit, start=start)
 
     def points(self, unit: str = "mm") -> Samples:
-        """One point per dwell, without a time: the mean of its looks, named P1, P2 ..."""
+        """One point per dwell, without a time: the mean of its samples, named P1, P2 ..."""
         values = np.array(self._values_mm)
         means = [values[dwell].mean(axis=0) for dwell in self._dwells()]
         names = [f"P{number}" for number in range(1, len(means) + 1)]
@@ -85,7 +85,7 @@ class Looks:
         return np.array(self._time_s) - self._time_s[0]
 
     def _dwells(self) -> list[slice]:
-        """Looks between two motions, where there are enough of them."""
+        """Samples between two motions, if there are enough of them."""
         still = np.concatenate([[False], ~np.array(self._moving, dtype=bool), [False]])
         begins, ends = np.flatnonzero(~still[:-1] & still[1:]), np.flatnonzero(still[:-1] & ~still[1:])
         return [

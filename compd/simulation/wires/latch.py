@@ -1,4 +1,4 @@
-"""The latch of the devices on a simulated line: from a round trigger on they show what they sensed when it came."""
+"""The latch of the devices on a simulated line: they show the values sensed at the last round trigger."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from compd.simulation.wires.device import Sense, SimulatedByteDevice, SimulatedR
 
 
 class Latch:
-    """What the devices of a line have latched. Before the first trigger they show what they sense."""
+    """Latched values of a line's devices. Before the first trigger they show present values."""
 
     def __init__(self, devices: Sequence[SimulatedByteDevice | SimulatedRegisterDevice]) -> None:
         """`devices`: sense by way of the latch from now on."""
@@ -18,13 +18,13 @@ class Latch:
             device.sense = latched
 
     def close(self) -> None:
-        """The trigger has come."""
+        """Note that the trigger has come."""
         for sense in self._latched:
             sense.latch()
 
 
 class _LatchedSense:
-    """Of one device. A channel that is asked for the first time is latched then: before it, nobody knows its name."""
+    """The latch of one device. A channel is latched at its first request: its name is unknown before."""
 
     def __init__(self, sense: Sense) -> None:
         self._sense = sense
@@ -44,7 +44,7 @@ class _LatchedSense:
 
 
 class _Listener(Protocol):
-    def hear(self, data: bytes) -> bytes: ...
+    def receive(self, data: bytes) -> bytes: ...
 
 
 class TriggeredDevices:
@@ -55,18 +55,18 @@ class TriggeredDevices:
         self._devices = devices
         self._trigger = trigger
         self._latch = latch
-        self._heard = b""
+        self._received = b""
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         """Receive bytes, in pieces of any size; the replies to complete requests."""
-        *before, rest = (self._heard + data).split(self._trigger)
+        *before, rest = (self._received + data).split(self._trigger)
         replies = b""
         for requests in before:
-            replies += self._devices.hear(requests)
+            replies += self._devices.receive(requests)
             self._latch.close()
         begun = next(
             n for n in range(min(len(rest), len(self._trigger) - 1), -1, -1) if rest.endswith(self._trigger[:n])
         )
         end = len(rest) - begun
-        self._heard = rest[end:]
-        return replies + (self._devices.hear(rest[:end]) if end else b"")
+        self._received = rest[end:]
+        return replies + (self._devices.receive(rest[:end]) if end else b"")

@@ -1,4 +1,4 @@
-"""The world beside the clock: it moves whenever anybody looks, and warms up and bends in steps."""
+"""The world in real time: it moves at each access, and warms up and bends in steps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class LiveWorld:
 
     @contextmanager
     def now(self) -> Iterator[World]:
-        """The world with its motion as it is now; nobody else has it meanwhile."""
+        """The world with its present motion, for exclusive use."""
         with self._lock:
             self._world.move(self._passed_s())
             yield self._world
@@ -52,7 +52,7 @@ class LiveWorld:
             return world.sense_scale(name)
 
     def _passed_s(self) -> float:
-        """Seconds since anybody looked; called under the lock."""
+        """Seconds since the last access; called under the lock."""
         now_s = self._clock.monotonic()
         passed_s, self._last_s = now_s - self._last_s, now_s
         return passed_s

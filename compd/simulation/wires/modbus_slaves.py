@@ -56,7 +56,7 @@ class ModbusSlaves:
         self._framer = (FramerAscii if as_text else FramerSocket if over_tcp else FramerRTU)(DecodePDU(True))
         self._received = b""
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         """Receive bytes, in pieces of any size; returns the replies to complete requests."""
         self._received += data
         replies = b""
@@ -110,7 +110,7 @@ class ModbusSlaves:
         latched = self._is_trigger(unit, message)
         if latched and self._latch is not None:
             self._latch.close()
-        if unit == 0 and not self._over_tcp:  # a broadcast, which nobody answers
+        if unit == 0 and not self._over_tcp:  # a broadcast, which has no reply
             for each in self._devices.values():
                 _reply(each, message)
             return b""
@@ -129,7 +129,7 @@ class ModbusSlaves:
 
 
 def _unit_and_message(text: bytes) -> bytes:
-    """The bytes of an ASCII frame without its LRC; b"" for anything else, which a slave does not hear."""
+    """The bytes of an ASCII frame without its LRC; b"" for anything else, which a slave ignores."""
     try:
         frame = binascii.unhexlify(text.removeprefix(b":"))
     except binascii.Error:
@@ -142,7 +142,7 @@ def _crc_matches(frame: bytes) -> bool:
 
 
 def _reply(device: SimulatedRegisterDevice | None, message: bytes, latched: bool = False) -> ModbusPDU:
-    """The reply to a request; `latched`: it is the round trigger, which every register takes."""
+    """The reply to a request; `latched`: it is the round trigger, which every register accepts."""
     function = message[0]
     if len(message) < 5:
         return ExceptionResponse(function, ILLEGAL_FUNCTION)

@@ -15,12 +15,12 @@ from compd.simulation.wires.device import SimulatedPushedDevice
 from compd.simulation.wires.pushed_line import WRONG_TYPE, SimulatedPushedLine
 
 NOT_A_NUMBER = "not a number"
-# What spreadsheets and gateways write in place of a value that they do not have.
+# Text of spreadsheets and gateways for a missing value.
 NO_VALUE = b"#N/A"
 
 
 class MqttPublisher(SimulatedPushedLine):
-    """Publishes to a broker; never to that of the machine's own configuration, where real programs may listen."""
+    """Publishes to a broker other than that of the machine's own configuration, where real programs may listen."""
 
     kind = "mqtt"
     own_faults = (NOT_A_NUMBER,)

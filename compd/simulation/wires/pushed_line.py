@@ -1,4 +1,4 @@
-"""A simulated line whose devices speak by themselves: a thread that sends what they say, and the line's faults."""
+"""A simulated line with pushed values: a thread that sends them, and the line's faults."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CLOCK_ERROR_S: Mapping[str, float] = {CLOCK_BEHIND: -3600.0, CLOCK_AHEAD: 3600.0
 HELD_UP = "held up"
 # The number comes in another form than it is described: text, or an array.
 WRONG_TYPE = "wrong type"
-# How often a device speaks that does not say it itself, s.
+# Period (s) of a device without one of its own.
 PERIOD_S = 0.05
 
 
@@ -41,19 +41,19 @@ class SimulatedPushedLine(ABC):
         self._clock = clock or MonotonicClock()
         self._period_s = min((device.period_s or PERIOD_S for device in devices), default=PERIOD_S)
         self._fault: str | None = None
-        self._stuck_utc_s: float | None = None  # what a clock that stands still shows, s since 1970
+        self._stuck_utc_s: float | None = None  # time of a stopped clock, s since 1970
         self._held_up: list[tuple[Mapping[str, Any], float]] = []
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"simulated {name}", daemon=True)
 
     def start(self) -> Port:
-        """Connect or listen, and speak. Returns the port for the daemon. Raises CompdError where that cannot be."""
+        """Connect or listen, and start sending. Returns the daemon's port. Raises CompdError if that is impossible."""
         self.plug_in()
         self._thread.start()
         return self.port
 
     def stop(self) -> None:
-        """Fall silent, and close what is open."""
+        """Stop sending, and close all connections."""
         self._stop.set()
         if self._thread.ident is not None:
             self._thread.join()

@@ -81,7 +81,7 @@ DAMAGES: Mapping[str, Mapping[str, Damage]] = {
 class Listener(Protocol):
     """Receives a line's bytes and returns replies."""
 
-    def hear(self, data: bytes) -> bytes: ...
+    def receive(self, data: bytes) -> bytes: ...
 
 
 class ByteDevices:
@@ -90,8 +90,8 @@ class ByteDevices:
     def __init__(self, devices: Sequence[SimulatedByteDevice]) -> None:
         self._devices = devices
 
-    def hear(self, data: bytes) -> bytes:
-        return b"".join(device.hear(data) for device in self._devices)
+    def receive(self, data: bytes) -> bytes:
+        return b"".join(device.receive(data) for device in self._devices)
 
 
 @dataclass
@@ -215,7 +215,7 @@ class SimulatedLine:
                     os.read(fd, 4096)
                     self._apply_fault()
                 elif self._end is not None:
-                    self._hear(self._end, fd)
+                    self._receive(self._end, fd)
         self._pull_out()
 
     def _apply_fault(self) -> None:
@@ -226,19 +226,19 @@ class SimulatedLine:
             self._plug_in()
         self._applied.set()
 
-    def _hear(self, end: End, fd: int) -> None:
+    def _receive(self, end: End, fd: int) -> None:
         data = end.read(fd)
-        reply = self._listener.hear(data)
+        reply = self._listener.receive(data)
         if not reply:
             return
         self.replies += 1
-        # transmission of the request takes time as well
+        # transmission of the request takes time, too
         start_s = self._clock.monotonic() + len(data) * self._character_s
         if self._fault is not None:
             reply = self._damages[self._fault](reply)
         if self._fault == "late":
             start_s += LATE_TIMEOUTS * self._settings.timeout_s
-        if self._replies:  # in order, also behind a late one
+        if self._replies:  # in order, even behind a late one
             start_s = max(start_s, self._end_s(self._replies[-1]))
         self._replies.append(_Reply(start_s, fd, reply))
 

@@ -1,4 +1,4 @@
-"""The directory that a simulated machine runs in: one simulator at a time, and nothing of it left at the end."""
+"""The directory of a running simulated machine: one simulator at a time, emptied at the end."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DAEMON_SOCKET = "compd.sock"
 SEALED_ANSWER = "hidden.answer.json"
 PORTS = "ports"
 STATE = "state"
-# What a simulator makes, and what the daemon keeps, with the copies that a crash leaves.
+# Files of a simulator and of its daemon, with the copies that a crash leaves.
 _MADE = ((PORTS, "*"), (STATE, "*machine-zero.json*"), (STATE, "*last-readings.json*"))
 # First line of the daemon's configuration: only a file that begins so is replaced and removed.
 WRITTEN_BY = "written by `compd simulate`, gone with it."
@@ -33,7 +33,7 @@ class SimulationDirectory:
         self._lock = -1
 
     def begin(self) -> None:
-        """Take the directory, and remove what a simulator left that was killed.
+        """Take the directory, and remove the remains of a killed simulator.
 
         Raises CompdError where another simulator or a daemon runs in it, or a file would be replaced that no simulator
         wrote.
@@ -48,7 +48,7 @@ class SimulationDirectory:
         (self.path / SEALED_ANSWER).unlink(missing_ok=True)
 
     def end(self) -> None:
-        """Remove what was made, and let go of the directory."""
+        """Remove the simulator's files, and release the directory."""
         self._clear()
         os.close(self._lock)
 
@@ -100,7 +100,7 @@ class SimulationDirectory:
 
 
 def is_served(path: Path) -> bool:
-    """Whether somebody listens on the Unix socket."""
+    """Whether a process listens on the Unix socket."""
     with socket.socket(socket.AF_UNIX) as probe:
         try:
             probe.connect(str(path))

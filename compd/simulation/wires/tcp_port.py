@@ -12,7 +12,7 @@ ANY = 0
 
 @contextmanager
 def claimed_port(wanted: int) -> Iterator[int]:
-    """The configured TCP port, or 0 (any) where a daemon uses it or another simulator has claimed it.
+    """The configured TCP port, or 0 (any) if a daemon uses it or another simulator has claimed it.
 
     The daemon starts later than the simulator and binds the port itself, so a claim is a name in Linux's abstract
     namespace of Unix sockets, which goes with the process that holds it.

@@ -14,8 +14,8 @@ MM_IN_AN_INCH = 25.4
 class SimulatedNd28x(SimulatedByteDevice):
     """Shows its channel `position`; a sensor that is off gives the unit `?`."""
 
-    def hear(self, data: bytes) -> bytes:
-        """One reply for every STX among the bytes; anything else is not for this display."""
+    def receive(self, data: bytes) -> bytes:
+        """One reply for every STX among the bytes; other bytes are ignored."""
         return b"".join(self._shown() for byte in data if byte == 0x02)
 
     def _shown(self) -> bytes:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from compd_drivers.simulated.shared import CommandDevice
 
 # DL-RS1A
-LARGEST_MM = 199.9990  # what a head shows that has no value
+LARGEST_MM = 199.9990  # display of a head without a value
 RS1A_COMMAND_ERROR = "ER,{},00\r\n"
 RS1A_GO, RS1A_ALARM = "02", "16"  # judgement of a head: inside its limits, or no value
 RS1A_CODES = {"+199.9990": "over_range", "-199.9990": "under_range", "---------": "sensor_fault"}
@@ -21,13 +21,13 @@ EN1_FORMAT_ERROR = "ER,{},255\r\n"
 
 
 class SimulatedDlRs1a(CommandDevice):
-    """Shows its channels `1`, `2` ...; a sensor that is off shows the number that means `no value`."""
+    """Shows its channels `1`, `2` ...; a sensor that is off shows the number for `no value`."""
 
     terminator = b"\r\n"
 
     @property
     def error_replies(self) -> Mapping[bytes, str]:
-        """Errors of the unit, and what every head shows without a value."""
+        """Errors of the unit, and the display of every head without a value."""
         request = self.options.request
         replies = {f"ER,{request},{number}\r\n".encode(): "device_error" for number in ("00", "31")}
         state = f",{RS1A_ALARM}" if request == "MS" else ""
@@ -36,7 +36,7 @@ class SimulatedDlRs1a(CommandDevice):
         return replies
 
     def answer(self, command: str) -> str:
-        """M0: values; MS: values with each head's judgement; ER for what it does not know."""
+        """M0: values; MS: values with each head's judgement; ER for unknown commands."""
         heads_mm = [self.sense(str(head + 1)) for head in range(self.options.heads)]
         match command:
             case "M0":
@@ -61,14 +61,14 @@ class SimulatedDlEn1(CommandDevice):
 
     @property
     def error_replies(self) -> Mapping[bytes, str]:
-        """Errors of the unit, and the numbers with which every head says that it has no value."""
+        """Errors of the unit, and the numbers of every head without a value."""
         replies = {f"ER,MS,{number}\r\n".encode(): "device_error" for number in ("031", "254", "255")}
         for number, quality in EN1_CODES.items():
             replies[("MS" + f",{EN1_ERROR},{number:+010d}" * self.options.heads + "\r\n").encode()] = quality
         return replies
 
     def answer(self, command: str) -> str:
-        """MS: states and values; M0: values alone; ER for what it does not know."""
+        """MS: states and values; M0: values alone; ER for unknown commands."""
         heads_mm = [self.sense(str(head + 1)) for head in range(self.options.heads)]
         match command:
             case "MS":

@@ -1,4 +1,4 @@
-"""A Modbus module's registers, filled from what its sensors see."""
+"""A Modbus module's registers, filled from its sensors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from compd_drivers.simulated.shared import signal_for
 
 FLOATS = {"float32": "f", "float64": "d"}
 ROW = 8  # modules have their channels in rows of eight; the rest of a row reads 0
-BITS = (1, 2)  # functions that read them
+BITS = (1, 2)  # functions for reading bits
 
 
 class SimulatedRegisters(SimulatedRegisterDevice):
@@ -35,7 +35,7 @@ class SimulatedRegisters(SimulatedRegisterDevice):
             self._reach(options.identity.function, options.identity.address + len(options.identity.equals))
 
     def _reach(self, function: int, end: int) -> None:
-        """Let the map of a function go on to the end of the row before `end`."""
+        """Extend the map of a function to the end of the row before `end`."""
         self._ends[function] = max(self._ends.get(function, 0), -(-end // ROW) * ROW)
 
     @property
@@ -89,11 +89,11 @@ class SimulatedRegisters(SimulatedRegisterDevice):
         if channel.word_order == "low_first":
             words = tuple(reversed(words))
         for place, word in enumerate(words, start=channel.address):
-            bank[place] |= word  # other numbers may have the other bits
+            bank[place] |= word  # other bits may belong to other numbers
 
 
 def registers_of(channel: Any) -> int:
-    """Registers, or bits, that a channel's number reaches over."""
+    """Registers, or bits, of a channel's number."""
     if channel.type == "bit":
         return 1
     return -(-(int(channel.at_byte) + bits_of(channel.type) // 8) // 2)
@@ -104,7 +104,7 @@ def bits_of(kind: str) -> int:
 
 
 def broken(status: Any, function: int) -> int:
-    """A status that does not mean: good."""
+    """A status other than good."""
     mask = status.mask or 0xFFFF
     values = [1] if function in BITS else [1 << k for k in range(16) if mask >> k & 1]
     return next(value for value in [*values, 0] if value not in status.ok)
@@ -115,7 +115,7 @@ def _raw(channel: Any, value: float) -> float:
 
 
 def _stored(channel: Any, value: float) -> bytes:
-    """The number as the module keeps it, high byte first."""
+    """The number in the module's form, high byte first."""
     if channel.type in FLOATS:
         gone = channel.invalid[0] if channel.invalid else math.nan
         return struct.pack(f">{FLOATS[channel.type]}", _raw(channel, value) if math.isfinite(value) else gone)

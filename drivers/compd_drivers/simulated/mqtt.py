@@ -1,4 +1,4 @@
-"""A device that publishes on MQTT topics: plain numbers, or a document with what its gauge is described to read."""
+"""A device that publishes on MQTT topics: plain numbers, or a document with the values described for its gauge."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class SimulatedPublisher(SimulatedPushedDevice):
 
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
-        # it is to publish at least once in a period
+        # it must publish at least once in a period
         self.period_s = None if options.period_s is None else options.period_s / 2
 
     def say(self, utc_s: float) -> Mapping[str, Any]:
@@ -57,7 +57,7 @@ def _put(document: Any, pointer: str, value: Any) -> None:
 
 
 def _get(place: Any, token: str) -> Any:
-    """What stands at `token`; None if nothing does."""
+    """The item at `token`; None if there is none."""
     if isinstance(place, list):
         return place[int(token)] if int(token) < len(place) else None
     return place.get(token)

@@ -1,4 +1,4 @@
-"""An OPC UA server's nodes, as a gauge is described to read them: numbers, or arrays of numbers."""
+"""An OPC UA server's nodes as described for a gauge: numbers, or arrays of numbers."""
 
 from __future__ import annotations
 

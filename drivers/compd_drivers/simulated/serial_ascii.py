@@ -1,6 +1,6 @@
 """The other end of a described ASCII gauge: answers its `out` with what its `in` shows, printed as C would.
 
-It hears only what the description holds. A sensor that is off is shown by a word or an error reply that the
+It answers only the requests of the description. A sensor that is off is shown by a word or an error reply that the
 description has for it; without one the device is silent.
 """
 
@@ -40,16 +40,16 @@ class SimulatedAscii(SimulatedByteDevice):
         for out, form in [(options.out, options.in_), *((request.out, request.in_) for request in options.requests)]:
             if out:
                 self._replies[(plain(out) + end).encode("latin-1")] = form
-        self._heard = b""
+        self._received = b""
 
     @property
     def error_replies(self) -> dict[bytes, str]:
-        """Each described error as it goes over the wire, and the quality that it means."""
+        """Each described error in the form on the wire, with its quality."""
         end = plain(self.options.in_terminator)
         return {(self._printed(error.in_, {}) + end).encode("latin-1"): error.quality for error in self.options.errors}
 
-    def hear(self, data: bytes) -> bytes:
-        self._heard += data
+    def receive(self, data: bytes) -> bytes:
+        self._received += data
         replies = ""
         while asked := self._next():
             replies += self._answer(self._replies[asked])
@@ -60,14 +60,14 @@ class SimulatedAscii(SimulatedByteDevice):
         return b"" if asked else self._answer(self.options.in_).encode("latin-1")
 
     def _next(self) -> bytes:
-        """The first whole request in what was heard, taken out of it."""
-        places = {request: self._heard.find(request) for request in self._replies}
+        """Take the first whole request out of the received bytes."""
+        places = {request: self._received.find(request) for request in self._replies}
         requests = {request: place for request, place in places.items() if place >= 0}
         if not requests:
-            self._heard = self._heard[-max(map(len, self._replies), default=0) :]
+            self._received = self._received[-max(map(len, self._replies), default=0) :]
             return b""
         first = min(requests, key=lambda request: (requests[request], -len(request)))
-        self._heard = self._heard[requests[first] + len(first) :]
+        self._received = self._received[requests[first] + len(first) :]
         return first
 
     def _answer(self, form: str) -> str:
@@ -92,7 +92,7 @@ class SimulatedAscii(SimulatedByteDevice):
         return next((error.in_ for error in self.options.errors if error.quality == quality), "")
 
     def _printed(self, form: str, words: dict[str, str]) -> str:
-        """`form` with numbers, blanks for what the driver skips, and checksums."""
+        """`form` with numbers, blanks for skipped text, and checksums."""
         text, done, at = plain(form), "", 0
         for token in TOKEN.finditer(text):
             done += text[at : token.start()]
@@ -151,7 +151,7 @@ def _beyond(channel: Any, value: float) -> bool:
 
 
 def checksum(kind: str, data: bytes, digits: str) -> str:
-    """A checksum as it stands on the wire. digits : "" for bytes, "0" for hexadecimal, "#" for decimal digits."""
+    """A checksum in its form on the wire. digits : "" for bytes, "0" for hexadecimal, "#" for decimal digits."""
     length, low_first, value = 1, True, 0
     if kind == "crc16_modbus":
         length, value = 2, 0xFFFF

@@ -19,11 +19,11 @@ class SimulatedFrame(SimulatedByteDevice):
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
         self._request = bytes.fromhex(options.out) if options.out_checksum is None else self._printed_request()
-        self._heard = b""
+        self._received = b""
 
     @property
     def error_replies(self) -> dict[bytes, str]:
-        """Each described error as it goes over the wire, and the quality that it means."""
+        """Each described error in the form on the wire, with its quality."""
         tokens = {error: error.frame.split() for error in self.options.errors}
         return {
             bytes(0 if token in {"..", "CS"} else int(token, 16) for token in frame): error.quality
@@ -36,13 +36,13 @@ class SimulatedFrame(SimulatedByteDevice):
             tokens, bytearray(0 if token == "CS" else int(token, 16) for token in tokens), self.options.out_checksum
         )
 
-    def hear(self, data: bytes) -> bytes:
-        self._heard += data
+    def receive(self, data: bytes) -> bytes:
+        self._received += data
         replies = b""
-        while self._request in self._heard:
-            _, _, self._heard = self._heard.partition(self._request)
+        while self._request in self._received:
+            _, _, self._received = self._received.partition(self._request)
             replies += self._frame()
-        self._heard = self._heard[-len(self._request) :]
+        self._received = self._received[-len(self._request) :]
         return replies
 
     def _frame(self) -> bytes:

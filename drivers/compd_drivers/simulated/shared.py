@@ -1,4 +1,4 @@
-"""What the simulated devices share: commands with an end, transducers in front of an input, units on the wire."""
+"""Common parts of the simulated devices: commands with an end, transducers at an input, units on the wire."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy as np
 
 from compd.simulation import Sense, SimulatedByteDevice
 
-BEYOND = 0.01  # of the range: how far a transducer goes beyond its calibrated ends before it saturates
-# In how many of the channel's unit (mm, N, hPa) one of the wire's units is.
+BEYOND = 0.01  # share of the range by which a transducer exceeds its calibrated ends before it saturates
+# Size of the wire's units in the channel's unit (mm, N, hPa).
 UNITS = {"mm": 1.0, "um": 1e-3, "nm": 1e-6, "inch": 25.4, "mil": 0.0254, "kN": 1e3, "kPa": 10.0, "Pa": 1e-2}
 
 
 class CommandDevice(SimulatedByteDevice):
-    """A text instrument: one answer for every command that is complete."""
+    """A text instrument: one answer for every complete command."""
 
     terminator: ClassVar[bytes] = b"\r"
 
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
-        self._heard = b""
+        self._received = b""
 
-    def hear(self, data: bytes) -> bytes:
-        *commands, self._heard = (self._heard + data).split(self.terminator)
+    def receive(self, data: bytes) -> bytes:
+        *commands, self._received = (self._received + data).split(self.terminator)
         return b"".join(self.answer(command.decode("ascii", "ignore")).encode("ascii") for command in commands)
 
     @abstractmethod

@@ -21,7 +21,7 @@ from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quali
 REQUEST = b"?\r"
 END = b"\r\n"
 LONGEST_REPLY = 12  # bytes: +01.2345mm CR LF
-# As narrow as the manual allows: what does not fit exactly is damage on the wire, never a number.
+# As narrow as the manual allows: anything that does not fit exactly is damage on the wire.
 _VALUE = re.compile(rb"([+-]\d{2}\.\d{4})(mm|in)")
 _ERROR = re.compile(rb"ER(\d{2})")
 _ERRORS = {b"01": Quality.SENSOR_FAULT, b"02": Quality.OVER_RANGE, b"03": Quality.UNDER_RANGE}
@@ -29,9 +29,9 @@ _MM = {"mm": 1.0, "in": 25.4}  # exact, by definition
 
 
 class MyGaugeOptions(GaugeOptions):
-    """Keys of this gauge in the configuration. Nothing that was not measured or read in a manual has a default."""
+    """Keys of this gauge in the configuration. Defaults come from a measurement or a manual."""
 
-    unit: Literal["mm", "in"] = Field(description="what the unit is set to; the other one is refused")
+    unit: Literal["mm", "in"] = Field(description="the unit's setting; the other one is refused")
 
 
 class MyGauge(Gauge[ByteLine]):
@@ -56,7 +56,7 @@ class MyGauge(Gauge[ByteLine]):
         return [(len(REQUEST), LONGEST_REPLY)]
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
-        """Raises LineFault: MISMATCH for anything but a whole reply in the configured unit; others as the line does."""
+        """Raises LineFault: MISMATCH unless the reply is whole and in the configured unit; others as the line does."""
         time_s = line.send(REQUEST)
         reply = line.receive_until(END, LONGEST_REPLY).removesuffix(END)
         if error := _ERROR.fullmatch(reply):

@@ -15,7 +15,7 @@ MM_IN_AN_INCH = 25.4
 class SimulatedMyGauge(SimulatedByteDevice):
     """Shows its channel `value`; a sensor that is off gives `ER01`."""
 
-    # whole replies by which the device says that something is wrong, and the quality that must come
+    # whole error replies of the device, and their qualities
     error_replies: ClassVar[Mapping[bytes, str]] = {
         b"ER01\r\n": "sensor_fault",
         b"ER02\r\n": "over_range",
@@ -25,11 +25,11 @@ class SimulatedMyGauge(SimulatedByteDevice):
 
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
-        self._heard = b""
+        self._received = b""
 
-    def hear(self, data: bytes) -> bytes:
-        """One reply for every request that is complete; bytes may come in any pieces."""
-        *requests, self._heard = (self._heard + data).split(b"\r")
+    def receive(self, data: bytes) -> bytes:
+        """One reply for every complete request; bytes may come in any pieces."""
+        *requests, self._received = (self._received + data).split(b"\r")
         return b"".join(self._shown() for request in requests if request.endswith(b"?"))
 
     def _shown(self) -> bytes:

@@ -1,4 +1,4 @@
-"""Replies out of the manual, byte by byte; then every fault that a wire can have."""
+"""Replies from the manual, byte by byte; then every fault of a wire."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from compd.gauge import LineFault, Quality, Reading
 
 
 class Transcript:
-    """A line on which exactly one request is sent and exactly one reply comes: a byte left over is an error."""
+    """A line with exactly one request and one reply: a byte left over is an error."""
 
     def __init__(self, sent: bytes, received: bytes) -> None:
         self._sent = sent

@@ -20,12 +20,12 @@ class AsciiDevice(SimulatedByteDevice):
 
     def __init__(self, options: Any, sense: Sense) -> None:
         super().__init__(options, sense)
-        self._heard = b""
+        self._received = b""
 
-    def hear(self, data: bytes) -> bytes:
-        self._heard += data
-        count = self._heard.count(self.request)
-        self._heard = self._heard.rpartition(b"\r")[2]
+    def receive(self, data: bytes) -> bytes:
+        self._received += data
+        count = self._received.count(self.request)
+        self._received = self._received.rpartition(b"\r")[2]
         return b"".join(self.shown() for _ in range(count))
 
     def shown(self) -> bytes:

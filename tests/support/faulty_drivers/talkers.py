@@ -1,4 +1,4 @@
-"""The comparator where no bytes ask it: it speaks unasked, or to a pulse of DTR."""
+"""The comparator where no bytes ask it: it sends unsolicited readings, or to a pulse of DTR."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ PULSE_S = 0.12
 class SpeakingDevice(ComparatorDevice):
     """+01.2345mm CR LF, without bytes that ask for it."""
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         return b""
 
     def speak(self) -> bytes:
         return self.shown()
 
 
-# --- unasked ---------------------------------------------------------------------------------------------------
+# --- unsolicited ---------------------------------------------------------------------------------------------------
 
 
 class Talker(Comparator):

@@ -323,7 +323,7 @@ def test_replies_of_a_live_gauge_are_kept_where_questions_are_left(scale: str) -
     assert [(request, len(reply)) for request, reply in captured] == 3 * [(b"\x02", 17)]
 
 
-def test_learn_a_device_that_speaks_unasked(tmp_path: Path) -> None:
+def test_learn_a_device_that_sends_unsolicited(tmp_path: Path) -> None:
     written = tmp_path / "gauge.yaml"
     with talker(0.02) as port:
         code, _ = run_gauge(

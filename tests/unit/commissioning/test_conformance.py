@@ -150,7 +150,7 @@ def test_no_interleaving_of_faults_gives_a_wrong_number(name: str, data: st.Data
 class Scale(SimulatedByteDevice):
     """Answers ? by +0.1234 CR LF."""
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         value = self.sense("value")
         shown = "ERROR" if math.isnan(value) else f"{value:+.4f}"
         return b"".join(f"{shown}\r\n".encode() for byte in data if byte == ord("?"))

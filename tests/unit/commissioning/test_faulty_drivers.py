@@ -191,7 +191,7 @@ def test_a_preset_that_is_asked_by_dtr_is_tried_in_virtual_time(options: dict[st
 
 @pytest.mark.long
 @pytest.mark.parametrize("form", sampled(["%+08.3f%0<sum8>", "%+08.3f", "%+08.3f mm"], 3))
-def test_a_described_device_that_speaks_unasked_is_tried_in_virtual_time(form: str) -> None:
+def test_a_described_device_that_sends_unsolicited_is_tried_in_virtual_time(form: str) -> None:
     options = {"in": form, "in_terminator": r"\r\n", "channels": [{"name": "a", "unit": "mm"}]}
     results = list(run_conformance(driver_under_test("serial_ascii", options)))
     assert [result for _, result in results if result.verdict == "FAIL"] == []

@@ -142,10 +142,10 @@ def test_two_presets_that_fit_are_both_named() -> None:
     assert len(lines) == 3
 
 
-def test_a_device_that_speaks_unasked_is_left_alone() -> None:
+def test_a_device_that_sends_unsolicited_is_left_alone() -> None:
     with talker(0.3, b"\r") as port:
         (line,) = announcements(port, CANDIDATES)
-    assert line.startswith("a device speaks unasked, b'+000")
+    assert line.startswith("a device sends unsolicited data, b'+000")
 
 
 def test_silence_and_a_port_that_is_not_there(tmp_path: Path) -> None:

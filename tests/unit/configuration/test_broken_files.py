@@ -45,8 +45,8 @@ UNREADABLE: dict[str, tuple[bytes, int, str]] = {
     "an escape character": (b"a: \x1b[31m\n", 1, "U+001B"),
     "five thousand brackets": (b"a: 1\nb: " + b"[" * 5000, 2, "more than 50 levels"),
     "brackets that close": (b"b: " + b"[" * 5000 + b"]" * 5000, 1, "more than 50 levels"),
-    "a list within itself": (b"a: 1\nx: &x [*x]\n", 2, "stands within what it stands for"),
-    "a mapping within itself": (b"x: &x\n  y: *x\n", 2, "stands within what it stands for"),
+    "a list within itself": (b"a: 1\nx: &x [*x]\n", 2, "recursive alias"),
+    "a mapping within itself": (b"x: &x\n  y: *x\n", 2, "recursive alias"),
     "aliases of aliases": (
         b"a0: &a0 [x, x, x, x, x, x, x, x, x]\n"
         + b"".join(b"a%d: &a%d [%s]\n" % (i, i, b", ".join([b"*a%d" % (i - 1)] * 9)) for i in range(1, 10)),

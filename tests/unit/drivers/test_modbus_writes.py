@@ -53,7 +53,7 @@ class Slave:
         self.clock = InstantClock()
         self.device = SimulatedRegisters(described, (values or {"value": 0.5}).__getitem__)
         slaves = ModbusSlaves([self.device], over_tcp=False)
-        self.port = ScriptedPort(self.clock, device=slaves.hear)
+        self.port = ScriptedPort(self.clock, device=slaves.receive)
         self.line = RtuMaster(StreamLine(self.port, 0.1, 0.002, self.clock))
 
     @property

@@ -25,7 +25,7 @@ def heard(measured: Any, payloads: list[Any], source_utc_s: Iterator[float]) -> 
     readings = []
     for number, (payload, utc_s) in enumerate(zip(payloads, source_utc_s, strict=False)):
         arrival = Arrival(100.0 + 0.5 * number, UTC_S + 100.0 + 0.5 * number)
-        readings += measured.hear(Message(measured.addresses[0], payload, arrival, utc_s))
+        readings += measured.receive(Message(measured.addresses[0], payload, arrival, utc_s))
     return [each.reading.value for each in readings]
 
 
@@ -56,8 +56,8 @@ def test_a_value_at_rest_with_a_new_time_is_new_and_with_the_same_time_a_copy() 
 def test_a_value_counts_again_when_its_status_is_good_again() -> None:
     node = gauge("opc_ua", channels=[NODE])
     good = Message("ns=2;s=a", 1.5, Arrival(100.0, UTC_S + 100.0), UTC_S + 99.9)
-    assert [each.reading.value for each in node.hear(good)] == [1.5]
+    assert [each.reading.value for each in node.receive(good)] == [1.5]
     bad = good._replace(quality=Quality.DEVICE_ERROR, detail="BadOutOfService")
-    assert [each.reading.quality for each in node.hear(bad)] == [Quality.DEVICE_ERROR]
-    again = node.hear(good._replace(arrival=Arrival(101.0, UTC_S + 101.0)))
+    assert [each.reading.quality for each in node.receive(bad)] == [Quality.DEVICE_ERROR]
+    again = node.receive(good._replace(arrival=Arrival(101.0, UTC_S + 101.0)))
     assert [(each.reading.value, each.reading.time_s) for each in again] == [(1.5, pytest.approx(99.9))]

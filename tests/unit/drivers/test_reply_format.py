@@ -205,7 +205,7 @@ SIGNED_UNITS = {
 def test_the_simulated_device_speaks_these_forms(keys: dict[str, Any], value: float) -> None:
     device = gauge(**keys)
     far_end = SimulatedAscii(device.options, lambda channel: value)
-    (reading,) = poll(device, far_end.hear(b"?\r"))
+    (reading,) = poll(device, far_end.receive(b"?\r"))
     assert reading.value == pytest.approx(value)
 
 
@@ -226,7 +226,7 @@ def test_checksums_find_every_turned_bit(kind: str, converter: str) -> None:
     """The reply is the simulated device's: the two ends share no code."""
     device = gauge(**{"in": r"\x02%+07.3f" + converter.format(kind)})
     far_end = SimulatedAscii(device.options, lambda channel: -1.25)
-    reply = far_end.hear(b"?\r")
+    reply = far_end.receive(b"?\r")
     assert [reading.value for reading in poll(device, reply)] == [-1.25]
     for bit in range(8 * (len(reply) - 2)):
         damaged = bytearray(reply)

@@ -73,7 +73,7 @@ def test_samples_of_a_form_are_replies_of_that_form(form: str) -> None:
         ({"in": "OK"}, "has no"),
         ({"in": "%f", "in_terminator": ""}, "fixed length"),
         ({"in": "%+07.3f", "in_terminator": "", "errors": [{"in": "ERR", "quality": "device_error"}]}, "same length"),
-        ({"in": "%f", "out": "", "echo": {"out": "ID?", "in": "TT"}}, "unasked"),
+        ({"in": "%f", "out": "", "echo": {"out": "ID?", "in": "TT"}}, "unsolicited"),
         ({"in": "%f", "channels": [{"name": "value", "unit": "V"}]}, "linearisation"),
         ({"in": "%f", "channels": [{"name": "value", "unit": "mm", "scale": 0}]}, "scale"),
         ({"in": "%f", "channels": [{"name": "value", "unit": "mm", "range": [1, -1]}]}, "range"),

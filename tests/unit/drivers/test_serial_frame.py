@@ -74,7 +74,7 @@ def test_every_turned_bit_is_found(kind: str) -> None:
     """The frame is the simulated device's: the two ends share no code."""
     places = " CS" * CHECKSUMS[kind].length  # type: ignore[index]
     device = gauge(frame="5A 01 .. .." + places, checksum={"kind": kind, "byte_order": "big"})
-    reply = SimulatedFrame(device.options, lambda name: -0.25).hear(bytes.fromhex("A501"))
+    reply = SimulatedFrame(device.options, lambda name: -0.25).receive(bytes.fromhex("A501"))
     assert poll(device, reply)[0].value == -0.25
     for bit in range(8 * len(reply)):
         damaged = bytearray(reply)

@@ -24,7 +24,7 @@ def test_each_value_has_its_own_request_and_time() -> None:
     device = gauge(**PROBES)
     values = {"p1": 1.0, "p2": -2.0, "p3": 3.5}
     far_end = SimulatedAscii(device.options, values.__getitem__)
-    line, port = line_with(device=far_end.hear)
+    line, port = line_with(device=far_end.receive)
     readings = device.read(line)
     assert [reading.value for reading in readings] == [3.5, 1.0, -2.0], "in the order of the channels"
     assert port.written == [b"M1\r", b"M2\r", b"M3\r"]

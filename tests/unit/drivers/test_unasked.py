@@ -1,4 +1,4 @@
-"""Described devices that speak unasked: which of their lines counts, its time, and their silence."""
+"""Described devices that send unsolicited readings: which of their lines counts, its time, and their silence."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_the_newest_whole_line_counts_and_never_a_half_one() -> None:
     assert reading.value == 13.0
 
 
-def test_the_age_of_what_comes_unasked_is_never_understated() -> None:
+def test_the_age_of_what_comes_unsolicited_is_never_understated() -> None:
     clock = InstantClock()
     port = ScriptedPort(clock, [b"+10.0\r\n", b"", b"+12.5\r\n", b"+13.0\r\n"])
     line = StreamLine(port, 0.1, 0.002, clock)

@@ -57,9 +57,9 @@ class Rfc2217Peer:
         with client:
             heard = b""
             while data := client.recv(1024):
-                heard = self._hear(client, heard + data)
+                heard = self._receive(client, heard + data)
 
-    def _hear(self, client: socket.socket, heard: bytes) -> bytes:
+    def _receive(self, client: socket.socket, heard: bytes) -> bytes:
         """Answer every whole command; what is left of the last one."""
         while (start := heard.find(IAC)) >= 0 and len(heard) >= start + 3:
             command = heard[start + 1]

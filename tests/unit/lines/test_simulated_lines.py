@@ -30,7 +30,7 @@ class Echo(SimulatedByteDevice):
         super().__init__(None, lambda channel: 0.0)
         self._answer = answer
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         return self._answer if data else b""
 
 

@@ -76,7 +76,7 @@ def test_bytes_that_dribble_in_do_not_stretch_the_deadline() -> None:
     assert caught.value.quality is Quality.INCOMPLETE
 
 
-def test_what_comes_unasked_is_dropped_and_counted_before_a_request() -> None:
+def test_what_comes_unsolicited_is_dropped_and_counted_before_a_request() -> None:
     line, port, _ = scripted(b"late rep", b"ly\r\n", b"", b"12.5\r\n")
     line.send(b"?")
     assert port.written == [b"?"]

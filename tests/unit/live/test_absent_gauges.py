@@ -138,7 +138,7 @@ def test_a_unit_that_makes_the_others_stale_is_asked_seldom(quality: Quality) ->
     assert len(asked_s) == 2 + 5, "twice at first, then after a hundred times the second that each one costs"
     assert bus.stale_share(10.0, 30.0) < 0.08
     assert bus.stale_share(30.0, 600.0) < 0.01
-    (event,) = [entry for entry in logs if entry["event"] == "gauge is asked seldom"]
+    (event,) = [entry for entry in logs if entry["event"] == "gauge is polled seldom"]
     assert (event["gauge"], event["cost_s"], event["rest_s"]) == ("g2", pytest.approx(1.01), pytest.approx(101.0))
 
 

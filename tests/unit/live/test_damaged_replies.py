@@ -81,8 +81,8 @@ class Far:
         self._listener, self._damage, self._rng = listener, damage, np.random.default_rng(7)
         self.replies = self.damaged = 0
 
-    def answer(self, request: bytes, heard_s: float, timeout_s: float, low_s: float = 0.0) -> Sequence[Piece]:
-        reply = self._listener.hear(request)
+    def answer(self, request: bytes, received_s: float, timeout_s: float, low_s: float = 0.0) -> Sequence[Piece]:
+        reply = self._listener.receive(request)
         if not reply:
             return []
         self.replies += 1

@@ -41,7 +41,7 @@ class Comparators:
         self._reply = reply
         self.requests = 0
 
-    def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
+    def answer(self, request: bytes, received_s: float, timeout_s: float) -> Sequence[Piece]:
         self.requests += 1
         measure = f"+{2e-3 * int(request):08.4f}\r".encode()
         return self._reply(self.requests, Piece(ANSWER_S - TURNAROUND_S, measure))
@@ -196,8 +196,8 @@ def test_replies_with_an_address_need_no_silence_at_the_end_of_a_round() -> None
     addressed = [comparator(unit, f"{unit:02}%+09.4f") for unit in range(1, UNITS + 1)]
 
     class Addressed(Comparators):
-        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
-            (piece,) = super().answer(request, heard_s, timeout_s)
+        def answer(self, request: bytes, received_s: float, timeout_s: float) -> Sequence[Piece]:
+            (piece,) = super().answer(request, received_s, timeout_s)
             return [piece._replace(data=request[:2] + piece.data)]
 
     known, unknown = Run(Addressed(), addressed, 60.0), Run(Comparators(), NINE, 60.0)
@@ -211,9 +211,9 @@ def test_a_late_reply_does_not_leave_a_single_gauge_one_reply_behind(late_s: flo
     counter = itertools.count(1)
 
     class Counting(Comparators):
-        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
-            (piece,) = super().answer(request, heard_s, timeout_s)
-            heard[number := next(counter)] = heard_s
+        def answer(self, request: bytes, received_s: float, timeout_s: float) -> Sequence[Piece]:
+            (piece,) = super().answer(request, received_s, timeout_s)
+            heard[number := next(counter)] = received_s
             delay_s = late_s if number == 30 else piece.delay_s
             return [Piece(delay_s, f"+{number:08.4f}\r".encode())]
 
@@ -229,9 +229,9 @@ def test_replies_that_are_all_late_from_now_on_never_count(late_s: float) -> Non
     counter = itertools.count(1)
 
     class Late(Comparators):
-        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
-            (piece,) = super().answer(request, heard_s, timeout_s)
-            heard[number := next(counter)] = heard_s
+        def answer(self, request: bytes, received_s: float, timeout_s: float) -> Sequence[Piece]:
+            (piece,) = super().answer(request, received_s, timeout_s)
+            heard[number := next(counter)] = received_s
             delay_s = late_s if number >= 30 else piece.delay_s
             return [Piece(delay_s, f"+{number:08.4f}\r".encode())]
 
@@ -248,8 +248,8 @@ def test_a_display_that_loses_replies_in_a_row_is_never_stale(lost: int, timeout
     """At 0.5 s, as both example configurations have it; the display takes 30 ms to answer."""
 
     class Display(Comparators):
-        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
-            (piece,) = super().answer(request, heard_s, timeout_s)
+        def answer(self, request: bytes, received_s: float, timeout_s: float) -> Sequence[Piece]:
+            (piece,) = super().answer(request, received_s, timeout_s)
             return [] if self.requests % 40 >= 40 - lost else [piece._replace(delay_s=30e-3)]
 
     run = Run(Display(), [comparator(1)], 60.0, timeout_s, stale_after_s=0.5)
@@ -264,10 +264,10 @@ def test_a_display_that_stands_still_for_a_moment_is_never_stale(pause_s: float)
     class Display(Comparators):
         free_s = 0.0
 
-        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
-            (piece,) = super().answer(request, heard_s, timeout_s)
-            self.free_s = max(self.free_s, heard_s) + (pause_s if self.requests % 60 == 0 else 10e-3)
-            return [piece._replace(delay_s=self.free_s - heard_s)]
+        def answer(self, request: bytes, received_s: float, timeout_s: float) -> Sequence[Piece]:
+            (piece,) = super().answer(request, received_s, timeout_s)
+            self.free_s = max(self.free_s, received_s) + (pause_s if self.requests % 60 == 0 else 10e-3)
+            return [piece._replace(delay_s=self.free_s - received_s)]
 
     run = Run(Display(), [comparator(1)], 60.0, 0.15, stale_after_s=0.5)
     assert run.thread.gauges[0].polls > 2000
@@ -283,15 +283,15 @@ def test_whatever_is_late_or_lost_a_single_gauge_answers_the_request_it_is_stamp
     class Troubled(Comparators):
         late_until_s, late_s, free_s = 0.0, 0.0, 0.0
 
-        def answer(self, request: bytes, heard_s: float, timeout_s: float) -> Sequence[Piece]:
-            heard[number := next(counter)] = heard_s
-            if heard_s > self.late_until_s and rng.random() < 0.02:
-                self.late_until_s, self.late_s = heard_s + rng.uniform(0.0, 3.0), rng.uniform(0.05, 1.5)
-            late_s = self.late_s if heard_s < self.late_until_s else 0.0
+        def answer(self, request: bytes, received_s: float, timeout_s: float) -> Sequence[Piece]:
+            heard[number := next(counter)] = received_s
+            if received_s > self.late_until_s and rng.random() < 0.02:
+                self.late_until_s, self.late_s = received_s + rng.uniform(0.0, 3.0), rng.uniform(0.05, 1.5)
+            late_s = self.late_s if received_s < self.late_until_s else 0.0
             if not late_s and rng.random() < 0.1:
                 return []
-            self.free_s = max(self.free_s, heard_s + 8e-3 + late_s)
-            return [Piece(self.free_s - heard_s, f"+{number:08.4f}\r".encode())]
+            self.free_s = max(self.free_s, received_s + 8e-3 + late_s)
+            return [Piece(self.free_s - received_s, f"+{number:08.4f}\r".encode())]
 
     heard: dict[int, float] = {}
     run = Run(Troubled(), [comparator(1)], 60.0, 0.15, stale_after_s=0.5)

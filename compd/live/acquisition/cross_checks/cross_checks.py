@@ -1,4 +1,4 @@
-"""All votes of a machine: they look at the gauges ten times a second, beside the lines' threads."""
+"""All votes of a machine. They look at the gauges ten times a second, in parallel to the lines' threads."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from compd.live.acquisition.cross_checks.standing_temperature import StandingTem
 from compd.live.acquisition.cross_checks.tip_speed import TipSpeed
 from compd.live.memory import Doubt, Latest, TrustMemory
 
-# From one look to the next, s.
+# Interval (s) of looks.
 LOOK_EVERY_S = 0.1
 
 log = structlog.get_logger()
@@ -54,9 +54,9 @@ class Votes:
         self._zero_mm = zero_mm
         self._setpoint_line = setpoint_line
         self._votes = _votes(settings, signal_period_mm)
-        self._remarks: dict[str, str] = memory.warnings.read() or {}  # as the process before has left them
+        self._remarks: dict[str, str] = memory.warnings.read() or {}  # as left by the previous process
         for i in range(len(self._wired)):
-            memory.suspected[i] = False  # of an acquisition that has ended: its evidence went with it
+            memory.suspected[i] = False  # votes of an ended acquisition: their evidence is gone
         # the messages are parsed only for votes that look at them
         self._needs_setpoint = (
             settings.following_mm is not None
@@ -87,7 +87,7 @@ class Votes:
         if remarks == self._remarks:
             return
         for channel in remarks.keys() - self._remarks.keys():
-            log.warning("gauge is to be looked at", channel=channel, reason=remarks[channel])
+            log.warning("gauge is to be inspected", channel=channel, reason=remarks[channel])
         for channel in self._remarks.keys() - remarks.keys():
             log.info("gauge has no warning any more", channel=channel, reason=self._remarks[channel])
         self._remarks = remarks

@@ -1,4 +1,4 @@
-"""Machine-tool mode: a scale that is not where the setpoint has it, for longer than a controller lags behind."""
+"""Machine-tool mode: a scale off its setpoint for longer than a controller lags."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView
 
-# Longer than a controller needs to follow a step, s.
+# Duration (s) of a deviation that counts; longer than a controller takes to follow a step.
 LASTING_S = 1.0
 
 
 class FollowingError:
-    """Compares the scales with the setpoints that are sent."""
+    """Compares the scales with the sent setpoints."""
 
     def __init__(self, largest_mm: float) -> None:
         self._largest_mm = largest_mm

@@ -10,7 +10,7 @@ from compd.units import UM_PER_MM
 
 
 class FrameTemperature:
-    """Compares each frame distance with what the temperature has made of it since it was first seen."""
+    """Compares each frame distance with its thermal change since its first reading."""
 
     def __init__(self, settings: FrameVote) -> None:
         self._settings = settings

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView
 from compd.units import UM_PER_MM
 
-# Longer than two polls of the same unit are apart, s.
+# Duration (s) of a difference that counts; longer than the interval of two polls of one unit.
 LASTING_S = 0.5
 
 
 class JointPair:
-    """Compares Ra with Rb at each link; of two that differ, the one that has moved further is named."""
+    """Compares Ra with Rb at each link; names the one that has moved further if they differ."""
 
     def __init__(self, largest_um: float) -> None:
         self._largest_um = largest_um

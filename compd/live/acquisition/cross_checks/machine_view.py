@@ -1,4 +1,4 @@
-"""What the votes look at, ten times a second."""
+"""Input of the votes, ten times a second."""
 
 from __future__ import annotations
 
@@ -62,14 +62,14 @@ class MachineView(NamedTuple):
 
 
 class Contradiction(NamedTuple):
-    """A channel, by its number, that others contradict, and the evidence in words."""
+    """A channel (by number) that others contradict, with the evidence in words."""
 
     channel: int
     evidence: str
 
 
 class Remark(NamedTuple):
-    """A channel, by its number, that is believed and to be looked at, and why; made at each look while it lasts."""
+    """A believed channel (by number) to be inspected, with the reason; repeated at each look while it lasts."""
 
     channel: int
     text: str
@@ -79,5 +79,5 @@ class Vote(Protocol):
     """One kind of contradiction. A channel that is not believed takes no part, and begins anew when it is again."""
 
     def look(self, view: MachineView) -> Iterator[Contradiction | Remark]:
-        """The channels that the gauges contradict now, or that are to be looked at."""
+        """The channels that are contradicted now, or to be inspected."""
         ...

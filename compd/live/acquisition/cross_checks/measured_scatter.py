@@ -1,4 +1,4 @@
-"""The scatter of each length at rest against its declared noise: where they differ by a factor of 2, one is wrong.
+"""Scatter of each length at rest against its declared noise: one of them is wrong if they differ by a factor of 2.
 
 A display with coarse digits scatters less than what it measures. So its smallest step counts as scatter, too, before a
 noise is said to be declared too large.
@@ -13,7 +13,7 @@ from compd.live.acquisition.cross_checks.machine_view import MachineView, Remark
 from compd.stated_noise import SCATTER_RATIO
 from compd.units import UM_PER_MM
 
-# The warning of SCATTER_RATIO goes away inside of this one, so that it does not come and go.
+# Ratio at which the warning of SCATTER_RATIO ends: smaller, so that the warning does not flicker.
 _NEAR = 1.8
 
 
@@ -32,7 +32,7 @@ class MeasuredScatter:
                 continue
             ratio = _NEAR if i in self._outside else SCATTER_RATIO
             step_um = float(view.memory.step_mm[i]) * UM_PER_MM
-            # the standard deviation of what lies anywhere between two digits is 0.29 of their distance
+            # standard deviation of a uniform distribution between two digits: 0.29 of their distance
             at_most_um = math.hypot(scatter_um, step_um / math.sqrt(12))
             if scatter_um > ratio * declared_um or at_most_um < declared_um / ratio:
                 self._outside.add(i)

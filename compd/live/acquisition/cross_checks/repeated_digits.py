@@ -1,4 +1,4 @@
-"""A gauge that repeats the very same digits while others scatter is stuck.
+"""A gauge is stuck if it repeats the same digits while others scatter.
 
 It can be told of gauges whose noise is not below their resolution: of these each new sample differs from the one before
 with a probability of 0.62 or more, wherever the value stands between two digits. A device that samples less often than
@@ -14,11 +14,11 @@ import numpy as np
 
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView
 
-# So many equal readings, over so many times the usual time from change to change. Where a sample repeats the one before
-# with a probability p, changes are 1 / (1 - p) samples apart, and a streak of 40 times as many comes with less than
-# exp(-40) = 4e-18, whatever p is.
+# Equal readings that show a stuck gauge, also as multiples of the usual time between changes. Where a sample repeats
+# the one before with a probability p, changes are 1 / (1 - p) samples apart, and a streak of 40 times as many comes
+# with less than exp(-40) = 4e-18, whatever p is.
 _STREAK = 40.0
-# A gauge scatters while its last change is no longer ago than this many of its usual times.
+# A gauge scatters if its last change is at most this many of its usual times ago.
 _SCATTERING = 5.0
 _FEWEST_CHANGES = 100
 

@@ -1,4 +1,4 @@
-"""Steps of one scale at rest, while all other lengths stand: signal periods that its interpolator has lost.
+"""Steps of one scale while all lengths are at rest: signal periods lost by its interpolator.
 
 In machine-tool mode the setpoint says whether the link was to move. In CMM mode a link may be moved on purpose, alone
 and by such a step: a second step without a reading on the way is needed, and until then there is a warning. Steps are
@@ -21,11 +21,11 @@ from compd.live.acquisition.cross_checks.machine_view import Contradiction, Mach
 from compd.live.acquisition.steps import Step
 from compd.units import UM_PER_MM
 
-# Steps that are longer ago, s, do not count: once in a while a link is moved on purpose.
+# Age (s) from which steps no longer count: a link is moved on purpose once in a while.
 MEMORY_S = 3600.0
-# In CMM mode, so many steps.
+# Fewest steps in CMM mode.
 FEWEST_STEPS = 2
-# Until all other lengths have been read after a step, s; after that nobody knows.
+# Longest wait (s) after a step until all other lengths have been read; the step is undecided after that.
 _WAIT_S = 2.0
 _QUARTERS = 4
 
@@ -33,7 +33,7 @@ _QUARTERS = 4
 class _Look(NamedTuple):
     now_s: float
     value: FloatArray
-    setpoint_mm: FloatArray | None  # of the scales, in machine-tool mode
+    setpoint_mm: FloatArray | None  # setpoints of the scales in machine-tool mode
 
 
 class SignalPeriods:
@@ -42,7 +42,7 @@ class SignalPeriods:
     def __init__(self, period_mm: float) -> None:
         self._period_mm = period_mm
         self._looks: deque[_Look] = deque()
-        self._known: dict[int, tuple[float, float]] = {}  # how often each has stepped until now, and how far, mm
+        self._known: dict[int, tuple[float, float]] = {}  # number and size (mm) of each channel's steps until now
         self._waiting: dict[int, Step] = {}
         self._steps: dict[int, list[Step]] = {}
         self._accepted: list[int] = []
@@ -53,7 +53,7 @@ class SignalPeriods:
         self._looks.append(_Look(view.now_s, view.value.copy(), _setpoint_mm(view)))
         while self._looks[0].now_s < view.now_s - LASTING_S - 2 * _WAIT_S:
             self._looks.popleft()
-        # how often first: a step whose height is there already is then taken at the next look
+        # the count first: a step whose height is already stored is then taken at the next look
         stepped, stepped_mm = memory.stepped[:n].tolist(), memory.stepped_mm[:n].tolist()
         for i in view.of_kind("scale"):
             if not view.believed[i] or (accepted and accepted[i] != self._accepted[i]):
@@ -83,7 +83,7 @@ class SignalPeriods:
         moved_mm = np.abs(view.value - before.value)[others]
         if not (moved_mm <= view.memory.tolerance_mm[others]).all() or self._was_told(view, i, step):
             return
-        if step.is_seen:  # somebody moves this link alone
+        if step.is_seen:  # this link is moved alone
             self._steps.pop(i, None)
         else:
             self._steps.setdefault(i, []).append(step)

@@ -1,4 +1,4 @@
-"""A thermometer that repeats its digits while all others of the machine grow warmer, or colder, is stuck.
+"""A thermometer is stuck if it repeats its digits while all others of the machine grow warmer, or colder.
 
 One in a body that changes slowly shows other digits, too: no two tenths of a degree in the time in which every other
 one changes by kelvins. Where its digits are too coarse for that, it has changed by less than one of them, and so little
@@ -18,12 +18,12 @@ _FEWEST_OTHERS = 2
 
 
 class StandingTemperature:
-    """Remembers what all thermometers showed when each of them last changed its digits."""
+    """Remembers the values of all thermometers when each of them last changed its digits."""
 
     def __init__(self, changed_K: float) -> None:
-        """`changed_K`: by how much all others must have changed, the same way."""
+        """`changed_K`: least change of all others, in the same direction."""
         self._changed_K = changed_K
-        self._before: dict[int, tuple[float, FloatArray]] = {}  # how often it had changed, and what all showed
+        self._before: dict[int, tuple[float, FloatArray]] = {}  # number of its changes, and the values of all
 
     def look(self, view: MachineView) -> Iterator[Contradiction]:
         places = view.of_unit("degC")

@@ -1,4 +1,4 @@
-"""CMM mode: the tip does not move faster than the machine can."""
+"""CMM mode: a scale is wrong if the tip would move faster than the machine can."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView
 
-# Over a shorter time, s, the times of readings make a speed uncertain.
+# Shortest time (s) over which a speed is taken; below it the times of readings make it uncertain.
 _SHORTEST_S = 0.05
-# Between setpoints that are further apart, s, nobody knows how the tip has moved.
+# Longest interval (s) of setpoints; beyond it the tip's path is unknown.
 _LONGEST_S = 1.0
 
 
 class TipSpeed:
-    """Compares the tips of setpoints; the scale that has moved most is named."""
+    """Compares the tips of setpoints; names the scale that has moved most."""
 
     def __init__(self, largest_mm_per_s: float) -> None:
         self._largest_mm_per_s = largest_mm_per_s
@@ -38,7 +38,7 @@ class TipSpeed:
         self._oldest_s = min(now[0], float(view.memory.time_s[scales].min()))
         if last is None or now[0] - last[0] > _LONGEST_S:
             return
-        # a scale that was not read for a while has come all the way since then
+        # the motion of a scale without readings for a while began at its last one
         speed = float(np.linalg.norm(now[1] - last[1])) / (now[0] - before_s)
         if speed > self._largest_mm_per_s:
             i = scales[int(np.argmax(np.abs(now[2] - last[2])[scales]))]

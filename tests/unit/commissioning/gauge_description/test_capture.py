@@ -1,4 +1,4 @@
-"""Replies for `compd gauge learn`: out of a file, and of devices that answer or speak unasked."""
+"""Replies for `compd gauge learn`: out of a file, and of devices that answer or send unsolicited readings."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def capture(port: str, timeout_s: float, wanted: int = 4) -> list[CapturedReply]
 
 @pytest.mark.parametrize("end", [b"\r\n", b"\r", b"\n", b"\x03"])
 @pytest.mark.parametrize("timeout_s", [0.03, 1.0])
-def test_a_device_that_speaks_unasked_is_captured_line_by_line(end: bytes, timeout_s: float) -> None:
+def test_a_device_that_sends_unsolicited_is_captured_line_by_line(end: bytes, timeout_s: float) -> None:
     """50 Hz: there is no silence, whatever the timeout."""
     with talker(0.02, end) as port:
         captured = capture(port, timeout_s)

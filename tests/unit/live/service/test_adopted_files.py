@@ -26,7 +26,7 @@ def aliases(levels):
         ("a: " + "{b: " * 4000, "more than 50 levels"),
         ("- " * 4000 + "1", "more than 50 levels"),
         (aliases(9), "aliases unfolded"),
-        ("x: &x [*x]", "stands within what it stands for"),
+        ("x: &x [*x]", "recursive alias"),
         ("\0", "cannot stand in YAML"),
         ("\udcff", "is not in UTF-8"),
     ],
