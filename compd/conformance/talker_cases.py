@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from compd.commissioning.conformance.case_result import GOOD, CaseResult, result_of, violations_of
-from compd.commissioning.conformance.harness import ConformanceSession
-from compd.commissioning.conformance.peer import GOLDEN
-from compd.commissioning.conformance.virtual import VirtualWire
+from compd.conformance.case_result import GOOD, CaseResult, result_of, violations_of
+from compd.conformance.harness import ConformanceSession
+from compd.conformance.peer import GOLDEN
+from compd.conformance.virtual import VirtualWire
 
 PLACES = 40  # positions in a line and the pause behind it at which the line is opened
 CHARACTER_S = 10 / 9600  # makes a line about as long as the pause behind it

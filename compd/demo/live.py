@@ -12,7 +12,7 @@ from compd.demo.simulated_daemon import simulated_daemon
 from compd.errors import DaemonError
 
 # Speed-up of weather and warm-up: an hour in three minutes makes the motion visible.
-SPEEDUP = 20.0
+LIVE_SPEEDUP = 20.0
 # Time (s) at machine zero, in which zero is taken.
 ZERO_HOLD_S = 30.0
 ANSWER_TIMEOUT_S = 15.0

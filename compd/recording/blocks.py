@@ -49,11 +49,3 @@ def recording_blocks(
         recording = builder.build(block.table, block.problems, last=following is None)
         if recording.rows:
             yield recording
-
-
-def row_count(path: Path) -> int:
-    """Number of rows of a recording's table, including empty ones: from Parquet's metadata, or counted in CSV.
-
-    path : NAME.csv, NAME.parquet, or NAME.yaml. Raises RecordingError for a file that cannot be read.
-    """
-    return table_file.row_count(path)

@@ -57,7 +57,7 @@ def try_on_wires(
 
 def _try(driver: DriverUnderTest, quick: bool) -> int:
     """Print each case as it ends, and the table; return the number of failures."""
-    from compd.commissioning.conformance.report import run_conformance
+    from compd.conformance import run_conformance
 
     typer.echo(f"\n{driver.name}, {driver.gauge.line_kind}:")
     results: list[tuple[str, CaseResult]] = []

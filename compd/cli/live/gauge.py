@@ -87,8 +87,8 @@ def scan(
     ] = False,
 ) -> None:
     """Find serial ports; with --probe, find the presets that match the answers."""
-    from compd.commissioning.probe import announcements, preset_candidates
-    from compd.lines.computer_ports import serial_ports
+    from compd.gauge_tools import announcements, preset_candidates
+    from compd.lines import serial_ports
 
     ports = serial_ports()
     if not ports:

@@ -99,7 +99,7 @@ def _print_address(address: str) -> None:
 
 def _print_qr_code(address: str) -> None:
     """Print the QR code on a terminal, for a tablet beside it; never into a file or a log."""
-    from compd.page.qr_code import print_qr_code
+    from compd.page import print_qr_code
 
     if sys.stdout.isatty():
         print_qr_code(address, sys.stdout)

@@ -70,7 +70,7 @@ def compare(
 
 def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison:
     """The comparison in memory, or block by block for a long recording."""
-    from compd.comparison.stream.recording_stream import is_long
+    from compd.comparison import is_long
 
     if not is_long(path):
         from compd.api import compare as compare_recording

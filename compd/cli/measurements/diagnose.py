@@ -71,8 +71,7 @@ def diagnose(
 
 def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, int]:
     """The recording and 0; for one too long for the memory a sample, and the number of its rows."""
-    from compd.comparison.open import open_recording
-    from compd.comparison.stream.recording_stream import is_long
+    from compd.comparison import is_long, open_recording
 
     if not is_long(path):
         return open_recording(path, machine), 0

@@ -127,8 +127,8 @@ def fit(
 @effect.command()
 def undo(model: ModelOption) -> None:
     """Undo the last step; repeat it for the previous ones. The ledger keeps them."""
-    from compd.diagnosis.model_changes import undo as undo_step
-    from compd.model_file.model_document import read_stored, write_stored
+    from compd.diagnosis import undo_step
+    from compd.model_file import read_stored, write_stored
 
     after = undo_step(read_stored(model), str(model))
     write_stored(model, after)
@@ -142,9 +142,8 @@ def _declared_id(declared: Declaration) -> str:
 
 def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinement]:
     """The recording; for one too long for the memory a sample, and the function that fits to all its rows."""
-    from compd.comparison.open import open_recording
-    from compd.comparison.stream.recording_stream import is_long
-    from compd.diagnosis.model_changes import unrefined
+    from compd.comparison import is_long, open_recording
+    from compd.diagnosis import unrefined
 
     if not is_long(path):
         return open_recording(path, machine), unrefined

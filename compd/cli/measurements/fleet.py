@@ -153,11 +153,8 @@ def report(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Write the page: effects by machine, drifts, differing machines, unreadable recordings."""
-    from compd.fleet.cluster import check_installed
-    from compd.fleet.examination import examination
-    from compd.fleet.fleet_page import write_fleet_page
-    from compd.fleet.table import is_table, read_table
-    from compd.report.page import check_page_path
+    from compd.fleet import check_installed, examination, is_table, read_table, write_fleet_page
+    from compd.report import check_page_path
 
     check_installed()
     if not all(is_table(Path(place)) for place in places):

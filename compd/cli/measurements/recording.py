@@ -57,7 +57,7 @@ def merge(
     overwrite: Annotated[bool, typer.Option(help="Overwrite existing files.")] = False,
 ) -> None:
     """Merge recordings of one machine, so that compare, diagnose and effect add learn from all of them."""
-    from compd.comparison.open import read_with_machine
+    from compd.comparison import read_with_machine
     from compd.errors import CompdError, Problem
     from compd.recording import ASSUMED_GAP_S, merge_recordings
     from compd.table_file import written_path
@@ -116,7 +116,7 @@ def exclude(
     reason: Annotated[str, typer.Option(help="Reason, kept in NAME.yaml.")],
 ) -> None:
     """Leave rows out of a recording, with a reason; only its sidecar is changed."""
-    from compd.recording.exclusions import exclude_rows, rows_of_text
+    from compd.recording import exclude_rows, rows_of_text
 
     numbers = rows_of_text(rows, "--rows")
     exclude_rows(path, numbers, reason)
@@ -129,7 +129,7 @@ def include(
     rows: RowsOption,
 ) -> None:
     """Let rows count again after leaving them out."""
-    from compd.recording.exclusions import include_rows, rows_of_text
+    from compd.recording import include_rows, rows_of_text
 
     numbers = rows_of_text(rows, "--rows")
     include_rows(path, numbers)

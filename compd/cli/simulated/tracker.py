@@ -159,7 +159,7 @@ def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate
 
 def _for_join(shape: ExportFormat, link: int | None, points: bool, unit: str, rate_hz: float) -> str:
     """Options that `compd join` needs, since the file lacks the information."""
-    from compd.instruments.writers.registry import FORMATS
+    from compd.instruments import FORMATS
 
     written = FORMATS[shape.value]
     given = [

@@ -74,7 +74,7 @@ def check(
 
 def print_zero(configuration: Configuration) -> None:
     """Print the lengths at machine zero for a tape measure."""
-    from compd.configuration.operation import FRAME_DISTANCES
+    from compd.configuration import FRAME_DISTANCES
     from compd.machine_builder import build_model
 
     zero = build_model(configuration.geometry, configuration.wiring).zero
@@ -114,11 +114,15 @@ def print_blind_spots(configuration: Configuration) -> None:
 
 def print_lines(configuration: Configuration) -> list[Problem]:
     """Print the load of the lines and the undetected jumps of their gauges; return the resulting warnings."""
-    from compd.commissioning.feigned_jumps import feigned_jumps, jump_warnings, reply_warnings
-    from compd.commissioning.line_budget import line_budgets
-    from compd.commissioning.line_warnings import budget_warnings
-    from compd.commissioning.pushed_periods import period_warnings
-    from compd.commissioning.shared_addresses import shared_address_warnings
+    from compd.commissioning import (
+        budget_warnings,
+        feigned_jumps,
+        jump_warnings,
+        line_budgets,
+        period_warnings,
+        reply_warnings,
+        shared_address_warnings,
+    )
 
     budgets = line_budgets(configuration)
     jumps = feigned_jumps(configuration, budgets)
@@ -135,7 +139,7 @@ def print_lines(configuration: Configuration) -> list[Problem]:
 
 def _print_cycle(configuration: Configuration) -> list[Problem]:
     """Print the time of a cycle on this computer; return the resulting warning."""
-    from compd.commissioning.cycle_time import cycle_warnings, measure_cycle, python_effect_times
+    from compd.commissioning import cycle_warnings, measure_cycle, python_effect_times
 
     cycle = measure_cycle(configuration)
     typer.echo(

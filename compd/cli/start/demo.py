@@ -72,7 +72,7 @@ def demo(
 
 def _load_daemon() -> None:
     """Compile the kernels at the first start on a machine, with a message, so that the daemon's start does not wait."""
-    import_module("compd.live.run")
+    import_module("compd.live.run_daemon")
 
 
 def _show_live(config: Path | None, seed: int, port: int) -> None:

@@ -27,7 +27,7 @@ from compd.gauge import Quality
 from compd.simulation import ControlClient, Mechanism
 
 # Speed-up of weather and warm-up: a minute of demonstration is half an hour.
-SPEEDUP = 30.0
+LINUXCNC_SPEEDUP = 30.0
 # Time (s) at machine zero, until the controller commands the machine.
 ZERO_HOLD_S = 600.0
 SHIPPED_PROGRAM = Path(__file__).parent / "program.ngc"

@@ -24,7 +24,7 @@ def summarise_linuxcnc(demo: LinuxCncDemo) -> TerminalTable:
     return table
 
 
-def verdict(demo: LinuxCncDemo) -> str:
+def linuxcnc_verdict(demo: LinuxCncDemo) -> str:
     """The result in one sentence, for the rests or, without rests, for the whole program."""
     errors = demo.errors.values()
     resting = all(len(run.at_rest_um) for run in errors)

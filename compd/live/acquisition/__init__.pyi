@@ -4,7 +4,7 @@ from .cross_checks.cross_checks import Votes as Votes
 from .cross_checks.machine_view import WiredLength as WiredLength
 from .gauge_trust import Judge as Judge
 from .polled_round import FASTEST_ROUND_S as FASTEST_ROUND_S
-from .polled_round import NOTHING_UNDER_WAY as NOTHING_UNDER_WAY
+from .polled_round import NO_REPLY_PENDING as NO_REPLY_PENDING
 from .possible_motion import MotionLimits as MotionLimits
 from .possible_motion import unseen_jump_mm as unseen_jump_mm
 from .quantity_bounds import UNIT_LIMITS as UNIT_LIMITS

@@ -48,7 +48,7 @@ class Diagnosing:
 
     def page(self) -> bytes:
         """The page of the findings, compressed: the script for its figures is some megabytes."""
-        from compd.report.diagnosis_page import write_diagnosis_page
+        from compd.report import write_diagnosis_page
 
         assert self._diagnosis is not None
         is_sample = self._aligned.recording.rows < self._recorded_rows
