@@ -12,7 +12,7 @@ from compd.conformance.device_replies import DeviceReplies
 from compd.conformance.faults import Fault
 from compd.conformance.peer import Exchange, Peer, SensorValues
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, bad
-from compd.live.acquisition.polled_round import NO_REPLY_PENDING
+from compd.live.acquisition import NO_REPLY_PENDING
 
 LOOKS = 24  # fault-free polls at the start
 DIGITS_FROM = 2  # number of the first of them for learning the device's digit
