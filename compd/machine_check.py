@@ -13,13 +13,13 @@ from typing import TypeVar
 import numpy as np
 
 from compd.configuration import Configuration
-from compd.configuration.document import Document, Location
 from compd.configuration.effect_files import effect_file_problems
 from compd.configuration.geometry import Geometry
 from compd.configuration.machine_configuration import SECTIONS, Examined, examine, in_order
 from compd.configuration.operation import SocketSettings, StateSettings
 from compd.configuration.places import place_problems, place_warnings
-from compd.configuration.section import Section, readable
+from compd.documents.document import Document, Location
+from compd.documents.section import Section, readable
 from compd.errors import ConfigurationError, KinematicsError, Problem
 from compd.machine_builder import build_model
 from compd.machine_slips import axes_along_links, slips

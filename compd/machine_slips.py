@@ -14,8 +14,8 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
-from compd.configuration.document import Document, Location
 from compd.configuration.geometry import Geometry, ToolOnPlatformSettings
+from compd.documents.document import Document, Location
 from compd.errors import Problem
 from compd.model.machine import MachineModel
 

@@ -13,10 +13,10 @@ import yaml
 
 from compd.commissioning.open_gauge import STALE_AFTER_S, GaugeTarget, PortArguments, line_settings
 from compd.configuration import load
-from compd.configuration.document import CONFIGURATION, Document, read_document
 from compd.configuration.lines import LineSettings, powered
 from compd.configuration.machine_configuration import SECTIONS, gauges_of, in_order
-from compd.configuration.section import validate
+from compd.documents.document import CONFIGURATION, Document, read_document
+from compd.documents.section import validate
 from compd.errors import ConfigurationError, Problem
 from compd.files.file_kind import FileKind
 from compd.gauge import Gauge, GaugeOptions

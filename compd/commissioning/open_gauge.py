@@ -21,8 +21,8 @@ from compd.configuration.lines import (
     powered,
 )
 from compd.configuration.pushed_lines import MqttLine, OpcUaLine, PushedLineSettings
-from compd.configuration.section import separate_errors
-from compd.configuration.yaml_reader import parse_yaml
+from compd.documents.section import separate_errors
+from compd.documents.yaml_reader import parse_yaml
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, LineKind, Quality, Reading, bad
 from compd.lines import Line, open_line, open_stream

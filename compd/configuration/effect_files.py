@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from compd.configuration.document import Document
-from compd.configuration.section import AbsolutePath, Section
+from compd.documents.document import Document
+from compd.documents.section import AbsolutePath, Section
 from compd.errors import PluginError, Problem
 from compd.plugins import ListedCode
 

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from compd.configuration.document import Location
-from compd.configuration.section import Finite, Positive, Section
+from compd.documents.document import Location
+from compd.documents.section import Finite, Positive, Section
 
 LINKS: Mapping[str, int] = {"tripod_3spr": 3, "hexapod_6ups": 6}
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from typing import NamedTuple
 
-from compd.configuration.document import Location
 from compd.configuration.lines import CARRIES
 from compd.configuration.sections import Sections
+from compd.documents.document import Location
 from compd.errors import Problem
 from compd.text.number_text import join_words
 

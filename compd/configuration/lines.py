@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from compd.configuration.pushed_lines import MqttLine, OpcUaLine, PushedLineSettings
 from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
-from compd.configuration.section import Positive, Section, Text, refusal
+from compd.documents.section import Positive, Section, Text, refusal
 from compd.gauge import MOST_SKIPPED_BYTES, Gauge, LineKind
 
 AnyLine = TypeVar("AnyLine", bound="_LineSettings | PushedLineSettings")

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from pydantic import AfterValidator, Field, ValidationError
 
 from compd.configuration import crosscheck
-from compd.configuration.document import Document, Location, read_document
 from compd.configuration.effect_files import EffectFile, EffectFiles
 from compd.configuration.geometry import LINKS, Geometry, contradictions
 from compd.configuration.hashes import NOT_IN_ZERO, hash_of
@@ -27,9 +26,10 @@ from compd.configuration.operation import (
     Wiring,
 )
 from compd.configuration.plausible import implausible
-from compd.configuration.section import Text, readable, unknown_key, validate, validation_problems, value_text
 from compd.configuration.sections import Sections
 from compd.configuration.stated_noise import StatedNoise, stated_noise
+from compd.documents.document import Document, Location, read_document
+from compd.documents.section import Text, readable, unknown_key, validate, validation_problems, value_text
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
 from compd.plugins import GAUGES

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from compd.configuration.section import AbsolutePath, Positive, Section, Text, refusal
+from compd.documents.section import AbsolutePath, Positive, Section, Text, refusal
 
 
 class PushedLineSettings(Section):

@@ -31,8 +31,8 @@ import yaml
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from compd.configuration.section import Finite
-from compd.configuration.yaml_reader import decode, parse_yaml, read_text
+from compd.documents.section import Finite
+from compd.documents.yaml_reader import decode, parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem, StateError
 from compd.files.atomic_files import write_files
 from compd.files.checksum import CHECKSUM, checksum_of

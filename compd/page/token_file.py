@@ -10,7 +10,7 @@ from typing import get_args
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from compd.configuration.yaml_reader import parse_yaml, read_text
+from compd.documents.yaml_reader import parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem
 from compd.files.file_kind import FileKind
 from compd.page.guard import Role, Token, hashed, new_token

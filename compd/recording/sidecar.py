@@ -12,8 +12,8 @@ from typing import Annotated, Any, get_args
 import yaml
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
-from compd.configuration.document import Document, read_document
-from compd.configuration.section import Section, refusal, unknown_key, validate
+from compd.documents.document import Document, read_document
+from compd.documents.section import Section, refusal, unknown_key, validate
 from compd.errors import ConfigurationError, Problem, RecordingError
 from compd.files.file_kind import FileKind
 from compd.recording.reference import Quantity, Reference

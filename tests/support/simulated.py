@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from compd.configuration.document import read_document
 from compd.configuration.geometry import Geometry
 from compd.configuration.operation import Wiring
+from compd.documents.document import read_document
 from tests.support.paths import CONFIG
 
 TRIPOD = CONFIG / "tripod-cmm.yaml"

@@ -12,7 +12,7 @@ import yaml
 from compd.client import connect
 from compd.clock import MonotonicClock
 from compd.configuration import Configuration, load
-from compd.configuration.document import read_document
+from compd.documents.document import read_document
 from compd.simulation.truth.world import World
 from compd.simulation.wires.server import Simulation
 from tests.support.paths import CONFIG

@@ -86,7 +86,7 @@ def _print_table(name: str, results: list[tuple[str, CaseResult]]) -> None:
 
 
 def _read_options(path: Path, driver: str) -> dict[str, Any]:
-    from compd.configuration.document import read_document
+    from compd.documents.document import read_document
     from compd.files.file_kind import FileKind
     from compd.plugins import GAUGES, load
 

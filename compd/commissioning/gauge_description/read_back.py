@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from compd.commissioning.gauge_description.capture import CapturedReply
 from compd.commissioning.gauge_description.reply_columns import DescriptionError
-from compd.configuration.section import separate_errors
+from compd.documents.section import separate_errors
 from compd.errors import Problem
 from compd.gauge import Gauge, LineFault, Quality
 

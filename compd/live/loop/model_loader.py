@@ -15,7 +15,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import GaugeValues, WarmStart
-from compd.configuration.yaml_reader import LARGEST_BYTES
+from compd.documents.yaml_reader import LARGEST_BYTES
 from compd.errors import Problem, StateError
 from compd.files.atomic_files import read_small_file
 from compd.live.loop.machine_zero import MachineZero

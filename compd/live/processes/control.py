@@ -6,7 +6,7 @@ import os
 import select
 from enum import IntEnum
 
-from compd.configuration.yaml_reader import LARGEST_BYTES
+from compd.documents.yaml_reader import LARGEST_BYTES
 from compd.live.memory.shared_array import shared_counters
 from compd.live.memory.shared_message import SharedMessage
 

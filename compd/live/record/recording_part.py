@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from compd.configuration.yaml_reader import LARGEST_BYTES
+from compd.documents.yaml_reader import LARGEST_BYTES
 from compd.files.atomic_files import read_small_file, sync_directory, write_new_file
 from compd.live.record.appended_file import AppendedFile
 from compd.live.record.part_table import part_table

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import structlog
 
 from compd.clock import Clock
-from compd.configuration.yaml_reader import LARGEST_BYTES
+from compd.documents.yaml_reader import LARGEST_BYTES
 from compd.files.atomic_files import read_descriptor
 from compd.live.loop.model_loader import ModelText
 from compd.live.processes.control import Control

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from compd.configuration.document import Document, read_entries
-from compd.configuration.section import unknown_key
 from compd.configuration.shipped import shipped_effects
+from compd.documents.document import Document, read_entries
+from compd.documents.section import unknown_key
 from compd.errors import CompdError, ConfigurationError, PluginError, Problem
 from compd.files.file_kind import FileKind
 from compd.model.effect import Effect

@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from compd.configuration.yaml_reader import parse_yaml
+from compd.documents.yaml_reader import parse_yaml
 from compd.errors import Problem, StateError
 from compd.model.library.effects_file import EFFECTS_FILE
 

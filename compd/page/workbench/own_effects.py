@@ -7,7 +7,7 @@ import threading
 from collections.abc import Mapping
 from pathlib import Path
 
-from compd.configuration.yaml_reader import read_text
+from compd.documents.yaml_reader import read_text
 from compd.errors import CompdError, Problem, StateError
 from compd.files.atomic_files import file_stamp, write_files
 from compd.model.effect import Effect

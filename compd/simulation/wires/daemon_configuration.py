@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from compd.configuration import Configuration, load
-from compd.configuration.document import read_document
+from compd.documents.document import read_document
 from compd.errors import ConfigurationError, Problem
 from compd.files.atomic_files import write_files
 from compd.files.output_file import check_replaceable

@@ -14,8 +14,8 @@ from compd.cli.live.poll import gauge_status
 from compd.cli.main import app
 from compd.client import connect
 from compd.configuration import load
-from compd.configuration.document import read_document
 from compd.configuration.operation import SocketSettings, StateSettings
+from compd.documents.document import read_document
 from tests.support.paths import CONFIG
 from tests.support.running_daemon import supervised
 from tests.support.serial_gateway import SerialGateway, serial_gateway

@@ -15,7 +15,7 @@ import compd.configuration.line_checks
 from compd.cli.main import app
 from compd.commissioning.pushed_periods import period_warnings
 from compd.configuration import Configuration, load
-from compd.configuration.document import read_document
+from compd.documents.document import read_document
 from compd.errors import ConfigurationError
 from tests.support.mosquitto import needs_mosquitto, publisher, running_broker
 from tests.support.paths import CONFIG
