@@ -16,10 +16,10 @@ from compd.commissioning.line_budget import LineBudget
 from compd.commissioning.pushed_periods import longest_period_s
 from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
-from compd.configuration.lines import CARRIES
 from compd.configuration.stated_noise import tolerance_mm
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
+from compd.lines.registry import definition_of
 from compd.live.acquisition.polled_round import FASTEST_ROUND_S
 from compd.live.acquisition.possible_motion import MotionLimits, unseen_jump_mm
 
@@ -122,7 +122,7 @@ def reply_warnings(configuration: Configuration) -> list[Problem]:
             next_step="let replies carry an address (see `compd gauge show DRIVER`), or give each gauge a line",
         )
         for line, settings in configuration.lines.items()
-        if CARRIES[settings.kind] == "bytes"
+        if definition_of(settings).carries == "bytes"
         and (
             unnamed := _without_identity(
                 {name: gauges[name].reply_identity for name, on in configuration.gauges.items() if on.line == line}

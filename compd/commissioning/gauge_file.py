@@ -11,15 +11,16 @@ from typing import Any
 
 import yaml
 
-from compd.commissioning.open_gauge import STALE_AFTER_S, GaugeTarget, PortArguments, line_settings
+from compd.commissioning.open_gauge import STALE_AFTER_S, GaugeTarget, line_settings
 from compd.configuration import load
-from compd.configuration.lines import LineSettings, powered
 from compd.configuration.machine_configuration import SECTIONS, gauges_of, in_order
 from compd.documents.document import CONFIGURATION, Document, read_document
 from compd.documents.section import validate
 from compd.errors import ConfigurationError, Problem
 from compd.files.file_kind import FileKind
 from compd.gauge import Gauge, GaugeOptions
+from compd.lines.line_settings import LineSettings, powered
+from compd.lines.port_arguments import PortArguments
 
 LEARNED_GAUGE, LEARNED_LINE = "learned_gauge", "learned_line"
 _SECTIONS = {"gauges", "lines"}
@@ -95,6 +96,6 @@ def _target(
             )
         )
     if line is None:
-        line = line_settings(port, drivers[name].line_kind == "registers")
+        line = line_settings(port, drivers[name].line_kind)
     on_line = [drivers[other](gauges[other]) for other in gauges if gauges[other].line == options.line]
     return GaugeTarget(name, drivers[name](options), powered(line, on_line), options.stale_after_s or stale_after_s)

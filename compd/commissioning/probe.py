@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.clock import MonotonicClock
-from compd.commissioning.open_gauge import PortArguments, byte_line_settings, line_settings
-from compd.configuration.lines import powered
+from compd.commissioning.open_gauge import byte_line_settings, line_settings
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line, open_stream
 from compd.lines.echo import explained
+from compd.lines.line_settings import powered
 from compd.lines.port import Port
+from compd.lines.port_arguments import PortArguments
 from compd.lines.stream import StreamLine, shown
 from compd.plugins import GAUGES, load, names
 
@@ -119,7 +120,7 @@ def probe_port(path: str, candidate: PresetCandidate) -> ProbeOutcome:
     """The outcome of one read on the port `path`. SENDS the candidate's request, and the ends of commands around it."""
     try:
         settings = line_settings(
-            PortArguments(path, candidate.baud, candidate.format, PROBE_TIMEOUT_S), candidate.on_registers
+            PortArguments(path, candidate.baud, candidate.format, PROBE_TIMEOUT_S), candidate.gauge.line_kind
         )
         closing = not candidate.on_registers
         line = open_line(

@@ -15,7 +15,6 @@ from compd.configuration import crosscheck
 from compd.configuration.effect_files import EffectFile, EffectFiles
 from compd.configuration.geometry import LINKS, Geometry, contradictions
 from compd.configuration.hashes import NOT_IN_ZERO, hash_of
-from compd.configuration.lines import LineSettings
 from compd.configuration.operation import (
     AcquisitionSettings,
     LimitSettings,
@@ -32,6 +31,8 @@ from compd.documents.document import Document, Location, read_document
 from compd.documents.section import Text, readable, unknown_key, validate, validation_problems, value_text
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
+from compd.lines.line_settings import LineSettings
+from compd.lines.registry import LINES_BY_NAME
 from compd.plugins import GAUGES
 from compd.plugins import load as load_plugin
 from compd.tables import Columns, data_frame, html_table
@@ -58,7 +59,7 @@ SECTIONS: Mapping[str, Any] = {
     ],
     "geometry": Geometry,
     "lines": Annotated[
-        dict[str, LineSettings], Field(description="The lines (ports), by name; each is polled by a thread of its own.")
+        LINES_BY_NAME, Field(description="The lines (ports), by name; each is polled by a thread of its own.")
     ],
     "wiring": Wiring,
     "loop": LoopSettings,

@@ -22,9 +22,8 @@ import structlog
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration
 from compd.configuration.effect_files import listed_code
-from compd.configuration.lines import powered
-from compd.configuration.pushed_lines import PushedLineSettings
 from compd.errors import DaemonError, StateError
+from compd.lines.line_settings import PushedLineSettings, powered
 from compd.live.acquisition.acquisition import Acquisition
 from compd.live.acquisition.votes.votes import Votes
 from compd.live.loop.adopted_models import AdoptedModels

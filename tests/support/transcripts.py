@@ -17,10 +17,10 @@ import yaml
 
 from compd.clock import MonotonicClock
 from compd.gauge import Gauge, LineFault, Quality, Reading
-from compd.lines.modbus_rtu import RtuMaster
-from compd.lines.modbus_tcp import ModbusTcp
+from compd.lines.kinds.modbus_rtu.master import RtuMaster
+from compd.lines.kinds.modbus_tcp.master import ModbusTcp
+from compd.lines.twins.modbus_slaves import ModbusSlaves
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
-from compd.simulation.wires.modbus_slaves import ModbusSlaves
 
 PATIENCE_S = 5.0
 

@@ -12,9 +12,10 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from compd.clock import MonotonicClock
-from compd.configuration.lines import LineSettings
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines import open_line
+from compd.lines.line_settings import LineSettings
+from compd.lines.registry import ANY_LINE
 from compd.live.memory.latest import Latest
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
@@ -23,7 +24,7 @@ from compd.simulation.wires.simulated_line import SimulatedLine
 PATIENCE_S = 20.0
 
 Sense = Callable[[str], float]
-SETTINGS: TypeAdapter[LineSettings] = TypeAdapter(LineSettings)
+SETTINGS: TypeAdapter[LineSettings] = TypeAdapter(ANY_LINE)
 
 
 class InstantClock:

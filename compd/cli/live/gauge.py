@@ -13,8 +13,9 @@ from compd.cli.options import OverwriteOption
 
 if TYPE_CHECKING:
     from compd.commissioning.gauge_statistics import GaugeStatistics
-    from compd.commissioning.open_gauge import GaugeTarget, PortArguments
+    from compd.commissioning.open_gauge import GaugeTarget
     from compd.gauge import Reading
+    from compd.lines.port_arguments import PortArguments
 
 gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and describe gauges.")
 
@@ -289,7 +290,7 @@ def _between_captures(done: int, wanted: int) -> None:
 def _port(
     port: str, baud: int | None, form: str | None, timeout_s: float, line_keys: Sequence[str] | None
 ) -> PortArguments:
-    from compd.commissioning.open_gauge import PortArguments
+    from compd.lines.port_arguments import PortArguments
 
     return PortArguments(port, baud, form, timeout_s, line_keys or ())
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from compd.commissioning.conformance.faults import Piece
 from compd.commissioning.conformance.peer import Peer
 from compd.gauge import LineFault, Quality
-from compd.lines.modbus_rtu import RtuMaster
+from compd.lines.kinds.modbus_rtu.master import RtuMaster
 from compd.lines.stream import StreamLine
 
 TURNAROUND_S = 1e-3  # from the last bit of a request to the first of the reply

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from compd.clock import MonotonicClock
 from compd.commissioning.open_gauge import open_tapped_stream
-from compd.configuration.lines import ModbusRtuLine, SerialLine, TcpLine
 from compd.errors import CompdError, Problem
 from compd.gauge import LineFault, Quality
+from compd.lines.line_settings import PolledLineSettings
 from compd.lines.stream import StreamLine
 
 LONGEST_REPLY = 1024
@@ -85,7 +85,7 @@ def unescaped(text: str) -> bytes:
 
 
 def capture_live(
-    settings: SerialLine | ModbusRtuLine | TcpLine,
+    settings: PolledLineSettings,
     out: str,
     wanted: int,
     between: Callable[[int, int], None],

@@ -12,12 +12,12 @@ import math
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
 
 from compd.clock import Clock
-from compd.configuration.lines import PolledLine
 from compd.gauge import LineFault, Quality, Reading
 from compd.lines.echo import explained
+from compd.lines.line import Line
+from compd.lines.line_settings import PolledLineSettings
 from compd.lines.stream import shown
 from compd.live.acquisition.absent_gauges import AbsentGauges
 from compd.live.acquisition.polled_gauge import DAMAGED, LONGEST_REST_S, BackOff, PolledGauge
@@ -35,28 +35,6 @@ NOT_LATCHED_S = -math.inf
 NOTHING_UNDER_WAY = (Quality.LINE_LOST, Quality.DEVICE_ERROR, Quality.SILENT)
 
 
-class OpenLine(Protocol):
-    """What acquisition itself needs of a line; the rest is between the line and the driver."""
-
-    @property
-    def last_request_s(self) -> float:
-        """Monotonic time of the last request, s; -inf before the first, and where a reply names its request."""
-
-    @property
-    def unexpected_bytes(self) -> int:
-        """Bytes that came without a request, since the line was opened."""
-
-    @property
-    def request_came_back(self) -> bool:
-        """Whether the first bytes that came after the last request are that request."""
-
-    def drain(self, quiet_s: float | None = None) -> bytes:
-        """Wait until nothing has come for `quiet_s`, the line's timeout if None; what came."""
-
-    def close(self) -> None:
-        """Close the line."""
-
-
 class PolledRound:
     """The gauges of one line that are polled in turn; used by its thread.
 
@@ -68,7 +46,7 @@ class PolledRound:
     def __init__(
         self,
         gauges: Sequence[PolledGauge],
-        settings: PolledLine,
+        settings: PolledLineSettings,
         buffer: RoundBuffer | None,
         clock: Clock,
         stop: threading.Event,
@@ -103,7 +81,7 @@ class PolledRound:
         self._waiting.clear()
         self._publish()
 
-    def take(self, line: OpenLine) -> None:
+    def take(self, line: Line) -> None:
         """Poll every gauge that is not resting, then wait for the next round. Raises LineFault (LINE_LOST)."""
         start_s = self._clock.monotonic()
         self._dropped_before = line.unexpected_bytes
@@ -135,7 +113,7 @@ class PolledRound:
         if self._buffer is not None:
             self._buffer.publish()
 
-    def _latch(self, due: Sequence[PolledGauge], line: OpenLine) -> float | None:
+    def _latch(self, due: Sequence[PolledGauge], line: Line) -> float | None:
         """Send the round trigger: its time (s); None where the line has none, NOT_LATCHED_S where it failed.
 
         The gauges of that round have no value then: they would show what they have latched before. Raises LineFault
@@ -155,7 +133,7 @@ class PolledRound:
                 gauge.fail(fault.quality, text, self._clock.monotonic())
             return NOT_LATCHED_S
 
-    def _poll(self, gauge: PolledGauge, line: OpenLine, latched_s: float | None) -> None:
+    def _poll(self, gauge: PolledGauge, line: Line, latched_s: float | None) -> None:
         start_s = self._clock.monotonic()
         failures = gauge.failures
         with self._faults_of(gauge, line):
@@ -175,7 +153,7 @@ class PolledRound:
         if gauge.failures > failures:
             self._absent.missed(gauge, start_s)
 
-    def _ask(self, gauge: PolledGauge, line: OpenLine, latched_s: float | None) -> Sequence[Reading]:
+    def _ask(self, gauge: PolledGauge, line: Line, latched_s: float | None) -> Sequence[Reading]:
         """The gauge's answer; after a missed reply its second one, where `ReplyOrder` wants that."""
         now_s = self._clock.monotonic()
         self._order.asked(now_s)
@@ -188,7 +166,7 @@ class PolledRound:
         self._order.answered_again(self._clock.monotonic() - again_s)
         return readings
 
-    def _publish_waiting(self, line: OpenLine) -> None:
+    def _publish_waiting(self, line: Line) -> None:
         """Publish the readings that wait, if nothing more comes. Raises LineFault (LINE_LOST)."""
         if not self._waiting:
             return
@@ -225,7 +203,7 @@ class PolledRound:
             gauge.resume()  # the silence has been kept
 
     @contextmanager
-    def _faults_of(self, gauge: PolledGauge, line: OpenLine) -> Iterator[None]:
+    def _faults_of(self, gauge: PolledGauge, line: Line) -> Iterator[None]:
         """Count what goes wrong with a gauge, and leave the line without anything under way, so far as that can be.
 
         Raises LineFault (LINE_LOST).
@@ -241,7 +219,7 @@ class PolledRound:
         except Exception as error:  # noqa: BLE001  of a driver; it must not end the line's thread
             self._fail(gauge, line, Quality.DRIVER_ERROR, gauge.driver_error(error))
 
-    def _fail(self, gauge: PolledGauge, line: OpenLine, quality: Quality, detail: str) -> None:
+    def _fail(self, gauge: PolledGauge, line: Line, quality: Quality, detail: str) -> None:
         """Raises LineFault (LINE_LOST)."""
         failed_s = self._clock.monotonic()
         if quality in NOTHING_UNDER_WAY:

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compd.configuration.round_trigger import TriggerBytes, TriggerWrite
 from compd.gauge import Gauge, Reading
+from compd.lines.round_trigger import TriggerBytes, TriggerWrite
 from compd.live.memory.latest import Latest
 
 

@@ -18,10 +18,11 @@ from compd.commissioning.gauge_description.capture import read_capture
 from compd.commissioning.open_gauge import open_tapped_line
 from compd.commissioning.probe import PresetCandidate, preset_candidates, probe_port
 from compd.configuration import load as load_machine
-from compd.configuration.lines import ModbusRtuLine, SerialLine
 from compd.errors import CompdError
 from compd.lines import open_line
 from compd.lines.computer_ports import serial_ports
+from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
+from compd.lines.kinds.serial.settings import SerialLine
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.paths import ROOT

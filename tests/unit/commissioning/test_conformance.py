@@ -21,7 +21,7 @@ from compd.commissioning.conformance.harness import ASKED_AGAIN_TIMEOUTS
 from compd.commissioning.conformance.report import DriverUnderTest, driver_under_test, run_conformance
 from compd.commissioning.conformance.value_cases import share_of
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
-from compd.lines.modbus_rtu import RtuMaster
+from compd.lines.kinds.modbus_rtu.master import RtuMaster
 from compd.simulation.wires.device import SimulatedByteDevice
 from tests.support.sampled import sampled
 

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from compd.commissioning.doctor import ports, system
+from compd.commissioning.doctor import system
 from compd.commissioning.doctor.examine import examine, is_fit, what_to_do
-from compd.commissioning.doctor.finding import Computer, Finding, Verdict, advice, fault, good
 from compd.commissioning.doctor.ports import port_findings
 from compd.commissioning.doctor.system import (
     clock_findings,
@@ -22,7 +21,11 @@ from compd.commissioning.doctor.system import (
     unit_finding,
 )
 from compd.configuration import load
-from compd.configuration.lines import LineSettings, ModbusTcpLine, SerialLine
+from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
+from compd.lines.kinds.serial.settings import SerialLine
+from compd.lines.line_settings import LineSettings
+from compd.lines.probes import serial_port as ports
+from compd.lines.probes.finding import Computer, Finding, Verdict, advice, fault, good
 from tests.support.paths import CONFIG
 
 PORT = "/dev/serial/by-id/usb-FTDI_A1-if00-port0"

@@ -14,9 +14,10 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.commissioning.probe import PresetCandidate, announcements, preset_candidates, probe_port
-from compd.configuration.lines import ModbusRtuLine, SerialLine
 from compd.gauge import Quality
 from compd.lines import open_stream
+from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
+from compd.lines.kinds.serial.settings import SerialLine
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.sampled import sampled

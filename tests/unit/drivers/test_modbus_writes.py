@@ -11,9 +11,9 @@ from pydantic import ValidationError
 
 from compd.commissioning.conformance.report import driver_under_test, run_conformance
 from compd.gauge import LineFault, Quality, RegisterReply
-from compd.lines.modbus_rtu import RtuMaster, crc16
+from compd.lines.kinds.modbus_rtu.master import RtuMaster, crc16
 from compd.lines.stream import StreamLine
-from compd.simulation.wires.modbus_slaves import ModbusSlaves
+from compd.lines.twins.modbus_slaves import ModbusSlaves
 from compd_drivers.modbus import Modbus
 from compd_drivers.simulated.modbus import SimulatedRegisters
 from tests.support.wire_rig import InstantClock, ScriptedPort, rig

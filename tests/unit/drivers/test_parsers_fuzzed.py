@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines.modbus_rtu import RtuMaster, crc16
+from compd.lines.kinds.modbus_rtu.master import RtuMaster, crc16
 from compd.lines.stream import StreamLine
 from compd.plugins import GAUGES, load
 from tests.support.wire_rig import InstantClock, ScriptedPort

@@ -28,8 +28,8 @@ from compd.fleet.recordings import find_recordings
 from compd.instruments.export import SHAPES, ReadOptions
 from compd.instruments.preview import preview_export
 from compd.instruments.read import read_export
-from compd.lines.mqtt_tls import tls_context
-from compd.lines.opc_ua_login import _certificate, _private_key
+from compd.lines.kinds.mqtt.tls import tls_context
+from compd.lines.kinds.opc_ua.login import _certificate, _private_key
 from compd.live.loop.machine_zero import FILE_NAME as ZERO_NAME
 from compd.live.loop.machine_zero import load_zero
 from compd.live.memory.trust_memory import TrustMemory

@@ -15,10 +15,13 @@ import pytest
 from compd.clock import Clock
 from compd.commissioning.conformance.faults import Piece
 from compd.commissioning.conformance.virtual import VirtualWire
-from compd.commissioning.line_budget import USUAL_TURNAROUND_S, character_bits, line_budgets
+from compd.commissioning.line_budget import USUAL_TURNAROUND_S, line_budgets
 from compd.configuration import load
 from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Reading
+from compd.lines.pace import character_bits
+from compd.lines.twins.byte_devices import ByteDevices
+from compd.lines.twins.modbus_slaves import ModbusSlaves
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
@@ -26,8 +29,6 @@ from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
-from compd.simulation.wires.modbus_slaves import ModbusSlaves
-from compd.simulation.wires.simulated_line import ByteDevices
 from tests.support.paths import CONFIG
 from tests.support.wire_rig import PATIENCE_S
 

@@ -15,7 +15,7 @@ from pymodbus.framer.rtu import FramerRTU
 
 from compd.clock import MonotonicClock
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, good
-from compd.lines.modbus_rtu import RtuMaster
+from compd.lines.kinds.modbus_rtu.master import RtuMaster
 from compd.lines.stream import StreamLine
 from compd.live.acquisition.acquisition import Acquisition, LineThread
 from compd.live.acquisition.possible_motion import MotionLimits

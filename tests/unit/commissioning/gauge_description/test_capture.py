@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from compd.commissioning.gauge_description.capture import CapturedReply, capture_live, read_capture, saved_capture
-from compd.configuration.lines import SerialLine
 from compd.errors import CompdError
+from compd.lines.kinds.serial.settings import SerialLine
 
 
 @contextmanager

@@ -16,9 +16,9 @@ from asyncua.server.server import Server
 from asyncua.ua.status_codes import StatusCodes
 
 from compd.clock import Clock
-from compd.simulation.wires.device import SimulatedPushedDevice
-from compd.simulation.wires.pushed_line import WRONG_TYPE, SimulatedPushedLine, is_off
-from compd.simulation.wires.wire_ends import LOOPBACK
+from compd.lines.twins.device import SimulatedPushedDevice
+from compd.lines.twins.pushed_line import WRONG_TYPE, SimulatedPushedLine, is_off
+from compd.lines.twins.wire_ends import LOOPBACK
 
 for _name in ("asyncua.server", "asyncua.client"):
     logging.getLogger(_name).setLevel(logging.CRITICAL)
