@@ -14,8 +14,6 @@ from typing import Any, TypeAlias, TypeVar, cast
 from numba import boolean, float64, guvectorize, int64, njit
 from numba.core import config as numba_config
 
-from compd import travel_direction
-
 Kernel: TypeAlias = Callable[..., Any]
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
@@ -45,8 +43,9 @@ def _cache_directory() -> str:
     numba knows compiled code as outdated by the kernel's own file alone. The digest makes a change in a helper or a
     limit count as well: no machine runs last version's kernels.
     """
-    here = Path(__file__).parents[1]  # kernels and helpers are anywhere below model/, but for the rule of a reversal
-    texts = [file.read_bytes() for file in [Path(travel_direction.__file__), *sorted(here.rglob("*.py"))]]
+    here = Path(__file__).parent  # kernels and helpers are beside this file, and anywhere below model/
+    files = [*sorted(here.glob("*.py")), *sorted((here / "model").rglob("*.py"))]
+    texts = [file.read_bytes() for file in files]
     compiled = [
         text for text in texts if b"@helper" in text or b"kernel(" in text or b"@loop" in text or b"_LIMIT = " in text
     ]

@@ -15,11 +15,8 @@ import numpy as np
 from compd.configuration import (
     SECTIONS,
     Configuration,
-    Document,
     Examined,
     Geometry,
-    Location,
-    Section,
     SocketSettings,
     StateSettings,
     effect_file_problems,
@@ -27,8 +24,8 @@ from compd.configuration import (
     in_order,
     place_problems,
     place_warnings,
-    readable,
 )
+from compd.documents import Document, Location, Section, readable
 from compd.errors import ConfigurationError, KinematicsError, Problem
 from compd.machine_builder import build_model
 from compd.machine_slips import axes_along_links, slips

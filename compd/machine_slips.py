@@ -14,7 +14,8 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
-from compd.configuration import Document, Geometry, Location, ToolOnPlatformSettings
+from compd.configuration import Geometry, ToolOnPlatformSettings
+from compd.documents import Document, Location
 from compd.errors import Problem
 from compd.model import MachineModel
 

@@ -1,1 +1,5 @@
 """The public functions that combine several packages, for `import compd` and the commands."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -14,9 +14,10 @@ from typing import NamedTuple
 
 from compd.commissioning.line_budget import LineBudget
 from compd.commissioning.pushed_periods import longest_period_s
-from compd.configuration import CARRIES, Configuration, resolve_channel
+from compd.configuration import Configuration, resolve_channel
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
+from compd.lines import definition_of
 from compd.live.acquisition import FASTEST_ROUND_S, MotionLimits, unseen_jump_mm
 from compd.stated_noise import tolerance_mm
 
@@ -119,7 +120,7 @@ def reply_warnings(configuration: Configuration) -> list[Problem]:
             next_step="let replies carry an address (see `compd gauge show DRIVER`), or give each gauge a line",
         )
         for line, settings in configuration.lines.items()
-        if CARRIES[settings.kind] == "bytes"
+        if definition_of(settings).carries == "bytes"
         and (
             unnamed := _without_identity(
                 {name: gauges[name].reply_identity for name, on in configuration.gauges.items() if on.line == line}

@@ -17,78 +17,25 @@ silence 1.8 ms; with a turnaround of 1.8 ms a round takes 19.8 ms: 51 rounds a s
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from compd.configuration import (
+from compd.configuration import Configuration
+from compd.gauge import replies_tell_whose
+from compd.lines import (
     BROADCAST,
     WRITE_REGISTERS,
-    Configuration,
-    ModbusAsciiLine,
-    ModbusRtuLine,
-    ModbusTcpLine,
-    PolledLine,
-    PushedLineSettings,
-    SerialPortSettings,
+    Pace,
+    PolledDefinition,
+    PolledLineSettings,
+    Traffic,
     TriggerBytes,
+    polled_definition,
 )
-from compd.gauge import replies_tell_whose
-from compd.lines import QUIET_CHARACTERS
 from compd.live.acquisition import LATER_S, SLOWER
 
-SHORTEST_QUIET_RTU_S = 1.75e-3  # the same, above 19200 baud
-SHORTEST_QUIET_ASCII_S = 1e-3
-# Usual time (s) of a slave's answer. It must keep the silence, too; many take longer, so both are planned with.
+# A slave must keep the silence too before it answers; many take longer: 10 ms is usual, so plan with both.
 USUAL_TURNAROUND_S = 10e-3
-# Latency timer (s) of an FTDI adapter, after which it hands over an incomplete packet: 16 ms by default (FTDI
-# AN232B-04, "Data Throughput, Latency and Handshaking").
-LATENCY_TIMER_S = 16e-3
-# Time (s) of an exchange over Ethernet: a packet there and back through a device's firmware, independent of its length.
-TCP_EXCHANGE_S = 2e-3
-
-Traffic = Sequence[tuple[int, int]]
-
-
-@dataclass(frozen=True)
-class Pace:
-    """Times on a line, s.
-
-    character_s : of one character, 0 over TCP.
-    quiet_s : silence before a request.
-    turnaround_s : from a request's last bit to the reply's first.
-    """
-
-    character_s: float
-    quiet_s: float
-    turnaround_s: float
-
-    def exchange_s(self, sent: int, received: int) -> float:
-        """One request of `sent` bytes and its reply of `received` bytes, s."""
-        return self.quiet_s + (sent + received) * self.character_s + self.turnaround_s
-
-    def round_s(self, traffic: Traffic) -> float:
-        """All exchanges of a round, s."""
-        return sum(self.exchange_s(sent, received) for sent, received in traffic)
-
-
-def character_bits(form: str) -> int:
-    """Bits of one character on the wire: start, data, parity, stop; "8N1" has 10, "7E2" 11."""
-    return 1 + int(form[0]) + (form[1] != "N") + int(form[2])
-
-
-def serial_pace(baud: int, form: str, rtu: bool, turnaround_s: float | None = None) -> Pace:
-    """A serial line's pace. `turnaround_s`: never shorter than the silence that a device must keep; None for that."""
-    character_s = character_bits(form) / baud
-    quiet_s = max(QUIET_CHARACTERS * character_s, SHORTEST_QUIET_RTU_S if rtu else SHORTEST_QUIET_ASCII_S)
-    return Pace(character_s, quiet_s, max(quiet_s, turnaround_s or 0.0))
-
-
-def pace(line: PolledLine, turnaround_s: float | None = None) -> Pace:
-    """A configured line's pace. Behind socket:// the device server's baud rate counts: it is the configured one."""
-    if isinstance(line, SerialPortSettings):
-        serial = serial_pace(line.baud, line.format, isinstance(line, ModbusRtuLine), turnaround_s)
-        return replace(serial, quiet_s=max(serial.quiet_s, line.pause_s))
-    return Pace(0.0, line.pause_s, TCP_EXCHANGE_S if turnaround_s is None else max(turnaround_s, TCP_EXCHANGE_S))
 
 
 @dataclass(frozen=True)
@@ -102,7 +49,7 @@ class LineBudget:
     """
 
     name: str
-    line: PolledLine
+    line: PolledLineSettings
     gauges: int
     exchanges: int
     bytes: int
@@ -132,20 +79,21 @@ class LineBudget:
 
 
 def budget_of_line(
-    name: str, line: PolledLine, gauges: Mapping[str, Traffic | None], tells_whose: bool = True
+    name: str, line: PolledLineSettings, gauges: Mapping[str, Traffic | None], tells_whose: bool = True
 ) -> LineBudget:
     """The budget of one line; `gauges`: name -> traffic per poll as (bytes sent, bytes received), None = unknown.
 
     tells_whose : whether replies on this line say whose they are.
     """
-    if isinstance(line, ModbusAsciiLine):
-        gauges = {name: traffic and [_as_text(*exchange) for exchange in traffic] for name, traffic in gauges.items()}
+    kind = polled_definition(line)
+    gauges = {
+        name: traffic and [kind.bytes_on_wire(*exchange) for exchange in traffic] for name, traffic in gauges.items()
+    }
     known: list[tuple[int, int]] = [exchange for traffic in gauges.values() for exchange in traffic or ()]
-    slowest = pace(line, USUAL_TURNAROUND_S)
-    trigger_s = _trigger_s(line, pace(line)) if known else 0.0
+    fastest, slowest = kind.pace(line), kind.pace(line, USUAL_TURNAROUND_S)
+    trigger_s = _trigger_s(line, kind, fastest) if known else 0.0
     usual_s = [slowest.exchange_s(*exchange) for exchange in known]
-    # A request without an answer takes the timeout, or longer behind a busy gateway.
-    wait_s = max(line.timeout_s, (line.gateway_wait_s or 0.0) if isinstance(line, ModbusTcpLine) else 0.0)
+    wait_s = kind.absent_wait_s(line)
     absent_s = max(
         (wait_s - slowest.exchange_s(0, traffic[0][1]) for traffic in gauges.values() if traffic), default=wait_s
     )
@@ -155,7 +103,7 @@ def budget_of_line(
         gauges=len(gauges),
         exchanges=len(known),
         bytes=sum(sent + received for sent, received in known),
-        ideal_s=trigger_s + pace(line).round_s(known) + (0.0 if tells_whose else _silence_s(pace(line), known)),
+        ideal_s=trigger_s + fastest.round_s(known) + (0.0 if tells_whose else _silence_s(fastest, known)),
         usual_s=trigger_s + sum(usual_s) + (0.0 if tells_whose else _silence_s(slowest, known)),
         absent_s=absent_s,
         spread_s=0.0 if line.round_trigger is not None else sum(usual_s) - min(usual_s, default=0.0),
@@ -163,8 +111,8 @@ def budget_of_line(
     )
 
 
-def _trigger_s(line: PolledLine, line_pace: Pace) -> float:
-    """Time (s) of a round trigger with its settling time; includes the confirmation over TCP, and of a single slave."""
+def _trigger_s(line: PolledLineSettings, kind: PolledDefinition, line_pace: Pace) -> float:
+    """What a round trigger takes with its settling time, s; over TCP, and to one slave alone, with its confirmation."""
     trigger = line.round_trigger
     if trigger is None:
         return 0.0
@@ -173,17 +121,10 @@ def _trigger_s(line: PolledLine, line_pace: Pace) -> float:
         return line_pace.quiet_s + len(trigger.request) * line_pace.character_s + settle_s
     several = trigger.function == WRITE_REGISTERS
     sent = 9 + 2 * len(trigger.values) if several else 8  # Modbus over Serial Line V1.02: with unit and CRC
-    received = 8
-    if isinstance(line, ModbusAsciiLine):
-        (sent, received) = _as_text(sent, received)
-    if trigger.unit == BROADCAST and isinstance(line, SerialPortSettings):
+    sent, received = kind.bytes_on_wire(sent, 8)
+    if trigger.unit == BROADCAST and not kind.broadcast_answered:
         return line_pace.quiet_s + sent * line_pace.character_s + settle_s
     return max(line_pace.exchange_s(sent, received), settle_s)
-
-
-def _as_text(sent: int, received: int) -> tuple[int, int]:
-    """Length in Modbus ASCII of an RTU frame: two digits per byte, one byte of LRC for two of CRC, : CR LF."""
-    return 2 * (sent - 1) + 3, 2 * (received - 1) + 3 if received else 0
 
 
 def _silence_s(line_pace: Pace, traffic: Traffic) -> float:
@@ -202,7 +143,7 @@ def line_budgets(configuration: Configuration) -> list[LineBudget]:
     gauges = configuration.gauge_objects()
     budgets = []
     for name, line in configuration.lines.items():
-        if isinstance(line, PushedLineSettings):
+        if not isinstance(line, PolledLineSettings):
             continue
         if on_line := {gauge: gauges[gauge] for gauge in gauges_on(configuration, name)}:
             traffic = {gauge: driver.traffic() for gauge, driver in on_line.items()}

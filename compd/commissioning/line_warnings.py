@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from compd.commissioning.line_budget import LATENCY_TIMER_S, LineBudget, gauges_on
-from compd.configuration import Configuration, SerialPortSettings
+from compd.commissioning.line_budget import LineBudget, gauges_on
+from compd.configuration import Configuration
 from compd.errors import Problem
+from compd.lines import polled_definition
 
 # Largest skew (s) of lengths without a warning, if neither limited nor latched: at 1 mm/s, slow for a moving machine,
 # it makes 20 um, and a comparator shows a hundredth of that.
@@ -108,9 +109,8 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
                 next_step="raise poll_every_s, or the baud rate",
             )
         )
-    line = budget.line
-    if isinstance(line, SerialPortSettings) and line.low_latency is False and "://" not in line.port:
-        held_back_s = budget.usual_s + budget.exchanges * LATENCY_TIMER_S
+    if held_s := polled_definition(budget.line).held_back_s(budget.line):
+        held_back_s = budget.usual_s + budget.exchanges * held_s
         problems.append(
             Problem(
                 where=where,

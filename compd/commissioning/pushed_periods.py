@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from compd.configuration import Configuration, LineSettings, OpcUaLine, PushedLineSettings
+from compd.configuration import Configuration
 from compd.errors import Problem
 from compd.gauge import Gauge
+from compd.lines import LineSettings, PushedLineSettings
 from compd.pushed_gauge import PushedGauge
 from compd.source_time import LATE
 
 
 def longest_period_s(line: LineSettings, gauge: Gauge[Any]) -> float:
-    """Longest interval (s) of a gauge's values; nan if the configuration does not state it.
-
-    Of OPC UA: a value waits for the next look at its node, and then for the next message.
-    """
-    if isinstance(line, OpcUaLine):
-        return line.publishing_s + (line.publishing_s if line.sampling_s is None else line.sampling_s)
+    """The longest time from one value of a gauge to the next, s; nan where the configuration does not say it."""
+    if isinstance(line, PushedLineSettings) and line.longest_period_s is not None:
+        return line.longest_period_s
     period_s = gauge.period_s if isinstance(gauge, PushedGauge) else None
     return math.nan if period_s is None else period_s
 
@@ -34,14 +32,13 @@ def period_warnings(configuration: Configuration) -> list[Problem]:
         period_s = longest_period_s(line, gauge)
         stale_after_s = options.stale_after_s or configuration.loop.stale_after_s
         if LATE * period_s > stale_after_s:
-            key = "publishing_s" if isinstance(line, OpcUaLine) else "period_s"
             problems.append(
                 Problem(
                     where=configuration.where("gauges", name),
                     what=f"a new value comes every {period_s:g} s: readings go stale between two of them",
                     value=f"{stale_after_s:g} s until stale",
                     allowed=f"{LATE * period_s:.3g} s or more",
-                    next_step=f"let the device send more often and lower `{key}`, or raise `stale_after_s`",
+                    next_step=f"let the device send more often and lower `{line.period_key}`, or raise `stale_after_s`",
                 )
             )
     return problems

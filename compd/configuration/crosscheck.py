@@ -6,11 +6,11 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from compd.configuration.document import Location
 from compd.configuration.line_checks import line_problems
 from compd.configuration.line_slips import line_slips
 from compd.configuration.operation import FRAME_DISTANCES
 from compd.configuration.sections import Sections
+from compd.documents import Location
 from compd.errors import Problem
 from compd.gauge import Gauge, GaugeOptions
 

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from compd.configuration.document import Document
-from compd.configuration.section import AbsolutePath, Section
+from compd.documents import AbsolutePath, Document, Section
 from compd.errors import PluginError, Problem
 from compd.plugins import ListedCode
 

@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from compd.configuration.document import Location
-from compd.configuration.section import Finite, Positive, Section
+from compd.documents import Finite, Location, Positive, Section
 
 LINKS: Mapping[str, int] = {"tripod_3spr": 3, "hexapod_6ups": 6}
 

@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib.util import find_spec
-from typing import NamedTuple
 
-from compd.configuration.document import Location
-from compd.configuration.lines import CARRIES
 from compd.configuration.sections import Sections
+from compd.documents import Location
 from compd.errors import Problem
+from compd.lines import KINDS, kinds_that_carry
 from compd.text import join_words
-
-
-class _Library(NamedTuple):
-    """An optional package, and the extra that installs it."""
-
-    package: str
-    extra: str
-
-
-LIBRARIES: Mapping[str, _Library] = {"opc_ua": _Library("asyncua", "opcua"), "mqtt": _Library("paho", "mqtt")}
 
 
 def line_problems(sections: Sections) -> Iterator[Problem]:
@@ -37,10 +26,10 @@ def _port_problems(sections: Sections) -> Iterator[Problem]:
     """A port or an address of two lines: units behind one gateway wait for each other."""
     line_of_port: dict[str, str] = {}
     for name, line in sections.lines.items():
-        port = getattr(line, "port", None)
-        if port is None or getattr(line, "kind", None) in (None, "mqtt"):  # a broker takes many connections
+        definition = KINDS.get(getattr(line, "kind", None) or "")
+        port = "" if definition is None else endpoint(definition.device(line))
+        if not port:
             continue
-        port = endpoint(f"//{line.host}:{port}" if line.kind in ("tcp", "modbus_tcp") else port)
         if port in line_of_port:
             yield Problem(
                 where=sections.document.where(("lines", name, "port")),
@@ -85,19 +74,20 @@ def _kind_problems(sections: Sections) -> Iterator[Problem]:
         if kind is None or name not in sections.drivers:
             continue
         needed = sections.drivers[name].line_kind
-        if needed != CARRIES[kind]:
+        if needed != KINDS[kind].carries:
             yield Problem(
                 where=sections.document.where(location),
                 what=f"driver {options['driver']} needs a line that carries {needed}",
                 value=f"{line_name} (kind {kind})",
-                allowed="kind " + join_words([kind for kind, carries in CARRIES.items() if carries == needed], "or"),
+                allowed="kind " + join_words([other.kind for other in kinds_that_carry(needed)], "or"),
             )
 
 
 def _library_problems(sections: Sections) -> Iterator[Problem]:
     """A line of a kind without its library."""
     for name, line in sections.lines.items():
-        library = LIBRARIES.get(getattr(line, "kind", ""))
+        definition = KINDS.get(getattr(line, "kind", None) or "")
+        library = None if definition is None else definition.library
         if library is not None and find_spec(library.package) is None:
             yield Problem(
                 where=sections.document.where(("lines", name, "kind")),
@@ -111,11 +101,12 @@ def _signal_problems(sections: Sections) -> Iterator[Problem]:
     """A gauge whose request needs a signal that its line lacks."""
     for name, options in sections.gauges.items():
         line = sections.lines.get(options.line)
-        over_tcp = getattr(line, "kind", None) == "tcp" or str(getattr(line, "port", "")).startswith("socket://")
-        if over_tcp and (signals := sections.drivers[name](options).serial_signals):
+        definition = KINDS.get(getattr(line, "kind", None) or "")
+        without = "" if definition is None else definition.without_signals(line)
+        if without and (signals := sections.drivers[name](options).serial_signals):
             yield Problem(
                 where=sections.document.where(("gauges", name, "line")),
-                what=f"is asked by {' and '.join(signals)}, which a TCP connection does not have",
+                what=f"is asked by {' and '.join(signals)}, which {without} does not have",
                 value=options.line,
                 allowed="a serial port, or rfc2217://host:port",
                 next_step="let the device server speak RFC 2217, or use a port of this computer",

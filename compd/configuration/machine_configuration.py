@@ -12,11 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from pydantic import AfterValidator, Field, ValidationError
 
 from compd.configuration import crosscheck
-from compd.configuration.document import Document, Location, read_document
 from compd.configuration.effect_files import EffectFile, EffectFiles
 from compd.configuration.geometry import LINKS, Geometry, contradictions
 from compd.configuration.hashes import NOT_IN_ZERO, hash_of
-from compd.configuration.lines import LineSettings
 from compd.configuration.operation import (
     AcquisitionSettings,
     LimitSettings,
@@ -27,10 +25,21 @@ from compd.configuration.operation import (
     Wiring,
 )
 from compd.configuration.plausible import implausible
-from compd.configuration.section import Text, readable, unknown_key, validate, validation_problems, value_text
 from compd.configuration.sections import Sections
+from compd.documents import (
+    Document,
+    Location,
+    Text,
+    read_document,
+    readable,
+    unknown_key,
+    validate,
+    validation_problems,
+    value_text,
+)
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
+from compd.lines import LINES_BY_NAME, LineSettings
 from compd.plugins import GAUGES
 from compd.plugins import load as load_plugin
 from compd.result_tables import Columns, data_frame, html_table
@@ -58,7 +67,7 @@ SECTIONS: Mapping[str, Any] = {
     ],
     "geometry": Geometry,
     "lines": Annotated[
-        dict[str, LineSettings], Field(description="The lines (ports), by name; each is polled by a thread of its own.")
+        LINES_BY_NAME, Field(description="The lines (ports), by name; each is polled by a thread of its own.")
     ],
     "wiring": Wiring,
     "loop": LoopSettings,

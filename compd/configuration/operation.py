@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
-from compd.configuration.section import AbsolutePath, Finite, Positive, Section, Text, refusal
+from compd.documents import AbsolutePath, Finite, Positive, Section, Text, refusal
 
 # The nine distances of the frame's octahedron: t_k between the base platform's supports, u_k from them to the plate.
 FrameDistance = Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]

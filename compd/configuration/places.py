@@ -7,8 +7,8 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from compd.configuration.document import Document
 from compd.configuration.operation import SocketSettings, StateSettings
+from compd.documents import Document
 from compd.errors import Problem
 
 # Below these the service manager creates the daemon's own directory: RuntimeDirectory=, StateDirectory=.

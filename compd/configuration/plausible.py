@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from compd.configuration.document import Document, Location
+from compd.documents import Document, Location
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
 

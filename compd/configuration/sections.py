@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from compd.configuration.document import Document
+from compd.documents import Document
 from compd.gauge import Gauge, GaugeOptions
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from compd.conformance.faults import NONE, Fault, Piece
 from compd.gauge import Channel
-from compd.simulation import ModbusSlaves, SimulatedByteDevice, SimulatedRegisterDevice
+from compd.twins import ModbusSlaves, SimulatedByteDevice, SimulatedRegisterDevice
 
 # Ranges of gauges without a stated one, by unit.
 RANGES = {"mm": (-0.9, 0.9), "degC": (5.0, 45.0), "N": (-50.0, 50.0), "hPa": (950.0, 1050.0), "pct": (10.0, 90.0)}

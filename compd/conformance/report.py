@@ -17,10 +17,11 @@ from compd.conformance.harness import ConformanceSession, ConformanceWire
 from compd.conformance.peer import Peer, SensorValues
 from compd.conformance.talker_cases import CHARACTER_S, opened_within_a_line, seldom_read
 from compd.conformance.virtual import VirtualWire
-from compd.conformance.wire import CHARACTER_BITS, Kind, RealWire
+from compd.conformance.wire import CHARACTER_BITS, RealWire
 from compd.conformance.wire_cases import slowest_line
 from compd.errors import PluginError, Problem
 from compd.gauge import Gauge, Quality
+from compd.lines import PolledDefinition, kinds_that_carry, polled_kind
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.pushed_gauge import PushedGauge
 
@@ -59,11 +60,12 @@ class DriverUnderTest:
         device = self.simulator(self.options, lambda channel: 0.0)
         return not self.registers and not self.by_dtr and bool(device.speak())
 
-    def kinds(self) -> tuple[Kind, ...]:
-        """The kinds of this computer's lines for the test."""
+    def kinds(self) -> list[str]:
+        """The kinds of line of this computer on which it can be tried."""
         if self.by_dtr or self.unsolicited:
-            return ()
-        return ("modbus_rtu", "modbus_tcp") if self.registers else ("serial", "tcp")
+            return []
+        carrying = kinds_that_carry(self.gauge.line_kind)
+        return [kind.kind for kind in carrying if isinstance(kind, PolledDefinition) and kind.tries_drivers]
 
     def subject(self, over_tcp: bool, exact: bool) -> Subject:
         checksum = self.registers or self.gauge.integrity == "checksum"
@@ -87,9 +89,9 @@ class DriverUnderTest:
         wire = VirtualWire(peer, self.registers, character_s=character_s, unsolicited=self.unsolicited)
         return self._session(wire, sensors), wire
 
-    def real(self, kind: Kind, directory: Path, **settings: Any) -> ConformanceSession:
-        """The test on a pty or TCP port; `settings`: baud, timeout_s."""
-        peer, sensors = self.peer(over_tcp=kind == "modbus_tcp")
+    def real(self, kind: str, directory: Path, **settings: Any) -> ConformanceSession:
+        """On a pty or TCP port; `settings`: baud, timeout_s."""
+        peer, sensors = self.peer(over_tcp=polled_kind(kind).over_network)
         return self._session(RealWire(peer, kind, directory, **settings), sensors)
 
     def _with_options(self, options: Any) -> ConformanceSession:
@@ -159,7 +161,7 @@ def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iter
             return
         for kind in driver.kinds():
             session = driver.real(kind, Path(temporary))
-            subject = driver.subject(kind in ("tcp", "modbus_tcp"), False)
+            subject = driver.subject(polled_kind(kind).over_network, False)
             yield from _cases_on(kind, session, subject)
         session = driver.real(driver.kinds()[0], Path(temporary), baud=SLOWEST_BAUD, timeout_s=SLOW_TIMEOUT_S)
         try:

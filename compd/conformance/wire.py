@@ -8,15 +8,12 @@ import os
 import select
 import threading
 from pathlib import Path
-from typing import Literal
 
 from compd.clock import MonotonicClock
-from compd.configuration import ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
 from compd.conformance.peer import Peer
-from compd.lines import Line, open_line
-from compd.simulation import LOOPBACK, End, PtyEnd, TcpEnd
+from compd.lines import Line, PolledLineSettings, PortArguments, open_line, polled_kind
+from compd.twins import End
 
-Kind = Literal["serial", "tcp", "modbus_rtu", "modbus_tcp"]
 FAST_BAUD = 115200
 CHARACTER_BITS = 10  # 8N1: a pty knows no parity
 TURNAROUND_S = 1e-3
@@ -32,17 +29,18 @@ class RealWire:
     pause_s = 0.0
 
     def __init__(
-        self, peer: Peer, kind: Kind, directory: Path, baud: int = FAST_BAUD, timeout_s: float = TIMEOUT_S
+        self, peer: Peer, kind: str, directory: Path, baud: int = FAST_BAUD, timeout_s: float = TIMEOUT_S
     ) -> None:
         """`directory`: where a pty appears, as `port`."""
+        self._kind = polled_kind(kind)
         self.peer = peer
         self.clock = MonotonicClock()
         self.timeout_s = timeout_s
-        self.character_s = CHARACTER_BITS / baud if kind in ("serial", "modbus_rtu") else 0.0
-        self._kind = kind
+        self.character_s = 0.0 if self._kind.over_network else CHARACTER_BITS / baud
         self._baud = baud
         self._link = directory / "port"
-        self._tcp_port = 0
+        self._port = ""  # for the line, once it is open
+        self._number = 0  # of a network port
         self._end: End | None = None
         self._arriving: list[tuple[float, int, int, bytes]] = []  # due (s), order, to whom, what
         self._order = itertools.count()
@@ -74,20 +72,13 @@ class RealWire:
         os.close(self._wake_read)
         os.close(self._wake_write)
 
-    def _settings(self) -> SerialLine | TcpLine | ModbusRtuLine | ModbusTcpLine:
-        match self._kind:
-            case "serial":
-                return SerialLine(
-                    kind="serial", port=str(self._link), baud=self._baud, format=FORMAT, timeout_s=self.timeout_s
-                )
-            case "modbus_rtu":
-                return ModbusRtuLine(
-                    kind="modbus_rtu", port=str(self._link), baud=self._baud, format=FORMAT, timeout_s=self.timeout_s
-                )
-            case "tcp":
-                return TcpLine(kind="tcp", host=LOOPBACK, port=self._tcp_port, timeout_s=self.timeout_s)
-            case "modbus_tcp":
-                return ModbusTcpLine(kind="modbus_tcp", host=LOOPBACK, port=self._tcp_port, timeout_s=self.timeout_s)
+    def _settings(self) -> PolledLineSettings:
+        port = PortArguments(self._port, self._baud, FORMAT, self.timeout_s)
+        settings = self._kind.settings.model_validate(
+            {"kind": self._kind.kind, **self._kind.port_keys(port), "timeout_s": self.timeout_s}
+        )
+        assert isinstance(settings, PolledLineSettings)
+        return settings
 
     def _follow(self) -> None:
         """Wait until the thread has taken over new settings."""
@@ -110,11 +101,9 @@ class RealWire:
 
     def _set_plug(self, plugged: bool) -> None:
         if plugged and self._end is None:
-            if self._kind in ("serial", "modbus_rtu"):
-                self._end = PtyEnd(self._link)
-            else:
-                end = TcpEnd(self._tcp_port)
-                self._end, self._tcp_port = end, end.port
+            self._end = end = self._kind.twin.end(None, self._link, self._number)
+            self._number = end.number
+            self._port = end.port if isinstance(end.port, str) else "{}:{}".format(*end.port)
         elif not plugged and self._end is not None:
             self._end.close()
             self._end = None

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compd.configuration import parse_yaml, read_text
+from compd.documents import parse_yaml, read_text
 from compd.errors import CompdError, Problem
 from compd.fleet.fleet_recording import FleetRecording, RecordingFiles
 from compd.fleet.machine_names import MachinesBy, machine_in, matches_of, name_machines

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from compd.clock import MonotonicClock
-from compd.configuration import ModbusRtuLine, SerialLine, TcpLine
 from compd.errors import CompdError, Problem
 from compd.gauge import LineFault, Quality
 from compd.gauge_tools import open_tapped_stream
-from compd.lines import StreamLine
+from compd.lines import PolledLineSettings, StreamLine
 
 LONGEST_REPLY = 1024
 # Line ends of devices: CR, LF, ETX, EOT.
@@ -85,7 +84,7 @@ def unescaped(text: str) -> bytes:
 
 
 def capture_live(
-    settings: SerialLine | ModbusRtuLine | TcpLine,
+    settings: PolledLineSettings,
     out: str,
     wanted: int,
     between: Callable[[int, int], None],

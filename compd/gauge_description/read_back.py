@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from compd.configuration import separate_errors
+from compd.documents import separate_errors
 from compd.errors import Problem
 from compd.gauge import Gauge, LineFault, Quality
 from compd.gauge_description.capture import CapturedReply

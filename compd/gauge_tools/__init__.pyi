@@ -6,7 +6,6 @@ from .gauge_file import gauge_file_text as gauge_file_text
 from .gauge_file import gauge_of_file as gauge_of_file
 from .gauge_statistics import GaugeStatistics as GaugeStatistics
 from .open_gauge import GaugeTarget as GaugeTarget
-from .open_gauge import PortArguments as PortArguments
 from .open_gauge import aged as aged
 from .open_gauge import byte_line_settings as byte_line_settings
 from .open_gauge import gauge_of_driver as gauge_of_driver

@@ -11,22 +11,13 @@ from typing import Any
 
 import yaml
 
-from compd.configuration import (
-    CONFIGURATION,
-    SECTIONS,
-    Document,
-    LineSettings,
-    gauges_of,
-    in_order,
-    load,
-    powered,
-    read_document,
-    validate,
-)
+from compd.configuration import SECTIONS, gauges_of, in_order, load
+from compd.documents import CONFIGURATION, Document, read_document, validate
 from compd.errors import ConfigurationError, Problem
 from compd.files import FileKind
 from compd.gauge import Gauge, GaugeOptions
-from compd.gauge_tools.open_gauge import STALE_AFTER_S, GaugeTarget, PortArguments, line_settings
+from compd.gauge_tools.open_gauge import STALE_AFTER_S, GaugeTarget, line_settings
+from compd.lines import LineSettings, PortArguments, powered
 
 LEARNED_GAUGE, LEARNED_LINE = "learned_gauge", "learned_line"
 _SECTIONS = {"gauges", "lines"}
@@ -102,6 +93,6 @@ def _target(
             )
         )
     if line is None:
-        line = line_settings(port, drivers[name].line_kind == "registers")
+        line = line_settings(port, drivers[name].line_kind)
     on_line = [drivers[other](gauges[other]) for other in gauges if gauges[other].line == options.line]
     return GaugeTarget(name, drivers[name](options), powered(line, on_line), options.stale_after_s or stale_after_s)

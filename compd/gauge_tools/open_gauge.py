@@ -5,54 +5,36 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from pydantic import ValidationError
 
 from compd.clock import Clock
-from compd.configuration import (
-    LineSettings,
-    ModbusAsciiLine,
-    ModbusRtuLine,
-    ModbusTcpLine,
-    MqttLine,
-    OpcUaLine,
-    PushedLineSettings,
-    SerialLine,
-    TcpLine,
-    parse_yaml,
-    powered,
-    separate_errors,
-)
+from compd.documents import separate_errors
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, LineKind, Quality, Reading, bad
-from compd.lines import Line, Port, StreamLine, explained, open_line, open_stream
+from compd.lines import (
+    Line,
+    LineDefinition,
+    LineSettings,
+    PolledLineSettings,
+    Port,
+    PortArguments,
+    PushedLineSettings,
+    StreamLine,
+    assigned,
+    explained,
+    kinds_that_carry,
+    open_line,
+    open_stream,
+    powered,
+)
 from compd.live.acquisition import read_latched
 from compd.plugins import GAUGES, load
 from compd.pushed_gauge import Message, PushedLine
 
-SettingsT = TypeVar(
-    "SettingsT", SerialLine, TcpLine, ModbusRtuLine, ModbusAsciiLine, ModbusTcpLine, OpcUaLine, MqttLine
-)
-
-
-# Default age (s) from which a reading is stale.
+# Where nothing says how old a reading may be: one that is older is no measurement of now.
 STALE_AFTER_S = 10.0
-
-
-@dataclass(frozen=True)
-class PortArguments:
-    """A port from the command line; `baud` and `format` (8N1 ...) are None over TCP.
-
-    keys : other keys of the line, as KEY=VALUE (VALUE in YAML).
-    """
-
-    port: str
-    baud: int | None
-    format: str | None
-    timeout_s: float
-    keys: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -71,7 +53,7 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
     Raises ConfigurationError for an assignment that is none, and for options that the driver refuses.
     """
     kind = load(GAUGES, driver, f"driver {driver}")
-    options = {"driver": driver, "line": "command_line", **_assigned("--set", assignments, "heads=9")}
+    options = {"driver": driver, "line": "command_line", **assigned("--set", assignments, "heads=9")}
     try:
         gauge = kind(kind.Options.model_validate(options))
     except ValidationError as error:
@@ -85,93 +67,39 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
                 for detail in separate_errors(error)
             ]
         ) from error
-    if kind.line_kind in ("nodes", "topics"):
-        line: LineSettings = pushed_line_settings(port, kind.line_kind)
-    else:
-        line = powered(line_settings(port, kind.line_kind == "registers"), [gauge])
+    line = powered(line_settings(port, kind.line_kind), [gauge])
     return GaugeTarget(driver, gauge, line, gauge.options.stale_after_s or STALE_AFTER_S)
 
 
-def line_settings(port: PortArguments, registers: bool) -> LineSettings:
-    """Settings of a Modbus line (`registers`) or of a line of bytes.
+def line_settings(port: PortArguments, carries: LineKind) -> LineSettings:
+    """Settings of a line that carries bytes, registers, nodes or topics.
 
-    host:port is TCP, everything else a serial port or pyserial URL, with baud rate and format. Raises
-    ConfigurationError where one of them is missing or not allowed.
+    Its kind is the one that `port.keys` name; without that the one that claims the port, as TCP does host:port, and
+    else the first of those that carry this: a serial port or pyserial URL, with baud rate and format.
+    Raises ConfigurationError where a key is missing or not allowed.
     """
-    if not registers:
-        return byte_line_settings(port)
-    if address := _tcp_address(port.port):
-        return _validated(ModbusTcpLine, kind="modbus_tcp", **_tcp_settings(address, port))
-    keys = _serial_settings(port)
-    if keys.get("kind") == "modbus_ascii":
-        return _validated(ModbusAsciiLine, **keys)
-    return _validated(ModbusRtuLine, **{"kind": "modbus_rtu", **keys})
+    kinds = kinds_that_carry(carries)
+    named = {f"kind={kind.kind}": kind for kind in kinds}
+    chosen = next((named[key] for key in port.keys if key in named), None)
+    return _settings(port, chosen or next((kind for kind in kinds if kind.claims(port.port)), kinds[0]))
 
 
-def byte_line_settings(port: PortArguments) -> SerialLine | TcpLine:
+def byte_line_settings(port: PortArguments) -> PolledLineSettings:
     """Settings of a line of bytes, as `line_settings` makes them."""
-    if address := _tcp_address(port.port):
-        return _validated(TcpLine, kind="tcp", **_tcp_settings(address, port))
-    return _validated(SerialLine, **{"kind": "serial", **_serial_settings(port)})
+    settings = line_settings(port, "bytes")
+    assert isinstance(settings, PolledLineSettings)
+    return settings
 
 
-def pushed_line_settings(port: PortArguments, line_kind: LineKind) -> OpcUaLine | MqttLine:
-    """Settings of a line to an OPC UA server, opc.tcp://host:port/path, or to an MQTT broker, host:port.
-
-    Raises ConfigurationError for another port.
-    """
-    keys = {"timeout_s": port.timeout_s, **_assigned("--line", port.keys, "user=compd")}
-    if line_kind == "nodes":
-        return _validated(OpcUaLine, kind="opc_ua", endpoint=port.port, **keys)
-    address = _tcp_address(port.port)
-    if address is None:
-        raise ConfigurationError(
-            Problem(where="--port", what="is no broker", value=port.port, allowed="host:port, such as 192.168.1.9:1883")
-        )
-    return _validated(MqttLine, kind="mqtt", host=address[0], port=address[1], **keys)
-
-
-def _assigned(option: str, assignments: Sequence[str], example: str) -> dict[str, Any]:
-    """The data of KEY=VALUE. ConfigurationError for a malformed one."""
-    data = {}
-    for assignment in assignments:
-        key, equals, value = assignment.partition("=")
-        if not equals:
-            raise ConfigurationError(
-                Problem(where=option, what="is not KEY=VALUE", value=assignment, allowed=f"{option} {example}")
-            )
-        data[key], _ = parse_yaml(value, Path(f"{option} {key}"))
-    return data
-
-
-def _tcp_settings(address: tuple[str, int], port: PortArguments) -> dict[str, Any]:
-    keys = _assigned("--line", port.keys, "pause_s=0.02")
-    return {"host": address[0], "port": address[1], "timeout_s": port.timeout_s, **keys}
-
-
-def _tcp_address(port: str) -> tuple[str, int] | None:
-    host, colon, number = port.rpartition(":")
-    return (host, int(number)) if colon and number.isdigit() and "/" not in port else None
-
-
-def _serial_settings(port: PortArguments) -> dict[str, Any]:
-    if port.baud is None or port.format is None:
-        raise ConfigurationError(
-            Problem(
-                where="--baud, --format",
-                what="a serial port needs both",
-                value=port.port,
-                allowed="--baud 9600 --format 7E2",
-                next_step="look them up in the device's manual; they differ from device to device",
-            )
-        )
-    keys = _assigned("--line", port.keys, "echo=true")
-    return {"port": port.port, "baud": port.baud, "format": port.format, "timeout_s": port.timeout_s, **keys}
-
-
-def _validated(settings: type[SettingsT], **data: Any) -> SettingsT:
+def _settings(port: PortArguments, kind: LineDefinition) -> LineSettings:
+    keys = {
+        "kind": kind.kind,
+        **kind.port_keys(port),
+        "timeout_s": port.timeout_s,
+        **assigned("--line", port.keys, kind.example_key),
+    }
     try:
-        return settings.model_validate(data)
+        return kind.settings.model_validate(keys)
     except ValidationError as error:
         raise ConfigurationError(
             [
@@ -236,13 +164,11 @@ class TappedPushedLine:
 
 
 def open_tapped_line(settings: LineSettings, clock: Clock, listener: ByteListener) -> Line:
-    """The line as the daemon opens it, with its bytes shown (but for Modbus TCP, OPC UA and MQTT)."""
+    """The line as the daemon opens it, with its bytes shown, but for ports that are within a library."""
     return open_line(settings, clock, lambda port: TappedPort(port, listener))
 
 
-def open_tapped_stream(
-    settings: SerialLine | ModbusRtuLine | TcpLine, clock: Clock, listener: ByteListener
-) -> StreamLine:
+def open_tapped_stream(settings: PolledLineSettings, clock: Clock, listener: ByteListener) -> StreamLine:
     """The byte stream of a line, with its bytes shown, whatever protocol runs over it."""
     return open_stream(settings, clock, lambda port: TappedPort(port, listener))
 

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.clock import MonotonicClock
-from compd.configuration import powered
 from compd.gauge import Gauge, LineFault, Quality, Reading
-from compd.gauge_tools.open_gauge import PortArguments, byte_line_settings, line_settings
-from compd.lines import Port, StreamLine, explained, open_line, open_stream, shown
+from compd.gauge_tools.open_gauge import byte_line_settings, line_settings
+from compd.lines import Port, PortArguments, StreamLine, explained, open_line, open_stream, powered, shown
 from compd.plugins import GAUGES, load, names
 
 PROBE_TIMEOUT_S = 0.5
@@ -119,7 +118,7 @@ def probe_port(path: str, candidate: PresetCandidate) -> ProbeOutcome:
     """The outcome of one read on the port `path`. SENDS the candidate's request, and the ends of commands around it."""
     try:
         settings = line_settings(
-            PortArguments(path, candidate.baud, candidate.format, PROBE_TIMEOUT_S), candidate.on_registers
+            PortArguments(path, candidate.baud, candidate.format, PROBE_TIMEOUT_S), candidate.gauge.line_kind
         )
         closing = not candidate.on_registers
         line = open_line(

@@ -1,6 +1,7 @@
 """Lines to gauges: bytes or Modbus registers over a serial port or TCP, with deadlines and named faults.
 
-A port moves bytes (`port`); a line makes requests and replies of them (`stream`, `modbus_rtu`, `modbus_tcp`).
+A port moves bytes (`port`); a line makes requests and replies of them (`stream`, `modbus_serial`). What kinds of line
+there are, and all that differs between them, is in `kinds`, one folder for each.
 """
 
 import lazy_loader

@@ -8,20 +8,11 @@ from __future__ import annotations
 import fcntl
 import struct
 import termios
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import serial.rs485
 
-
-class Rs485Settings(Protocol):
-    """RTS as the direction of a two-wire line, switched by the port's driver around every request."""
-
-    @property
-    def rts_when_sending(self) -> bool: ...
-    @property
-    def delay_before_s(self) -> float: ...
-    @property
-    def delay_after_s(self) -> float: ...
+from compd.lines.serial_settings import Rs485
 
 
 class ControlLines(NamedTuple):
@@ -29,7 +20,7 @@ class ControlLines(NamedTuple):
 
     dtr: bool | None = None
     rts: bool | None = None
-    rs485: Rs485Settings | None = None
+    rs485: Rs485 | None = None
 
     def prepare(self, port: Any) -> None:
         """Set what a port of pyserial, not open yet, does when it is opened."""

@@ -31,7 +31,7 @@ import yaml
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from compd.configuration import Finite, decode, parse_yaml, read_text
+from compd.documents import Finite, decode, parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem, StateError
 from compd.files import CHECKSUM, FileKind, checksum_of, write_files
 from compd.release import __version__

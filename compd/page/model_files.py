@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from compd.configuration import LARGEST_BYTES
+from compd.documents import LARGEST_BYTES
 from compd.files import open_regular, read_descriptor
 from compd.page.recordings import is_own
 

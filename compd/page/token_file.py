@@ -10,7 +10,7 @@ from typing import get_args
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from compd.configuration import parse_yaml, read_text
+from compd.documents import parse_yaml, read_text
 from compd.errors import ConfigurationError, Problem
 from compd.files import FileKind
 from compd.page.guard import Role, Token, hashed, new_token

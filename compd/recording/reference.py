@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationInfo, WithJsonSchema, field_validator, model_validator
 
-from compd.configuration import Section, refusal
+from compd.documents import Section, refusal
 from compd.units import REFERENCE_UNITS
 
 Quantity = Literal["tool_position", "tool_pose", "link_length", "ball_plate", "distance", "fixed_point"]

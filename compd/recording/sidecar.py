@@ -12,7 +12,7 @@ from typing import Annotated, Any, get_args
 import yaml
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
-from compd.configuration import Document, Section, read_document, refusal, unknown_key, validate
+from compd.documents import Document, Section, read_document, refusal, unknown_key, validate
 from compd.errors import ConfigurationError, Problem, RecordingError
 from compd.files import FileKind
 from compd.recording.reference import Quantity, Reference

@@ -19,15 +19,6 @@ from .truth.warm_up import Heat as Heat
 from .truth.weather import AirAtZero as AirAtZero
 from .truth.world import World as World
 from .wires.control_client import ControlClient as ControlClient
-from .wires.device import Sense as Sense
-from .wires.device import SimulatedByteDevice as SimulatedByteDevice
-from .wires.device import SimulatedPushedDevice as SimulatedPushedDevice
-from .wires.device import SimulatedRegisterDevice as SimulatedRegisterDevice
 from .wires.instrument_sampling import Looks as Looks
-from .wires.modbus_slaves import ModbusSlaves as ModbusSlaves
 from .wires.server import Simulation as Simulation
 from .wires.simulation_directory import SEALED_ANSWER as SEALED_ANSWER
-from .wires.wire_ends import LOOPBACK as LOOPBACK
-from .wires.wire_ends import End as End
-from .wires.wire_ends import PtyEnd as PtyEnd
-from .wires.wire_ends import TcpEnd as TcpEnd

@@ -7,12 +7,20 @@ from typing import Any
 import yaml
 
 from compd.gauge import Gauge, GaugeOptions, Quality
-from compd.gauge_tools import catalogue
-from compd.gauge_tools.driver_catalogue import GIVEN_BY_THE_CONFIGURATION, driver_text
+from compd.lines import KINDS, kinds_that_carry
 from compd.plugins import GAUGES, load
+from compd.text import join_words
 from docs.generate.configuration import keys_table
 from docs.generate.markdown import code, codes, escape, fence, heading, join, link, prose, table, target, term
 from docs.generate.schema import Key, ModelSchema
+
+
+def _line_kinds() -> str:
+    """Which kinds of line carry what drivers need, in a sentence."""
+    carried = dict.fromkeys(kind.carries for kind in KINDS.values())
+    on = [f"{what} on {join_words([code(kind.kind) for kind in kinds_that_carry(what)], 'or')}" for what in carried]
+    return f"A driver needs a line of a kind that carries what it reads: {', '.join(on)}."
+
 
 INTRODUCTION = f"""\
 A gauge of the configuration names its driver and its line; every other key belongs to the driver. A {term("driver")} is
@@ -20,10 +28,9 @@ a class, or a {term("preset")}: a description in a YAML file that the drivers `s
 `modbus` carry out. `compd gauge show NAME` prints what stands here. [Add a gauge](../how-to/add-a-gauge.md) goes from
 the plug to the number, for a gauge that is here and for one that is not.
 
-Drivers for bytes need a line of kind `serial` or `tcp`, drivers for registers one of kind `modbus_rtu`, `modbus_ascii`
-or `modbus_tcp`, for nodes `opc_ua`, for topics `mqtt`; see [lines](#configuration-lines). In the descriptions, (M)
-stands for what was read in a maker's manual, (C) for what was read in public code, (P) for what is only plausible. A
-length is delivered in mm, whatever the device shows.
+{_line_kinds()} See [lines](#configuration-lines).
+In the descriptions, (M) stands for what was read in a maker's manual, (C) for what was read in public code, (P) for
+what is only plausible. A length is delivered in mm, whatever the device shows.
 """
 QUALITIES = """\
 A reading has a value, or a reason why not: its quality. These are the words in `compd gauge watch`, in the messages

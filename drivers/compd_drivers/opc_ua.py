@@ -7,9 +7,9 @@ A node is named by its id, with the index of its namespace (`ns=2;s=Probe1`), or
 when the server is configured anew (`nsu=http://maker.example/probes;s=Probe1`). The value is any number of OPC UA, or,
 with `index`, an entry of an array of numbers. Text, true and an array without `index` are `mismatch`.
 
-A value counts where its status is Good. The others have qualities (`compd.lines.opc_ua_status`) and the name of the
-status as their detail: BadSensorFailure is `sensor_fault`, UncertainLastUsableValue `stale`, a value at the limit of
-its range `over_range` or `under_range`, most others `device_error`.
+A value counts where its status is Good. The others have qualities (`compd.lines.kinds.opc_ua.status`) and the name of
+the status as their detail: BadSensorFailure is `sensor_fault`, UncertainLastUsableValue `stale`, a value at the limit
+of its range `over_range` or `under_range`, most others `device_error`.
 """
 
 from __future__ import annotations

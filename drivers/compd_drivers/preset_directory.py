@@ -16,7 +16,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from compd.configuration import Document, Location, read_document
+from compd.documents import Document, Location, read_document
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.files import FileKind
 from compd.gauge import Gauge

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from compd.clock import MonotonicClock
-from compd.configuration import ModbusTcpLine
 from compd.gauge import Gauge
+from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
 from compd.live.acquisition import Acquisition
 from compd.live.memory import Latest
 from compd.plugins import GAUGES, load

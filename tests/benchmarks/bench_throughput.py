@@ -22,11 +22,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from compd.clock import MonotonicClock
-from compd.commissioning.line_budget import LATENCY_TIMER_S, budget_of_line, serial_pace
-from compd.configuration import ModbusRtuLine
+from compd.commissioning.line_budget import budget_of_line
 from compd.gauge import Gauge
 from compd.lines import open_line
-from compd.lines.modbus_rtu import crc16
+from compd.lines.kinds.modbus_rtu.master import crc16
+from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
+from compd.lines.pace import LATENCY_TIMER_S, serial_pace
 from compd.live.acquisition import Acquisition
 from compd.live.memory import Latest
 from compd.live.system import sharpen_timers

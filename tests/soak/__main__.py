@@ -13,7 +13,7 @@ from pathlib import Path
 import structlog
 import yaml
 
-from compd.configuration import read_document
+from compd.documents import read_document
 from tests.injection.rig import TRIPOD, InjectedMachine, add_votes
 from tests.injection.truth import MOTION_EVERY_S
 from tests.soak.soak import DRAWN, TOGETHER_SHARE, soak

@@ -22,9 +22,9 @@ import yaml
 from numpy.typing import NDArray
 
 from compd.client import connect
-from compd.configuration import read_document
 from compd.demo.processes import Command, run_commands
 from compd.demo.session import ARRIVED_MM, wait_for_gauges
+from compd.documents import read_document
 from compd.simulation import ControlClient
 from tests.support.hidden_visits import Visit
 from tests.support.simulated import TRIPOD

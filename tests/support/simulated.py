@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from compd.configuration import Geometry, Wiring, read_document
+from compd.configuration import Geometry, Wiring
+from compd.documents import read_document
 from tests.support.paths import CONFIG
 
 TRIPOD = CONFIG / "tripod-cmm.yaml"

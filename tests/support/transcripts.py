@@ -17,9 +17,10 @@ import yaml
 
 from compd.clock import MonotonicClock
 from compd.gauge import Gauge, LineFault, Quality, Reading
-from compd.lines import ModbusTcp, RtuMaster
+from compd.lines import RtuMaster
+from compd.lines.kinds.modbus_tcp.master import ModbusTcp
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
-from compd.simulation import ModbusSlaves
+from compd.twins import ModbusSlaves
 
 PATIENCE_S = 5.0
 

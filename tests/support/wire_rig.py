@@ -12,9 +12,9 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from compd.clock import MonotonicClock
-from compd.configuration import LineSettings
 from compd.gauge import Gauge, LineFault, Quality, Reading
-from compd.lines import open_line
+from compd.lines import LineSettings, open_line
+from compd.lines.registry import ANY_LINE
 from compd.live.memory import Latest
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
@@ -23,7 +23,7 @@ from compd.simulation.wires.simulated_line import SimulatedLine
 PATIENCE_S = 20.0
 
 Sense = Callable[[str], float]
-SETTINGS: TypeAdapter[LineSettings] = TypeAdapter(LineSettings)
+SETTINGS: TypeAdapter[LineSettings] = TypeAdapter(ANY_LINE)
 
 
 class InstantClock:

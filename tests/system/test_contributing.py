@@ -12,10 +12,12 @@ from tests.support.paths import ROOT
 from tests.support.walks import PAGE, Copy, Insertion, Walk, apply_all, inserted, walks
 
 WALKS = walks()
-# What iterates over all gauges, effects, causes, requests, commands or states.
+# What iterates over all gauges, line kinds, effects, causes, requests, commands or states.
 REGISTRIES = (
     "tests/unit/drivers/test_presets.py",
     "tests/unit/drivers/test_transcripts.py",
+    "tests/unit/lines/test_line_kinds.py",
+    "tests/unit/lines/test_simulated_lines.py",
     "tests/unit/library",
     "tests/unit/simulation/test_causes.py",
     "tests/unit/simulation/test_seeds.py",
@@ -49,7 +51,7 @@ def copy(tree: Copy) -> Iterator[Copy]:
 def test_there_is_a_walk_for_everything_that_rooms_lists() -> None:
     rooms = (ROOT / "docs" / "explanation" / "rooms.md").read_text(encoding="utf-8")
     listed = re.findall(r"^\| an? .*\|$", rooms.partition("## What an addition touches")[2], flags=re.MULTILINE)
-    assert len(listed) == len(WALKS) == 5
+    assert len(listed) == len(WALKS) == 6
 
 
 @pytest.mark.parametrize("walk", WALKS, ids=lambda walk: walk.title)

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 import yaml
 
-from compd.configuration import read_document
 from compd.demo.processes import Command, run_commands
 from compd.demo.session import wait_for_gauges
+from compd.documents import read_document
 from compd.simulation import ControlClient
 from tests.support.daemon_process import Daemon
 from tests.support.mosquitto import Broker, needs_mosquitto, publisher, running_broker

@@ -11,7 +11,8 @@ import yaml
 
 from compd.client import connect
 from compd.clock import MonotonicClock
-from compd.configuration import Configuration, load, read_document
+from compd.configuration import Configuration, load
+from compd.documents import read_document
 from compd.simulation import Simulation, World
 from tests.support.paths import CONFIG
 from tests.support.running_daemon import supervised

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
-from compd.configuration import read_document
+from compd.documents import read_document
 from compd.machine_check import examine_whole
 from tests.support.paths import CONFIG
 

@@ -85,7 +85,7 @@ def _print_table(name: str, results: list[tuple[str, CaseResult]]) -> None:
 
 
 def _read_options(path: Path, driver: str) -> dict[str, Any]:
-    from compd.configuration import read_document
+    from compd.documents import read_document
     from compd.files import FileKind
     from compd.plugins import GAUGES, load
 

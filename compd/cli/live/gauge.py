@@ -13,7 +13,8 @@ from compd.cli.options import OverwriteOption
 
 if TYPE_CHECKING:
     from compd.gauge import Reading
-    from compd.gauge_tools import GaugeStatistics, GaugeTarget, PortArguments
+    from compd.gauge_tools import GaugeStatistics, GaugeTarget
+    from compd.lines import PortArguments
 
 gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and describe gauges.")
 
@@ -294,7 +295,7 @@ def _between_captures(done: int, wanted: int) -> None:
 def _port(
     port: str, baud: int | None, form: str | None, timeout_s: float, line_keys: Sequence[str] | None
 ) -> PortArguments:
-    from compd.gauge_tools import PortArguments
+    from compd.lines import PortArguments
 
     return PortArguments(port, baud, form, timeout_s, line_keys or ())
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from compd.commissioning.daemon_health import DaemonStatus, Health, daemon_status
-from compd.commissioning.doctor.finding import Computer, Finding, Verdict, advice, good, unknown
 from compd.commissioning.doctor.ports import port_findings
 from compd.commissioning.doctor.system import (
     clock_findings,
@@ -16,6 +15,7 @@ from compd.commissioning.doctor.system import (
     unit_finding,
 )
 from compd.configuration import Configuration
+from compd.lines import Computer, Finding, Verdict, advice, good, unknown
 
 # Values of the shipped configurations, for a computer without a configuration.
 _USUAL_PRIORITY = 40

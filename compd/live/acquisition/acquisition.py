@@ -14,12 +14,11 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.configuration import LineSettings, PushedLineSettings
 from compd.gauge import Gauge, LineFault, Quality
-from compd.lines import ModbusTcp, open_line
+from compd.lines import Line, LineSettings, PolledLineSettings, open_line
 from compd.live.acquisition.gauge_trust import Judge
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
-from compd.live.acquisition.polled_round import OpenLine, PolledRound
+from compd.live.acquisition.polled_round import PolledRound
 from compd.live.acquisition.pushed_round import PushedRound
 from compd.live.acquisition.round_trigger import RoundBuffer
 from compd.live.acquisition.shared_endpoints import Peers
@@ -30,7 +29,7 @@ log = structlog.get_logger()
 
 _NO_TRUST: Mapping[str, Judge] = {}
 # Opens a line from its settings; raises LineFault (LINE_LOST) where it cannot.
-Opener = Callable[[Any, Clock], OpenLine]
+Opener = Callable[[Any, Clock], Line]
 
 
 class LineThread:
@@ -76,15 +75,15 @@ class LineThread:
         self._clock = clock
         self._opener = opener
         self._peers = Peers() if peers is None else peers
-        self._line: Any = None  # an OpenLine; of another kind for each driver
+        self._line: Any = None  # a Line; of another kind for each driver
         self._back_off = BackOff(*settings.back_off_s)
         self._stop = threading.Event()
         self._round: PolledRound | PushedRound
-        if isinstance(settings, PushedLineSettings):
-            self._round = PushedRound(self.gauges, stale_after_s, clock, self._back_off)
-        else:
+        if isinstance(settings, PolledLineSettings):
             requests = PollRequests() if poll_requests is None else poll_requests
             self._round = PolledRound(self.gauges, settings, buffer, clock, self._stop, self._back_off, requests)
+        else:
+            self._round = PushedRound(self.gauges, stale_after_s, clock, self._back_off)
         self._thread = threading.Thread(target=self._run, name=f"line {name}", daemon=True)
 
     def start(self) -> None:
@@ -144,8 +143,8 @@ class LineThread:
         self.opened += 1
         self.state, self.detail = "open", ""
         log.info("line is open", line=self.name)
-        if isinstance(self._line, ModbusTcp):
-            self._peers.connected(self.name, self._line.peer)
+        if (peer := getattr(self._line, "peer", None)) is not None:  # of a line that a gateway may share
+            self._peers.connected(self.name, peer)
         self._round.opened()
         for gauge in self.gauges:
             gauge.resume()

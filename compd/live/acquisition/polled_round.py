@@ -12,12 +12,10 @@ import math
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
 
 from compd.clock import Clock
-from compd.configuration import PolledLine
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines import explained, shown
+from compd.lines import Line, PolledLineSettings, explained, shown
 from compd.live.acquisition.absent_gauges import AbsentGauges
 from compd.live.acquisition.polled_gauge import DAMAGED, LONGEST_REST_S, BackOff, PolledGauge
 from compd.live.acquisition.reply_order import ReplyOrder
@@ -34,28 +32,6 @@ NOT_LATCHED_S = -math.inf
 NO_REPLY_PENDING = (Quality.LINE_LOST, Quality.DEVICE_ERROR, Quality.SILENT)
 
 
-class OpenLine(Protocol):
-    """The part of a line that acquisition uses; the driver uses the rest."""
-
-    @property
-    def last_request_s(self) -> float:
-        """Monotonic time of the last request, s; -inf before the first, and where a reply names its request."""
-
-    @property
-    def unexpected_bytes(self) -> int:
-        """Unsolicited bytes since the line was opened."""
-
-    @property
-    def request_came_back(self) -> bool:
-        """Whether the first bytes after the last request repeat it."""
-
-    def drain(self, quiet_s: float | None = None) -> bytes:
-        """Wait for `quiet_s` of silence (the line's timeout if None); return the bytes received meanwhile."""
-
-    def close(self) -> None:
-        """Close the line."""
-
-
 class PolledRound:
     """The gauges of one line, polled in turn; used by its thread.
 
@@ -67,7 +43,7 @@ class PolledRound:
     def __init__(
         self,
         gauges: Sequence[PolledGauge],
-        settings: PolledLine,
+        settings: PolledLineSettings,
         buffer: RoundBuffer | None,
         clock: Clock,
         stop: threading.Event,
@@ -102,7 +78,7 @@ class PolledRound:
         self._waiting.clear()
         self._publish()
 
-    def take(self, line: OpenLine) -> None:
+    def take(self, line: Line) -> None:
         """Poll every gauge that is not resting, then wait for the next round. Raises LineFault (LINE_LOST)."""
         start_s = self._clock.monotonic()
         self._dropped_before = line.unexpected_bytes
@@ -134,8 +110,8 @@ class PolledRound:
         if self._buffer is not None:
             self._buffer.publish()
 
-    def _latch(self, due: Sequence[PolledGauge], line: OpenLine) -> float | None:
-        """Send the round trigger; return its time (s), None for a line without one, NOT_LATCHED_S if it failed.
+    def _latch(self, due: Sequence[PolledGauge], line: Line) -> float | None:
+        """Send the round trigger: its time (s); None where the line has none, NOT_LATCHED_S where it failed.
 
         The gauges of that round have no value then: they would show what they have latched before. Raises LineFault
         (LINE_LOST).
@@ -154,7 +130,7 @@ class PolledRound:
                 gauge.fail(fault.quality, text, self._clock.monotonic())
             return NOT_LATCHED_S
 
-    def _poll(self, gauge: PolledGauge, line: OpenLine, latched_s: float | None) -> None:
+    def _poll(self, gauge: PolledGauge, line: Line, latched_s: float | None) -> None:
         start_s = self._clock.monotonic()
         failures = gauge.failures
         with self._faults_of(gauge, line):
@@ -174,8 +150,8 @@ class PolledRound:
         if gauge.failures > failures:
             self._absent.missed(gauge, start_s)
 
-    def _ask(self, gauge: PolledGauge, line: OpenLine, latched_s: float | None) -> Sequence[Reading]:
-        """The gauge's answer, or its second one if `ReplyOrder` asks for it after a missed reply."""
+    def _ask(self, gauge: PolledGauge, line: Line, latched_s: float | None) -> Sequence[Reading]:
+        """The gauge's answer; after a missed reply its second one, where `ReplyOrder` wants that."""
         now_s = self._clock.monotonic()
         self._order.asked(now_s)
         if not (gauge.fresh(now_s) and self._order.asks_twice()):
@@ -187,8 +163,8 @@ class PolledRound:
         self._order.answered_again(self._clock.monotonic() - again_s)
         return readings
 
-    def _publish_waiting(self, line: OpenLine) -> None:
-        """Publish the waiting readings if the line stays silent. Raises LineFault (LINE_LOST)."""
+    def _publish_waiting(self, line: Line) -> None:
+        """Publish the readings that wait, if nothing more comes. Raises LineFault (LINE_LOST)."""
         if not self._waiting:
             return
         # bytes before a request were dropped: the previous reply may belong to another request
@@ -224,8 +200,8 @@ class PolledRound:
             gauge.resume()  # the silence has been kept
 
     @contextmanager
-    def _faults_of(self, gauge: PolledGauge, line: OpenLine) -> Iterator[None]:
-        """Count a gauge's faults, and leave the line without a pending reply as far as possible.
+    def _faults_of(self, gauge: PolledGauge, line: Line) -> Iterator[None]:
+        """Count what goes wrong with a gauge, and leave the line without anything under way, so far as that can be.
 
         Raises LineFault (LINE_LOST).
         """
@@ -240,7 +216,7 @@ class PolledRound:
         except Exception as error:  # noqa: BLE001  of a driver; it must not end the line's thread
             self._fail(gauge, line, Quality.DRIVER_ERROR, gauge.driver_error(error))
 
-    def _fail(self, gauge: PolledGauge, line: OpenLine, quality: Quality, detail: str) -> None:
+    def _fail(self, gauge: PolledGauge, line: Line, quality: Quality, detail: str) -> None:
         """Raises LineFault (LINE_LOST)."""
         failed_s = self._clock.monotonic()
         if quality in NO_REPLY_PENDING:

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compd.configuration import TriggerBytes, TriggerWrite
 from compd.gauge import Gauge, Reading
+from compd.lines import TriggerBytes, TriggerWrite
 from compd.live.memory import Latest
 
 

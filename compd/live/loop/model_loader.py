@@ -14,7 +14,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
-from compd.configuration import LARGEST_BYTES
+from compd.documents import LARGEST_BYTES
 from compd.errors import Problem, StateError
 from compd.files import read_small_file
 from compd.live.loop.machine_zero import MachineZero

@@ -6,7 +6,7 @@ import os
 import select
 from enum import IntEnum
 
-from compd.configuration import LARGEST_BYTES
+from compd.documents import LARGEST_BYTES
 from compd.live.memory.shared_array import shared_counters
 from compd.live.memory.shared_message import SharedMessage
 

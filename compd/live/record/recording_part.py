@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from compd.configuration import LARGEST_BYTES
+from compd.documents import LARGEST_BYTES
 from compd.files import read_small_file, sync_directory, write_new_file
 from compd.live.record.appended_file import AppendedFile
 from compd.live.record.part_table import part_table

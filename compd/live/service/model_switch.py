@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import structlog
 
 from compd.clock import Clock
-from compd.configuration import LARGEST_BYTES
+from compd.documents import LARGEST_BYTES
 from compd.files import read_descriptor
 from compd.live.loop import ModelText
 from compd.live.memory import Control

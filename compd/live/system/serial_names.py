@@ -10,8 +10,8 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from compd.configuration import Configuration, SerialPortSettings
-from compd.lines import serial_ports
+from compd.configuration import Configuration
+from compd.lines import LineSettings, serial_ports
 
 
 def port_names(configuration: Configuration) -> dict[str, str]:
@@ -34,17 +34,14 @@ def changed_ports(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str
     }
 
 
-def _port(line: Any, lasting: Mapping[str, str]) -> str:
-    """`line`: settings of any kind. `lasting`: names of serial ports by device."""
-    if isinstance(line, SerialPortSettings):
-        if "://" in line.port or line.port.startswith("/dev/serial/"):
-            return line.port
-        device = os.path.realpath(line.port)
-        # one that the kernel has counted and that is not there now is not known
-        return lasting.get(device, "" if line.port == device and device.startswith("/dev/tty") else line.port)
-    if hasattr(line, "endpoint"):
-        return str(line.endpoint)
-    return f"{line.host}:{line.port}"
+def _port(line: LineSettings, lasting: Mapping[str, str]) -> str:
+    """`lasting`: names of serial ports by device."""
+    port = line.address
+    if not port.startswith("/") or port.startswith("/dev/serial/"):
+        return port
+    device = os.path.realpath(port)
+    # one that the kernel has counted and that is not there now is not known
+    return lasting.get(device, "" if port == device and device.startswith("/dev/tty") else port)
 
 
 def _unit(options: Any) -> list[str]:

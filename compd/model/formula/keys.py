@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
-from compd.configuration import Finite
+from compd.documents import Finite
 from compd.errors import ConfigurationError, Problem
 from compd.model.formula.basis import VECTORS
 from compd.model.formula.parser import LONGEST

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from compd.configuration import Document, read_entries, shipped_effects, unknown_key
+from compd.configuration import shipped_effects
+from compd.documents import Document, read_entries, unknown_key
 from compd.errors import CompdError, ConfigurationError, PluginError, Problem
 from compd.files import FileKind
 from compd.model.effects import Effect

@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from compd.configuration import parse_yaml
+from compd.documents import parse_yaml
 from compd.errors import Problem, StateError
 from compd.model.library import EFFECTS_FILE
 

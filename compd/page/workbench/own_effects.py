@@ -7,7 +7,7 @@ import threading
 from collections.abc import Mapping
 from pathlib import Path
 
-from compd.configuration import read_text
+from compd.documents import read_text
 from compd.errors import CompdError, Problem, StateError
 from compd.files import file_stamp, write_files
 from compd.model.effects import Effect

@@ -8,7 +8,8 @@ from typing import Any
 
 import yaml
 
-from compd.configuration import Configuration, load, read_document
+from compd.configuration import Configuration, load
+from compd.documents import read_document
 from compd.errors import ConfigurationError, Problem
 from compd.files import check_replaceable, write_files
 from compd.simulation.wires.simulation_directory import DAEMON_SOCKET, STATE, WRITTEN_BY

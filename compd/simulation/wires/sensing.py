@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from compd.configuration import Configuration, resolve_channel
-from compd.simulation.wires.device import Sense
+from compd.twins import Sense
 
 # Source by unit for a channel that is not wired or that the simulated machine does not have; otherwise 0.
 _IDLE_SOURCE = {"degC": "temperature_room_degC", "hPa": "pressure_hPa", "pct": "humidity_pct"}

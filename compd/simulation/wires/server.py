@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from compd.clock import Clock
-from compd.configuration import Configuration, LineSettings
+from compd.configuration import Configuration
+from compd.lines import LineSettings, PolledLineSettings, PushedDefinition, definition_of
 from compd.plugins import SIMULATED_GAUGES, load
 from compd.simulation.truth.follow_motion import MotorCommand
 from compd.simulation.truth.instruments import INTERFEROMETER, TRACKER
@@ -20,11 +21,11 @@ from compd.simulation.truth.world import World
 from compd.simulation.wires.control import Answer, ControlSocket, Handler
 from compd.simulation.wires.daemon_configuration import Port, daemon_configuration, daemon_path
 from compd.simulation.wires.live_world import LiveWorld
-from compd.simulation.wires.pushed_line import SimulatedPushedLine
 from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.simulated_line import SimulatedLine
 from compd.simulation.wires.simulation_directory import CONTROL_SOCKET, PORTS, SimulationDirectory
 from compd.simulation.wires.tcp_port import ANY, claimed_port
+from compd.twins import SimulatedPushedLine
 
 # Step in which the world warms up and bends. Its scales follow the motion without steps.
 STEP_S = 0.02
@@ -120,15 +121,10 @@ class Simulation:
     ) -> SimulatedLine | SimulatedPushedLine:
         gauges = [gauge for gauge, options in self.configuration.gauges.items() if options.line == name]
         devices = [self._device(gauge, sensing) for gauge in gauges]
-        match settings.kind:
-            case "opc_ua":
-                from compd.simulation.wires.opc_ua_server import OpcUaNodes
-
-                return OpcUaNodes(name, devices)
-            case "mqtt":
-                from compd.simulation.wires.mqtt_publisher import MqttPublisher
-
-                return MqttPublisher(name, devices, broker)
+        definition = definition_of(settings)
+        if isinstance(definition, PushedDefinition):
+            return definition.simulated_line(name, devices, broker)
+        assert isinstance(settings, PolledLineSettings)
         return SimulatedLine(name, settings, devices, self._ports_directory)
 
     def _device(self, gauge: str, sensing: Sensing) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from compd.simulation import SimulatedByteDevice
+from compd.twins import SimulatedByteDevice
 
 DECIMALS_MM = 4  # display step 0.1 um
 DECIMALS_INCH = 5  # display step 0.25 um

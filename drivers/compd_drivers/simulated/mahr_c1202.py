@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from compd.simulation import Sense
+from compd.twins import Sense
 from compd_drivers.simulated.shared import UNITS, CommandDevice
 
 FEATURES = (1, 2, 3)

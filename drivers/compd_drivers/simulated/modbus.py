@@ -7,7 +7,7 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-from compd.simulation import Sense, SimulatedRegisterDevice
+from compd.twins import Sense, SimulatedRegisterDevice
 from compd_drivers.simulated.shared import signal_for
 
 FLOATS = {"float32": "f", "float64": "d"}

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
-from compd.simulation import Sense, SimulatedPushedDevice
+from compd.twins import Sense, SimulatedPushedDevice
 from compd_drivers.simulated.shared import number_for
 
 PER_SECOND = {"unix_s": 1.0, "unix_ms": 1e3, "unix_us": 1e6, "unix_ns": 1e9}

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from compd.simulation import SimulatedPushedDevice
+from compd.twins import SimulatedPushedDevice
 from compd_drivers.simulated.shared import number_for
 
 

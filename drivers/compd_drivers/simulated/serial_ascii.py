@@ -11,7 +11,7 @@ import math
 import re
 from typing import Any
 
-from compd.simulation import Sense, SimulatedByteDevice
+from compd.twins import Sense, SimulatedByteDevice
 from compd_drivers.simulated.shared import number_for
 
 ESCAPES = {"r": "\r", "n": "\n", "t": "\t", "\\": "\\"}

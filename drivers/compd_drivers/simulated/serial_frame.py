@@ -6,7 +6,7 @@ import math
 import struct
 from typing import Any
 
-from compd.simulation import Sense, SimulatedByteDevice
+from compd.twins import Sense, SimulatedByteDevice
 from compd_drivers.simulated.serial_ascii import checksum
 from compd_drivers.simulated.shared import number_for
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from compd.simulation import Sense, SimulatedByteDevice
+from compd.twins import Sense, SimulatedByteDevice
 
 BEYOND = 0.01  # share of the range by which a transducer exceeds its calibrated ends before it saturates
 # Size of the wire's units in the channel's unit (mm, N, hPa).

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from compd.simulation import Sense, SimulatedByteDevice
+from compd.twins import Sense, SimulatedByteDevice
 
 LARGEST = 99.9999
 MM_IN_AN_INCH = 25.4

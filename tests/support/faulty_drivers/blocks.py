@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, RegisterLine, bad, good
-from compd.simulation import SimulatedRegisterDevice
+from compd.twins import SimulatedRegisterDevice
 from tests.support.faulty_drivers.comparator import LARGEST_MM, AsciiDevice
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, bad, good
-from compd.simulation import Sense, SimulatedByteDevice
+from compd.twins import Sense, SimulatedByteDevice
 
 LARGEST_MM = 99.9999
 

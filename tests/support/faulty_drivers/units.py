@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from compd.gauge import ByteLine, GaugeOptions, LineFault, Quality
-from compd.simulation import Sense
+from compd.twins import Sense
 from tests.support.faulty_drivers.comparator import Comparator, ComparatorDevice
 
 

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 from compd.cli.app import app
 from compd.cli.live.poll import gauge_status
 from compd.client import connect
-from compd.configuration import SocketSettings, StateSettings, load, read_document
+from compd.configuration import SocketSettings, StateSettings, load
+from compd.documents import read_document
 from tests.support.paths import CONFIG
 from tests.support.running_daemon import supervised
 from tests.support.serial_gateway import SerialGateway, serial_gateway

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from compd.gauge import Quality, bad, good
-from compd.gauge_tools import PortArguments, aged, gauge_of_driver, gauge_of_file
+from compd.gauge_tools import aged, gauge_of_driver, gauge_of_file
 from compd.gauge_tools.open_gauge import STALE_AFTER_S
+from compd.lines import PortArguments
 from tests.support.paths import CONFIG
 
 OPC_UA = PortArguments("opc.tcp://127.0.0.1:4840", None, None, 1.0)

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from compd.commissioning.doctor import ports, system
+from compd.commissioning.doctor import system
 from compd.commissioning.doctor.examine import examine, is_fit, what_to_do
-from compd.commissioning.doctor.finding import Computer, Finding, Verdict, advice, fault, good
 from compd.commissioning.doctor.ports import port_findings
 from compd.commissioning.doctor.system import (
     clock_findings,
@@ -21,7 +20,11 @@ from compd.commissioning.doctor.system import (
     tcp_finding,
     unit_finding,
 )
-from compd.configuration import LineSettings, ModbusTcpLine, SerialLine, load
+from compd.configuration import load
+from compd.lines import Computer, Finding, LineSettings, Verdict, advice, fault, good
+from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
+from compd.lines.kinds.serial.settings import SerialLine
+from compd.lines.probes import serial_port as ports
 from tests.support.paths import CONFIG
 
 PORT = "/dev/serial/by-id/usb-FTDI_A1-if00-port0"

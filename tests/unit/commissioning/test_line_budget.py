@@ -14,11 +14,15 @@ from compd.cli.start.check import print_lines
 from compd.commissioning.line_budget import (
     LineBudget,
     budget_of_line,
-    character_bits,
     line_budgets,
 )
 from compd.commissioning.line_warnings import budget_warnings, line_warnings
-from compd.configuration import ModbusAsciiLine, ModbusRtuLine, ModbusTcpLine, SerialLine, load
+from compd.configuration import load
+from compd.lines import character_bits
+from compd.lines.kinds.modbus_ascii.settings import ModbusAsciiLine
+from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
+from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
+from compd.lines.kinds.serial.settings import SerialLine
 from tests.support.paths import CONFIG
 
 

@@ -13,11 +13,12 @@ from typing import Any
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.configuration import ModbusRtuLine, SerialLine
 from compd.gauge import Quality
 from compd.gauge_tools import announcements, preset_candidates
 from compd.gauge_tools.probe import PresetCandidate, probe_port
 from compd.lines import open_stream
+from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
+from compd.lines.kinds.serial.settings import SerialLine
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.sampled import sampled

@@ -14,7 +14,8 @@ from typer.testing import CliRunner
 import compd.configuration.line_checks
 from compd.cli.app import app
 from compd.commissioning.pushed_periods import period_warnings
-from compd.configuration import Configuration, load, read_document
+from compd.configuration import Configuration, load
+from compd.documents import read_document
 from compd.errors import ConfigurationError
 from tests.support.mosquitto import needs_mosquitto, publisher, running_broker
 from tests.support.paths import CONFIG

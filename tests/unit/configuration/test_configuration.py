@@ -14,9 +14,12 @@ import yaml
 
 from compd.configuration import load
 from compd.configuration.hashes import hash_of
-from compd.configuration.lines import ModbusRtuLine, ModbusTcpLine, SerialLine, TcpLine
 from compd.configuration.schema import json_schema
 from compd.errors import ConfigurationError
+from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
+from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
+from compd.lines.kinds.serial.settings import SerialLine
+from compd.lines.kinds.tcp.settings import TcpLine
 from compd.plugins import GAUGES
 from compd.plugins import load as load_plugin
 from compd_drivers.heidenhain_nd28x import HeidenhainNd28x

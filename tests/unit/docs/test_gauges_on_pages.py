@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from compd.configuration import parse_yaml
+from compd.documents import parse_yaml
 from compd.plugins import GAUGES, load
 from tests.support.pages import fences
 from tests.support.paths import ROOT

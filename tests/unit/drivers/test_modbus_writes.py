@@ -12,8 +12,8 @@ from pydantic import ValidationError
 from compd.conformance import driver_under_test, run_conformance
 from compd.gauge import LineFault, Quality, RegisterReply
 from compd.lines import RtuMaster, StreamLine
-from compd.lines.modbus_rtu import crc16
-from compd.simulation import ModbusSlaves
+from compd.lines.kinds.modbus_rtu.master import crc16
+from compd.twins import ModbusSlaves
 from compd_drivers.modbus import Modbus
 from compd_drivers.simulated.modbus import SimulatedRegisters
 from tests.support.wire_rig import InstantClock, ScriptedPort, rig

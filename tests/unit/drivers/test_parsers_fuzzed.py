@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from compd.gauge import LineFault, Quality, Reading
 from compd.lines import RtuMaster, StreamLine
-from compd.lines.modbus_rtu import crc16
+from compd.lines.kinds.modbus_rtu.master import crc16
 from compd.plugins import GAUGES, load
 from tests.support.wire_rig import InstantClock, ScriptedPort
 

@@ -18,10 +18,10 @@ from pydantic import ValidationError
 from structlog.testing import capture_logs
 
 from compd.clock import MonotonicClock
-from compd.configuration import powered
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from compd.lines.control_lines import ControlLines
+from compd.lines.line_settings import powered
 from compd.lines.port import TcpPort
 from compd.lines.stream import StreamLine
 from tests.support.ascii_gauge import gauge, line_with

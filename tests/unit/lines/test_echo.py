@@ -8,7 +8,7 @@ import pytest
 
 from compd.gauge import LineFault, Quality
 from compd.lines.echo import HINT, explained
-from compd.lines.modbus_rtu import RtuMaster
+from compd.lines.kinds.modbus_rtu.master import RtuMaster
 from compd.lines.stream import StreamLine
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.memory import Latest

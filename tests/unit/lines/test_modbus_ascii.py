@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymodbus.framer.ascii import FramerAscii
 
 from compd.gauge import LineFault, Quality
-from compd.lines.modbus_ascii import AsciiMaster, lrc
+from compd.lines.kinds.modbus_ascii.master import AsciiMaster, lrc
 from compd.lines.stream import StreamLine
 from tests.support.wire_rig import InstantClock, ScriptedPort
 

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from pymodbus.framer.rtu import FramerRTU
 
 from compd.gauge import MOST_SKIPPED_BYTES, LineFault, Quality
-from compd.lines.modbus_rtu import RtuMaster, crc16, gap_s
+from compd.lines.kinds.modbus_rtu.master import RtuMaster, crc16, gap_s
 from compd.lines.stream import StreamLine
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 

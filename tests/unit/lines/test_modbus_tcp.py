@@ -13,7 +13,7 @@ import pytest
 from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line
-from compd.lines.modbus_tcp import ModbusTcp
+from compd.lines.kinds.modbus_tcp.master import ModbusTcp
 from tests.support.serial_gateway import serial_gateway
 from tests.support.wire_rig import InstantClock, Rig, rig
 

@@ -10,8 +10,11 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
-from compd.simulation import SimulatedByteDevice
-from compd.simulation.wires.simulated_line import DAMAGES, SimulatedLine
+from compd.lines.line_definition import PolledDefinition
+from compd.lines.port_arguments import PortArguments
+from compd.lines.registry import KINDS
+from compd.simulation.wires.device import SimulatedByteDevice
+from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.wire_rig import SETTINGS, outcome, rig
 
 RTU = {"kind": "modbus_rtu", "port": "x", "baud": 115200, "format": "8N1", "timeout_s": 0.1}
@@ -80,10 +83,10 @@ def test_a_reply_leaves_at_the_pace_of_the_line(tmp_path: Path) -> None:
     assert received == b"12345678901234567"
 
 
-@pytest.mark.parametrize("kind", DAMAGES)
+@pytest.mark.parametrize("kind", [name for name, kind in KINDS.items() if isinstance(kind, PolledDefinition)])
 def test_a_fault_that_there_is_not_is_refused_and_the_others_named(tmp_path: Path, kind: str) -> None:
-    where = {"host": "x", "port": 1} if "tcp" in kind else {"port": "x", "baud": 9600, "format": "8N1"}
-    settings = SETTINGS.validate_python({"kind": kind, "timeout_s": 0.1, **where})
+    port = KINDS[kind].port_keys(PortArguments(KINDS[kind].example_port, 9600, "8N1", 0.1))
+    settings = SETTINGS.validate_python({"kind": kind, "timeout_s": 0.1, **port})
     line = SimulatedLine("line", settings, [], tmp_path)
     with pytest.raises(RuntimeError, match="start it first"):
         line.fault = "silent"

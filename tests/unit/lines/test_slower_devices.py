@@ -8,8 +8,8 @@ from collections.abc import Callable
 import pytest
 
 from compd.gauge import LineFault, Quality
-from compd.lines.modbus_ascii import AsciiMaster, lrc
-from compd.lines.modbus_rtu import RtuMaster, crc16
+from compd.lines.kinds.modbus_ascii.master import AsciiMaster, lrc
+from compd.lines.kinds.modbus_rtu.master import RtuMaster, crc16
 from compd.lines.modbus_serial import SerialMaster
 from compd.lines.stream import FEWEST_RESTS, MOST_GIVEN_UP, SHORTEST_REST, StreamLine
 from tests.support.wire_rig import InstantClock, ScriptedPort

@@ -18,7 +18,7 @@ import pytest
 from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line, open_stream
-from compd.lines.modbus_rtu import RtuMaster
+from compd.lines.kinds.modbus_rtu.master import RtuMaster
 from compd.lines.port import Port, SerialPort, TcpPort
 from compd.lines.stream import FEWEST_RESTS, MOST_DRAIN_TIMEOUTS, MOST_GIVEN_UP, SHORTEST_REST, StreamLine
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
@@ -140,7 +140,7 @@ def test_a_device_that_is_deaf_after_its_reply_is_left_alone(monkeypatch: pytest
         replied_s[0] = clock.now_s
         return b"+1.5\r\n"
 
-    monkeypatch.setattr("compd.lines.open.TcpPort", lambda *_: ScriptedPort(clock, device=deaf))
+    monkeypatch.setattr("compd.lines.port.TcpPort", lambda *_: ScriptedPort(clock, device=deaf))
     answers = {}
     for pause_s in (0.0, 0.015):
         settings = {"kind": "tcp", "host": "x", "port": 1, "timeout_s": TIMEOUT_S, "pause_s": pause_s}

@@ -14,11 +14,12 @@ import pytest
 
 from compd.clock import Clock
 from compd.commissioning import line_budgets
-from compd.commissioning.line_budget import USUAL_TURNAROUND_S, character_bits
+from compd.commissioning.line_budget import USUAL_TURNAROUND_S
 from compd.configuration import load
 from compd.conformance.faults import Piece
 from compd.conformance.virtual import VirtualWire
 from compd.gauge import Reading
+from compd.lines import character_bits
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
@@ -26,9 +27,8 @@ from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
-from compd.simulation import ModbusSlaves
-from compd.simulation.wires.simulated_line import ByteDevices
-from compd.stated_noise import tolerance_mm
+from compd.twins import ModbusSlaves
+from compd.twins.byte_devices import ByteDevices
 from tests.support.paths import CONFIG
 from tests.support.wire_rig import PATIENCE_S
 

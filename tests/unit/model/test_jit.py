@@ -18,16 +18,17 @@ from compd import jit
 @pytest.fixture
 def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the sources that jit.py takes for its own."""
-    folder = tmp_path / "model"
-    shutil.copytree(Path(jit.__file__).parents[1], folder, ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(jit, "__file__", str(folder / "kernels" / "jit.py"))
+    folder = tmp_path / "compd"
+    shutil.copytree(Path(jit.__file__).parent, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(jit, "__file__", str(folder / "jit.py"))
     monkeypatch.setattr(jit._config, "CACHE_DIR", "")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
     return folder
 
 
 @pytest.mark.parametrize(
-    ("name", "old", "new"), [("solve_status.py", "= 100.0", "= 200.0"), ("kernels/linear.py", "1e12", "1e11")]
+    ("name", "old", "new"),
+    [("model/kernels/solve_status.py", "= 100.0", "= 200.0"), ("linear.py", "1e12", "1e11")],
 )
 def test_a_changed_limit_or_helper_does_not_run_old_kernels(sources: Path, name: str, old: str, new: str) -> None:
     before = jit._cache_directory()
@@ -60,7 +61,7 @@ def test_kernels_work_where_nothing_can_be_kept(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
     code = (
-        "import numpy as np; from compd.model.kernels import jit; from compd.rotation import to_outer;"
+        "import numpy as np; from compd import jit; from compd.rotation import to_outer;"
         "print(repr(jit.CACHE_DIRECTORY), to_outer(np.eye(3), np.ones(3), np.zeros(3)).tolist())"
     )
     done = subprocess.run(

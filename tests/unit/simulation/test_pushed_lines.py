@@ -16,10 +16,10 @@ from structlog.testing import capture_logs
 from compd.clock import MonotonicClock
 from compd.errors import CompdError
 from compd.gauge import Quality
+from compd.lines.kinds.mqtt.twin import MqttPublisher
+from compd.lines.kinds.opc_ua.twin import OpcUaNodes
 from compd.plugins import SIMULATED_GAUGES, load
-from compd.simulation.wires.mqtt_publisher import MqttPublisher
-from compd.simulation.wires.opc_ua_server import OpcUaNodes
-from compd.simulation.wires.pushed_line import SimulatedPushedLine
+from compd.twins import SimulatedPushedLine
 from tests.support.mosquitto import needs_mosquitto, running_broker
 from tests.support.pushed_gauges import STALE_AFTER_S, acquiring, gauge
 from tests.support.sampled import sampled

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from compd.configuration import SerialLine
 from compd.errors import CompdError
 from compd.gauge_description import capture_live, read_capture, saved_capture
 from compd.gauge_description.capture import CapturedReply
+from compd.lines.kinds.serial.settings import SerialLine
 
 
 @contextmanager

@@ -31,8 +31,9 @@ from asyncua.ua.uaerrors import UaError, UaStatusCodeError
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality
-from compd.lines.opc_ua_login import OpcUaSettings, log_in, refusal
-from compd.lines.opc_ua_status import quality_of
+from compd.lines.kinds.opc_ua.login import log_in, refusal
+from compd.lines.kinds.opc_ua.settings import OpcUaLine
+from compd.lines.kinds.opc_ua.status import quality_of
 from compd.pushed_gauge import Message
 from compd.source_time import Arrival
 
@@ -61,7 +62,7 @@ class OpcUaSubscriber:
     unexpected_bytes = 0
     request_came_back = False
 
-    def __init__(self, settings: OpcUaSettings, clock: Clock, utc: Callable[[], float] = time.time) -> None:
+    def __init__(self, settings: OpcUaLine, clock: Clock, utc: Callable[[], float] = time.time) -> None:
         """Connect within `settings.timeout_s`, and subscribe to nothing yet. `utc`: the calendar clock, s since 1970.
 
         Raises LineFault (LINE_LOST) when the server cannot be reached, or refuses.
@@ -136,7 +137,7 @@ class OpcUaSubscriber:
             text = str(error) or type(error).__name__
             raise LineFault(Quality.LINE_LOST, f"cannot connect to {where}: {text}") from error
 
-    async def _connect(self, settings: OpcUaSettings) -> None:
+    async def _connect(self, settings: OpcUaLine) -> None:
         """Connect, log in, and make the subscription."""
         await log_in(self._client, settings)
         self._asked_s = self._clock.monotonic()

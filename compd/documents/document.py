@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from compd.configuration.yaml_reader import Location, dotted, parse_yaml, read_text
+from compd.documents.yaml_reader import Location, dotted, parse_yaml, read_text
 from compd.files import FileKind
 
 __all__ = ["CONFIGURATION", "Document", "Location", "dotted", "read_document", "read_entries"]

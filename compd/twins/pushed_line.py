@@ -10,10 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from compd.clock import Clock, MonotonicClock
-from compd.simulation.wires.device import SimulatedPushedDevice
-from compd.simulation.wires.line_fault import SILENT, UNPLUGGED, checked_fault
-
-Port = str | tuple[str, int]
+from compd.twins.device import SimulatedPushedDevice
+from compd.twins.line_fault import SILENT, UNPLUGGED, checked_fault
+from compd.twins.wire_ends import Port
 
 # The source's clock stands still, or is wrong by an hour.
 CLOCK_STUCK, CLOCK_BEHIND, CLOCK_AHEAD = "clock stuck", "clock behind", "clock ahead"

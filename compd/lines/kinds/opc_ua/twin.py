@@ -16,9 +16,7 @@ from asyncua.server.server import Server
 from asyncua.ua.status_codes import StatusCodes
 
 from compd.clock import Clock
-from compd.simulation.wires.device import SimulatedPushedDevice
-from compd.simulation.wires.pushed_line import WRONG_TYPE, SimulatedPushedLine, is_off
-from compd.simulation.wires.wire_ends import LOOPBACK
+from compd.twins import LOOPBACK, WRONG_TYPE, SimulatedPushedDevice, SimulatedPushedLine, is_off
 
 for _name in ("asyncua.server", "asyncua.client"):
     logging.getLogger(_name).setLevel(logging.CRITICAL)

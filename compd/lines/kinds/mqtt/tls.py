@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ssl
 from collections.abc import Mapping
-from typing import Protocol
+
+from compd.lines.kinds.mqtt.settings import MqttTls
 
 _NOT_VOUCHED_FOR = "`ca_file` has to have the certificate that vouches for it"
 _OTHER_HOST = "`host` has to be a name in it"
@@ -25,17 +26,6 @@ _HINTS: Mapping[int, str] = {
 }
 
 
-class TlsSettings(Protocol):
-    """TLS to the broker: see `compd.configuration.pushed_lines.MqttTls`."""
-
-    @property
-    def ca_file(self) -> str | None: ...
-    @property
-    def certificate(self) -> str | None: ...
-    @property
-    def private_key(self) -> str | None: ...
-
-
 class _ClosingSocket(ssl.SSLSocket):
     """Closed where the handshake fails: paho leaves it open."""
 
@@ -47,7 +37,7 @@ class _ClosingSocket(ssl.SSLSocket):
             raise
 
 
-def tls_context(settings: TlsSettings) -> ssl.SSLContext:
+def tls_context(settings: MqttTls) -> ssl.SSLContext:
     """The context of a connection. Raises ValueError for files that cannot be used."""
     try:
         context = ssl.create_default_context(cafile=settings.ca_file)

@@ -7,15 +7,24 @@ import socket
 import tty
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 LOOPBACK = "127.0.0.1"
 MOST_BYTES = 4096  # of one read
+# For the daemon: a device path, a URL, or host and port.
+Port = str | tuple[str, int]
 
 
 class End(Protocol):
-    """An end that can be selected, read and written, by file descriptor."""
+    """An end that can be selected, read and written, by file descriptor.
 
+    port : for the daemon. number : of the network port, 0 where it has none; it is opened there again.
+    """
+
+    @property
+    def port(self) -> Port: ...
+    @property
+    def number(self) -> int: ...
     def fds(self) -> list[int]: ...
     def read(self, fd: int) -> bytes: ...
     def write(self, fd: int, data: bytes) -> None: ...
@@ -25,6 +34,8 @@ class End(Protocol):
 class PtyEnd:
     """A pty with a symbolic link to the daemon's side; closing it unplugs the line."""
 
+    number = 0
+
     def __init__(self, link: Path) -> None:
         self._link = link
         # The daemon's side stays open here, so that the daemon can close and reopen it.
@@ -32,6 +43,10 @@ class PtyEnd:
         tty.setraw(self._slave)
         link.unlink(missing_ok=True)
         link.symlink_to(os.ttyname(self._slave))
+
+    @property
+    def port(self) -> str:
+        return str(self._link)
 
     def fds(self) -> list[int]:
         return [self._master]
@@ -51,10 +66,15 @@ class PtyEnd:
 class TcpEnd:
     """A listening socket; a reply goes to the connection that sent the request."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, number: int) -> None:
+        """`number`: of the port, 0 for any."""
         self._connections: dict[int, socket.socket] = {}
-        self._listener = socket.create_server((LOOPBACK, port))
-        self.port: int = self._listener.getsockname()[1]
+        self._listener = socket.create_server((LOOPBACK, number))
+        self.number: int = self._listener.getsockname()[1]
+
+    @property
+    def port(self) -> Port:
+        return LOOPBACK, self.number
 
     def fds(self) -> list[int]:
         return [self._listener.fileno(), *self._connections]
@@ -83,3 +103,8 @@ class TcpEnd:
         for connection in (self._listener, *self._connections.values()):
             connection.close()
         self._connections.clear()
+
+
+def tcp_end(settings: Any, link: Path, number: int) -> End:
+    """See `compd.twins.polled_twin.PolledTwin.end`."""
+    return TcpEnd(number)

@@ -11,8 +11,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from compd.clock import Clock
 from compd.errors import CompdError, Problem
-from compd.simulation.wires.device import SimulatedPushedDevice
-from compd.simulation.wires.pushed_line import WRONG_TYPE, SimulatedPushedLine
+from compd.twins import WRONG_TYPE, SimulatedPushedDevice, SimulatedPushedLine
 
 NOT_A_NUMBER = "not a number"
 # Text of spreadsheets and gateways for a missing value.

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from compd.configuration.section import Section, refusal
+from compd.documents import Section, refusal
 from compd.text import unescape
 
 SettleTime = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)]

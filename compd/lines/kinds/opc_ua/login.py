@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal, Protocol
 
 from asyncua import ua
 from asyncua.client.client import Client
@@ -33,6 +32,8 @@ from cryptography.x509 import (
     load_pem_x509_certificate,
 )
 
+from compd.lines.kinds.opc_ua.settings import OpcUaLine, OpcUaSecurity
+
 _PEM = b"-----BEGIN "
 _TRUST = "let the server trust `certificate`"
 _USER = "`user` and `password_file` are not what the server knows"
@@ -46,45 +47,7 @@ _HINTS: Mapping[int, str] = {
 }
 
 
-class SecuritySettings(Protocol):
-    """A secure channel: see `compd.configuration.pushed_lines.OpcUaSecurity`."""
-
-    @property
-    def policy(self) -> str: ...
-    @property
-    def mode(self) -> str: ...
-    @property
-    def certificate(self) -> str: ...
-    @property
-    def private_key(self) -> str: ...
-    @property
-    def server_certificate(self) -> str: ...
-
-
-class OpcUaSettings(Protocol):
-    """The keys of an OPC UA line in the configuration."""
-
-    @property
-    def kind(self) -> Literal["opc_ua"]: ...
-    @property
-    def timeout_s(self) -> float: ...
-    @property
-    def endpoint(self) -> str: ...
-    @property
-    def publishing_s(self) -> float: ...
-    @property
-    def sampling_s(self) -> float | None: ...
-    @property
-    def unchanged(self) -> Literal["stale", "holds"]: ...
-    @property
-    def user(self) -> str | None: ...
-    @property
-    def password_file(self) -> str | None: ...
-    @property
-    def security(self) -> SecuritySettings | None: ...
-
-
-async def log_in(client: Client, settings: OpcUaSettings) -> None:
+async def log_in(client: Client, settings: OpcUaLine) -> None:
     """Connect, with the channel and the user of the settings.
 
     Raises what asyncua raises; OSError and ValueError for files that cannot be used, and for a server that offers no
@@ -112,7 +75,7 @@ def refusal(error: UaStatusCodeError) -> str:
     return f"refuses: {ua.StatusCode(error.code).name}{'' if hint is None else f'; {hint}'}"
 
 
-async def _secure(client: Client, security: SecuritySettings) -> None:
+async def _secure(client: Client, security: OpcUaSecurity) -> None:
     """Raises OSError or ValueError."""
     own = _certificate("certificate", security.certificate)
     server = _certificate("server_certificate", security.server_certificate)

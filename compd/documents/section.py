@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, 
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from compd.configuration.document import Document, Location
+from compd.documents.document import Document, Location
 from compd.errors import Problem
 from compd.text import has_secret, holds_secret
 

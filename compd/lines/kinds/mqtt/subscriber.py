@@ -19,7 +19,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any
 
 from paho.mqtt.client import Client, ConnectFlags, DisconnectFlags, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
@@ -28,7 +28,8 @@ from paho.mqtt.reasoncodes import ReasonCode
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality
-from compd.lines.mqtt_tls import TlsSettings, handshake_failure, tls_context
+from compd.lines.kinds.mqtt.settings import MqttLine
+from compd.lines.kinds.mqtt.tls import handshake_failure, tls_context
 from compd.pushed_gauge import Message
 from compd.source_time import Arrival
 
@@ -39,29 +40,6 @@ MOST_MESSAGES = 1000
 LONGEST_PASSWORD = 65535  # bytes, MQTT 3.1.1, 3.1.3.5
 
 
-class MqttSettings(Protocol):
-    """The keys of an MQTT line in the configuration."""
-
-    @property
-    def kind(self) -> Literal["mqtt"]: ...
-    @property
-    def timeout_s(self) -> float: ...
-    @property
-    def host(self) -> str: ...
-    @property
-    def port(self) -> int: ...
-    @property
-    def client_id(self) -> str | None: ...
-    @property
-    def keep_alive_s(self) -> int: ...
-    @property
-    def user(self) -> str | None: ...
-    @property
-    def password_file(self) -> str | None: ...
-    @property
-    def tls(self) -> TlsSettings | None: ...
-
-
 class MqttSubscriber:
     """A `PushedLine` over MQTT. Used by one thread."""
 
@@ -69,7 +47,7 @@ class MqttSubscriber:
     unexpected_bytes = 0
     request_came_back = False
 
-    def __init__(self, settings: MqttSettings, clock: Clock, utc: Callable[[], float] = time.time) -> None:
+    def __init__(self, settings: MqttLine, clock: Clock, utc: Callable[[], float] = time.time) -> None:
         """Connect within `settings.timeout_s`. `utc`: the calendar clock, s since 1970.
 
         Raises LineFault (LINE_LOST) when the broker cannot be reached, or refuses.
@@ -151,7 +129,7 @@ class MqttSubscriber:
         if connection is not None:
             connection.close()  # paho leaves one open to which DISCONNECT could not be sent
 
-    def _log_in(self, settings: MqttSettings) -> None:
+    def _log_in(self, settings: MqttLine) -> None:
         """Raises OSError or ValueError for files that cannot be used."""
         if settings.user is not None:
             password = None

@@ -21,9 +21,9 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
-from compd.configuration import TriggerWrite
-from compd.simulation.wires.device import SimulatedRegisterDevice
-from compd.simulation.wires.latch import Latch
+from compd.lines import PolledLineSettings, TriggerWrite
+from compd.twins.device import SimulatedRegisterDevice
+from compd.twins.latch import Latch
 
 READ_COILS, READ_HOLDING, WRITE_REGISTERS = 1, 3, 16
 COIL_ON = 0xFF00
@@ -126,6 +126,18 @@ class ModbusSlaves:
         if trigger is None or unit != trigger.unit or len(message) < 5:
             return False
         return (message[0], int.from_bytes(message[1:3], "big")) == (trigger.function, trigger.address)
+
+
+def register_listener(
+    settings: PolledLineSettings,
+    devices: Sequence[SimulatedRegisterDevice],
+    over_tcp: bool = False,
+    as_text: bool = False,
+) -> ModbusSlaves:
+    """The slaves, latched by the line's round trigger where it has one. over_tcp, as_text : as of `ModbusSlaves`."""
+    trigger = settings.round_trigger
+    latch = None if trigger is None else Latch(devices)
+    return ModbusSlaves(devices, over_tcp, as_text, trigger if isinstance(trigger, TriggerWrite) else None, latch)
 
 
 def _unit_and_message(text: bytes) -> bytes:

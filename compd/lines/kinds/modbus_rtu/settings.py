@@ -1,0 +1,21 @@
+"""Keys of a Modbus RTU line."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from compd.gauge import MOST_SKIPPED_BYTES
+from compd.lines.serial_settings import ModbusSerialSettings
+
+
+class ModbusRtuLine(ModbusSerialSettings):
+    """Modbus RTU on a serial port, or over TCP with port: socket://host:port."""
+
+    kind: Literal["modbus_rtu"] = Field(description="Modbus RTU registers")
+    skip_bytes: Annotated[int, Field(ge=0, le=MOST_SKIPPED_BYTES)] = Field(
+        default=0,
+        description="so many bytes before a reply are damage of a transceiver that changes its direction: they are "
+        "skipped where the checksum of the rest fits; left out: such a reply counts as damaged",
+    )

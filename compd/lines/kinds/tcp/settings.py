@@ -1,0 +1,21 @@
+"""Keys of a line of bytes over TCP."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from compd.documents import Text
+from compd.lines.line_settings import ECHO, HOST, ROUND_TRIGGER, NetworkPort, PolledLineSettings
+from compd.lines.round_trigger import TriggerBytes
+
+
+class TcpLine(PolledLineSettings):
+    """A stream of bytes over TCP."""
+
+    kind: Literal["tcp"] = Field(description="bytes over TCP")
+    host: Text = Field(description=HOST)
+    port: NetworkPort = Field(description="TCP port of the device")
+    echo: bool = Field(default=False, description=ECHO)
+    round_trigger: TriggerBytes | None = Field(default=None, description=ROUND_TRIGGER)
