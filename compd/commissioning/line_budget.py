@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 
 from compd.configuration import Configuration
 from compd.gauge import replies_tell_whose
-from compd.lines import (
+from compd.line_settings import (
     BROADCAST,
     WRITE_REGISTERS,
     Pace,

@@ -8,7 +8,7 @@ from typing import Any
 from compd.configuration import Configuration
 from compd.errors import Problem
 from compd.gauge import Gauge
-from compd.lines import LineSettings, PushedLineSettings
+from compd.line_settings import LineSettings, PushedLineSettings
 from compd.pushed_gauge import PushedGauge
 from compd.source_time import LATE
 

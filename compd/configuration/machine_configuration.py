@@ -39,7 +39,8 @@ from compd.documents import (
 )
 from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
-from compd.lines import LINES_BY_NAME, LineSettings
+from compd.line_settings import LineSettings
+from compd.lines import LINES_BY_NAME
 from compd.plugins import GAUGES
 from compd.plugins import load as load_plugin
 from compd.result_tables import Columns, data_frame, html_table

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from compd.clock import MonotonicClock
 from compd.conformance.peer import Peer
-from compd.lines import Line, PolledLineSettings, PortArguments, open_line, polled_kind
+from compd.line_settings import PolledLineSettings
+from compd.lines import Line, PortArguments, open_line, polled_kind
 from compd.twins import End
 
 FAST_BAUD = 115200

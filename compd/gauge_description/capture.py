@@ -11,7 +11,8 @@ from compd.clock import MonotonicClock
 from compd.errors import CompdError, Problem
 from compd.gauge import LineFault, Quality
 from compd.gauge_tools import open_tapped_stream
-from compd.lines import PolledLineSettings, StreamLine
+from compd.line_settings import PolledLineSettings
+from compd.lines import StreamLine
 
 LONGEST_REPLY = 1024
 # Line ends of devices: CR, LF, ETX, EOT.

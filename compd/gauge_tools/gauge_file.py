@@ -17,7 +17,8 @@ from compd.errors import ConfigurationError, Problem
 from compd.files import FileKind
 from compd.gauge import Gauge, GaugeOptions
 from compd.gauge_tools.open_gauge import STALE_AFTER_S, GaugeTarget, line_settings
-from compd.lines import LineSettings, PortArguments, powered
+from compd.line_settings import LineSettings, powered
+from compd.lines import PortArguments
 
 LEARNED_GAUGE, LEARNED_LINE = "learned_gauge", "learned_line"
 _SECTIONS = {"gauges", "lines"}

@@ -13,21 +13,18 @@ from compd.clock import Clock
 from compd.documents import separate_errors
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, LineKind, Quality, Reading, bad
+from compd.line_settings import LineSettings, PolledLineSettings, PushedLineSettings, powered
 from compd.lines import (
     Line,
     LineDefinition,
-    LineSettings,
-    PolledLineSettings,
     Port,
     PortArguments,
-    PushedLineSettings,
     StreamLine,
     assigned,
     explained,
     kinds_that_carry,
     open_line,
     open_stream,
-    powered,
 )
 from compd.live.acquisition import read_latched
 from compd.plugins import GAUGES, load

@@ -14,7 +14,8 @@ from typing import Any
 from compd.clock import MonotonicClock
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.gauge_tools.open_gauge import byte_line_settings, line_settings
-from compd.lines import Port, PortArguments, StreamLine, explained, open_line, open_stream, powered, shown
+from compd.line_settings import powered
+from compd.lines import Port, PortArguments, StreamLine, explained, open_line, open_stream, shown
 from compd.plugins import GAUGES, load, names
 
 PROBE_TIMEOUT_S = 0.5

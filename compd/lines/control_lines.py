@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import serial.rs485
 
-from compd.lines.serial_settings import Rs485
+from compd.line_settings import Rs485
 
 
 class ControlLines(NamedTuple):

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from compd.clock import Clock
 from compd.gauge import LineFault, LineKind, Quality
-from compd.lines.line_settings import LineSettings
+from compd.line_settings import LineSettings
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
+    from compd.finding import Computer, Finding
+    from compd.line_settings import Pace
     from compd.lines.line import Line, WrapPort
-    from compd.lines.pace import Pace
-    from compd.lines.probes.finding import Computer, Finding
     from compd.lines.stream import StreamLine
     from compd.twins import PolledTwin, SimulatedPushedLine
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from compd.clock import Clock
+from compd.line_settings import LineSettings, PolledLineSettings
 from compd.lines.line import Line, WrapPort, unchanged
-from compd.lines.line_settings import LineSettings, PolledLineSettings
 from compd.lines.registry import definition_of, polled_definition
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from typing import Annotated, Any, Union
 
 from pydantic import Field
 
+from compd.line_settings import LineSettings, PolledLineSettings
 from compd.lines import kinds
 from compd.lines.line_definition import LineDefinition, PolledDefinition
-from compd.lines.line_settings import LineSettings, PolledLineSettings
 
 
 def _definitions() -> dict[str, LineDefinition]:

@@ -7,14 +7,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from compd.clock import Clock
+from compd.line_settings import LATENCY_TIMER_S, QUIET_CHARACTERS, Pace, serial_pace
 from compd.lines.line_definition import PolledDefinition
-from compd.lines.pace import LATENCY_TIMER_S, QUIET_CHARACTERS, Pace, serial_pace
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
+    from compd.finding import Computer, Finding
+    from compd.line_settings import SerialPortSettings
     from compd.lines.line import WrapPort
-    from compd.lines.probes.finding import Computer, Finding
-    from compd.lines.serial_settings import SerialPortSettings
     from compd.lines.stream import StreamLine
 
 # Silence before a request, by which a late or repeated reply is noticed before the next one is asked for: at least

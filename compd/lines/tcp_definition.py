@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from compd.line_settings import Pace, network_pace
 from compd.lines.line_definition import PolledDefinition
-from compd.lines.pace import Pace, network_pace
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
-    from compd.lines.probes.finding import Computer, Finding
+    from compd.finding import Computer, Finding
 
 
 class TcpDefinition(PolledDefinition):

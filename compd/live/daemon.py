@@ -22,7 +22,7 @@ import structlog
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration, listed_code
 from compd.errors import DaemonError, StateError
-from compd.lines import PushedLineSettings, powered
+from compd.line_settings import PushedLineSettings, powered
 from compd.live.acquisition import Acquisition, Votes
 from compd.live.loop import (
     AdoptedModels,

@@ -14,8 +14,8 @@ from .polled_twin import PolledTwin as PolledTwin
 from .pushed_line import WRONG_TYPE as WRONG_TYPE
 from .pushed_line import SimulatedPushedLine as SimulatedPushedLine
 from .pushed_line import is_off as is_off
-from .serial_end import serial_character_s as serial_character_s
-from .serial_end import serial_end as serial_end
+from .serial_port_end import serial_character_s as serial_character_s
+from .serial_port_end import serial_end as serial_end
 from .wire_ends import LOOPBACK as LOOPBACK
 from .wire_ends import End as End
 from .wire_ends import Port as Port

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from compd.lines import PolledLineSettings, TriggerBytes
+from compd.line_settings import PolledLineSettings, TriggerBytes
 from compd.twins.device import SimulatedByteDevice
 from compd.twins.latch import Latch, TriggeredDevices
 from compd.twins.polled_twin import Listener

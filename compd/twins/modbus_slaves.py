@@ -21,7 +21,7 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
-from compd.lines import PolledLineSettings, TriggerWrite
+from compd.line_settings import PolledLineSettings, TriggerWrite
 from compd.twins.device import SimulatedRegisterDevice
 from compd.twins.latch import Latch
 

@@ -24,8 +24,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.configuration import Configuration, load
 from compd.gauge import Quality, Reading, bad, good
-from compd.lines import Pace
-from compd.lines.pace import serial_pace
+from compd.line_settings import Pace, serial_pace
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
 from compd.live.loop import CycleInputs, CycleSettings, CycleState, MachineZero, Models, build_pipeline, step

@@ -24,10 +24,10 @@ from typing import Any, NamedTuple
 from compd.clock import MonotonicClock
 from compd.commissioning.line_budget import budget_of_line
 from compd.gauge import Gauge
+from compd.line_settings import LATENCY_TIMER_S, serial_pace
 from compd.lines import open_line
 from compd.lines.kinds.modbus_rtu.master import crc16
 from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
-from compd.lines.pace import LATENCY_TIMER_S, serial_pace
 from compd.live.acquisition import Acquisition
 from compd.live.memory import Latest
 from compd.live.system import sharpen_timers

@@ -13,7 +13,8 @@ from pydantic import TypeAdapter
 
 from compd.clock import MonotonicClock
 from compd.gauge import Gauge, LineFault, Quality, Reading
-from compd.lines import LineSettings, open_line
+from compd.line_settings import LineSettings
+from compd.lines import open_line
 from compd.lines.registry import ANY_LINE
 from compd.live.memory import Latest
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load

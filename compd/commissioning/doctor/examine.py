@@ -15,7 +15,7 @@ from compd.commissioning.doctor.system import (
     unit_finding,
 )
 from compd.configuration import Configuration
-from compd.lines import Computer, Finding, Verdict, advice, good, unknown
+from compd.finding import Computer, Finding, Verdict, advice, good, unknown
 
 # Values of the shipped configurations, for a computer without a configuration.
 _USUAL_PRIORITY = 40

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from compd.lines import Computer, Finding, LineSettings, definition_of
+from compd.finding import Computer, Finding
+from compd.line_settings import LineSettings
+from compd.lines import definition_of
 
 
 def port_findings(computer: Computer, lines: Mapping[str, LineSettings], daemon_runs: bool) -> Iterator[Finding]:

@@ -15,7 +15,8 @@ import structlog
 
 from compd.clock import Clock
 from compd.gauge import Gauge, LineFault, Quality
-from compd.lines import Line, LineSettings, PolledLineSettings, open_line
+from compd.line_settings import LineSettings, PolledLineSettings
+from compd.lines import Line, open_line
 from compd.live.acquisition.gauge_trust import Judge
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.polled_round import PolledRound

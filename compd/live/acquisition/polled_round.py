@@ -15,7 +15,8 @@ from contextlib import contextmanager
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality, Reading
-from compd.lines import Line, PolledLineSettings, explained, shown
+from compd.line_settings import PolledLineSettings
+from compd.lines import Line, explained, shown
 from compd.live.acquisition.absent_gauges import AbsentGauges
 from compd.live.acquisition.polled_gauge import DAMAGED, LONGEST_REST_S, BackOff, PolledGauge
 from compd.live.acquisition.reply_order import ReplyOrder

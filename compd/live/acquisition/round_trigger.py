@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from compd.gauge import Gauge, Reading
-from compd.lines import TriggerBytes, TriggerWrite
+from compd.line_settings import TriggerBytes, TriggerWrite
 from compd.live.memory import Latest
 
 

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from compd.configuration import Configuration
-from compd.lines import LineSettings, serial_ports
+from compd.line_settings import LineSettings
+from compd.lines import serial_ports
 
 
 def port_names(configuration: Configuration) -> dict[str, str]:

@@ -12,7 +12,8 @@ import numpy as np
 
 from compd.clock import Clock
 from compd.configuration import Configuration
-from compd.lines import LineSettings, PolledLineSettings, PushedDefinition, definition_of
+from compd.line_settings import LineSettings, PolledLineSettings
+from compd.lines import PushedDefinition, definition_of
 from compd.plugins import SIMULATED_GAUGES, load
 from compd.simulation.truth.follow_motion import MotorCommand
 from compd.simulation.truth.instruments import INTERFEROMETER, TRACKER

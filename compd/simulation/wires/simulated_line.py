@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from compd.clock import Clock, MonotonicClock
-from compd.lines import PolledLineSettings, polled_definition
+from compd.line_settings import PolledLineSettings
+from compd.lines import polled_definition
 from compd.twins import LATE, UNPLUGGED, End, Port, SimulatedByteDevice, SimulatedRegisterDevice, checked_fault
 
 # Replies are written in pieces of this duration; shorter pieces would only cost processor time.

@@ -21,7 +21,8 @@ from compd.commissioning.doctor.system import (
     unit_finding,
 )
 from compd.configuration import load
-from compd.lines import Computer, Finding, LineSettings, Verdict, advice, fault, good
+from compd.finding import Computer, Finding, Verdict, advice, fault, good
+from compd.line_settings import LineSettings
 from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
 from compd.lines.kinds.serial.settings import SerialLine
 from compd.lines.probes import serial_port as ports

@@ -19,9 +19,9 @@ from structlog.testing import capture_logs
 
 from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
+from compd.line_settings import powered
 from compd.lines import open_line
 from compd.lines.control_lines import ControlLines
-from compd.lines.line_settings import powered
 from compd.lines.port import TcpPort
 from compd.lines.stream import StreamLine
 from tests.support.ascii_gauge import gauge, line_with

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from compd.lines.serial_settings import ModbusSerialSettings
+from compd.line_settings import ModbusSerialSettings
 
 
 class ModbusAsciiLine(ModbusSerialSettings):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from compd.clock import Clock
+from compd.line_settings import SerialPortSettings
 from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
 from compd.lines.serial_definition import SerialDefinition
-from compd.lines.serial_settings import SerialPortSettings
 
 if TYPE_CHECKING:
     from compd.lines.kinds.modbus_rtu.master import RtuMaster

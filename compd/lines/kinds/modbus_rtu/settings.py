@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from compd.gauge import MOST_SKIPPED_BYTES
-from compd.lines.serial_settings import ModbusSerialSettings
+from compd.line_settings import ModbusSerialSettings
 
 
 class ModbusRtuLine(ModbusSerialSettings):

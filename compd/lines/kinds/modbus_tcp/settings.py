@@ -7,8 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from compd.documents import Positive, Text
-from compd.lines.line_settings import HOST, ROUND_TRIGGER, NetworkPort, PolledLineSettings
-from compd.lines.round_trigger import TriggerWrite
+from compd.line_settings import HOST, ROUND_TRIGGER, NetworkPort, PolledLineSettings, TriggerWrite
 
 
 class ModbusTcpLine(PolledLineSettings):

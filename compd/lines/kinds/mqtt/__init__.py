@@ -11,9 +11,9 @@ from compd.lines.line_definition import Library, PushedDefinition
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
+    from compd.finding import Computer, Finding
     from compd.lines.kinds.mqtt.subscriber import MqttSubscriber
     from compd.lines.kinds.mqtt.twin import MqttPublisher
-    from compd.lines.probes.finding import Computer, Finding
 
 
 class Mqtt(PushedDefinition):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from compd.documents import AbsolutePath, Section, Text, refusal
-from compd.lines.line_settings import NetworkPort, PushedLineSettings
+from compd.line_settings import NetworkPort, PushedLineSettings
 
 
 class MqttTls(Section):

@@ -12,9 +12,9 @@ from compd.lines.line_definition import Library, PushedDefinition
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
+    from compd.finding import Computer, Finding
     from compd.lines.kinds.opc_ua.subscriber import OpcUaSubscriber
     from compd.lines.kinds.opc_ua.twin import OpcUaNodes
-    from compd.lines.probes.finding import Computer, Finding
 
 
 class OpcUa(PushedDefinition):

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from compd.documents import AbsolutePath, Positive, Section
-from compd.lines.line_settings import PushedLineSettings
+from compd.line_settings import PushedLineSettings
 
 
 class OpcUaSecurity(Section):

@@ -6,9 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from compd.lines.line_settings import ROUND_TRIGGER
-from compd.lines.round_trigger import TriggerBytes
-from compd.lines.serial_settings import SerialPortSettings
+from compd.line_settings import ROUND_TRIGGER, SerialPortSettings, TriggerBytes
 
 
 class SerialLine(SerialPortSettings):

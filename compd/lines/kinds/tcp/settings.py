@@ -7,8 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from compd.documents import Text
-from compd.lines.line_settings import ECHO, HOST, ROUND_TRIGGER, NetworkPort, PolledLineSettings
-from compd.lines.round_trigger import TriggerBytes
+from compd.line_settings import ECHO, HOST, ROUND_TRIGGER, NetworkPort, PolledLineSettings, TriggerBytes
 
 
 class TcpLine(PolledLineSettings):

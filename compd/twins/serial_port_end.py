@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from compd.lines import SerialPortSettings, character_bits
+from compd.line_settings import SerialPortSettings, character_bits
 from compd.twins.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
 
 

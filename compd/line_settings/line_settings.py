@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from compd.documents import AbsolutePath, Positive, Section, Text, refusal
 from compd.gauge import Gauge
-from compd.lines.round_trigger import TriggerBytes, TriggerWrite
+from compd.line_settings.round_trigger import TriggerBytes, TriggerWrite
 
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 NetworkPort = Annotated[int, Field(ge=1, le=65535)]

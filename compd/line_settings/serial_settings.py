@@ -7,8 +7,8 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from compd.documents import Section, Text, refusal
-from compd.lines.line_settings import ECHO, ROUND_TRIGGER, NotNegative, PolledLineSettings
-from compd.lines.round_trigger import TriggerWrite
+from compd.line_settings.line_settings import ECHO, ROUND_TRIGGER, NotNegative, PolledLineSettings
+from compd.line_settings.round_trigger import TriggerWrite
 
 Format = Annotated[str, Field(pattern=r"^[78][NEO][12]$")]
 _URL_HAS_NONE = "a device server has these lines only behind rfc2217://host:port, and switches RS-485 itself"
