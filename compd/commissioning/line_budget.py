@@ -26,12 +26,11 @@ from compd.line_settings import (
     BROADCAST,
     WRITE_REGISTERS,
     Pace,
-    PolledDefinition,
     PolledLineSettings,
     Traffic,
     TriggerBytes,
-    polled_definition,
 )
+from compd.lines import PolledDefinition, polled_definition
 from compd.live.acquisition import LATER_S, SLOWER
 
 # A slave must keep the silence too before it answers; many take longer: 10 ms is usual, so plan with both.

@@ -7,6 +7,8 @@ from typing import Any
 import yaml
 
 from compd.gauge import Gauge, GaugeOptions, Quality
+from compd.gauge_tools import catalogue
+from compd.gauge_tools.driver_catalogue import GIVEN_BY_THE_CONFIGURATION, driver_text
 from compd.lines import KINDS, kinds_that_carry
 from compd.plugins import GAUGES, load
 from compd.text import join_words

@@ -16,6 +16,10 @@ from compd.cli.live import gauge as gauge_cli
 from compd.clock import MonotonicClock
 from compd.configuration import load as load_machine
 from compd.errors import CompdError
+from compd.gauge_description import read_capture
+from compd.gauge_tools import preset_candidates
+from compd.gauge_tools.open_gauge import open_tapped_line
+from compd.gauge_tools.probe import PresetCandidate, probe_port
 from compd.lines import open_line, serial_ports
 from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
 from compd.lines.kinds.serial.settings import SerialLine

@@ -19,6 +19,7 @@ from compd.conformance.faults import Fault
 from compd.conformance.harness import ASKED_AGAIN_TIMEOUTS
 from compd.conformance.value_cases import share_of
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
+from compd.gauge_tools import polled_drivers
 from compd.lines import RtuMaster
 from compd.simulation.wires.device import SimulatedByteDevice
 from tests.support.sampled import sampled

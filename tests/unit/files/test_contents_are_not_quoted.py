@@ -22,9 +22,13 @@ from compd.clock import MonotonicClock
 from compd.configuration import load
 from compd.errors import CompdError
 from compd.fleet import find_recordings
+from compd.gauge_description import read_capture
+from compd.gauge_tools import gauge_of_file
 from compd.instruments import SHAPES, ReadOptions, preview_export, read_export
+from compd.lines import PortArguments
 from compd.lines.kinds.mqtt.tls import tls_context
 from compd.lines.kinds.opc_ua.login import _certificate, _private_key
+from compd.live.loop import load_zero
 from compd.live.loop.machine_zero import FILE_NAME as ZERO_NAME
 from compd.live.memory import TrustMemory
 from compd.live.record import RecordedCycles

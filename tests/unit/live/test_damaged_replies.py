@@ -27,6 +27,7 @@ from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
+from compd.stated_noise import tolerance_mm
 from compd.twins import ModbusSlaves
 from compd.twins.byte_devices import ByteDevices
 from tests.support.paths import CONFIG
