@@ -14,6 +14,7 @@ from .pace import character_bits as character_bits
 from .pace import network_pace as network_pace
 from .pace import serial_pace as serial_pace
 from .round_trigger import BROADCAST as BROADCAST
+from .round_trigger import WRITE_REGISTERS as WRITE_REGISTERS
 from .round_trigger import TriggerBytes as TriggerBytes
 from .round_trigger import TriggerWrite as TriggerWrite
 from .serial_settings import ModbusSerialSettings as ModbusSerialSettings
