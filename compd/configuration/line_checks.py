@@ -8,8 +8,8 @@ from importlib.util import find_spec
 from compd.configuration.sections import Sections
 from compd.documents import Location
 from compd.errors import Problem
-from compd.lines import KINDS, kinds_that_carry
-from compd.text import join_words
+from compd.lines.registry import kinds_that_carry, readable_definition
+from compd.text.number_text import join_words
 
 
 def line_problems(sections: Sections) -> Iterator[Problem]:
@@ -26,7 +26,7 @@ def _port_problems(sections: Sections) -> Iterator[Problem]:
     """A port or an address of two lines: units behind one gateway wait for each other."""
     line_of_port: dict[str, str] = {}
     for name, line in sections.lines.items():
-        definition = KINDS.get(getattr(line, "kind", None) or "")
+        definition = readable_definition(line)
         port = "" if definition is None else endpoint(definition.device(line))
         if not port:
             continue
@@ -70,23 +70,23 @@ def _kind_problems(sections: Sections) -> Iterator[Problem]:
                 next_step="write the name of a line under `lines:`",
             )
             continue
-        kind = getattr(sections.lines.get(line_name), "kind", None)
-        if kind is None or name not in sections.drivers:
+        definition = readable_definition(sections.lines.get(line_name))
+        if definition is None or name not in sections.drivers:
             continue
         needed = sections.drivers[name].line_kind
-        if needed != KINDS[kind].carries:
+        if needed != definition.carries:
             yield Problem(
                 where=sections.document.where(location),
                 what=f"driver {options['driver']} needs a line that carries {needed}",
-                value=f"{line_name} (kind {kind})",
-                allowed="kind " + join_words([other.kind for other in kinds_that_carry(needed)], "or"),
+                value=f"{line_name} (kind {definition.kind})",
+                allowed="kind " + join_words([kind.kind for kind in kinds_that_carry(needed)], "or"),
             )
 
 
 def _library_problems(sections: Sections) -> Iterator[Problem]:
     """A line of a kind without its library."""
     for name, line in sections.lines.items():
-        definition = KINDS.get(getattr(line, "kind", None) or "")
+        definition = readable_definition(line)
         library = None if definition is None else definition.library
         if library is not None and find_spec(library.package) is None:
             yield Problem(
@@ -101,7 +101,7 @@ def _signal_problems(sections: Sections) -> Iterator[Problem]:
     """A gauge whose request needs a signal that its line lacks."""
     for name, options in sections.gauges.items():
         line = sections.lines.get(options.line)
-        definition = KINDS.get(getattr(line, "kind", None) or "")
+        definition = readable_definition(line)
         without = "" if definition is None else definition.without_signals(line)
         if without and (signals := sections.drivers[name](options).serial_signals):
             yield Problem(

@@ -30,6 +30,11 @@ ANY_LINE: Any = Annotated[Union[tuple(kind.settings for kind in KINDS.values())]
 LINES_BY_NAME: Any = GenericAlias(dict, (str, ANY_LINE))
 
 
+def readable_definition(line: Any) -> LineDefinition | None:
+    """Of the kind of a line of which only a part could be read; None where its kind could not."""
+    return KINDS.get(getattr(line, "kind", None) or "")
+
+
 def definition_of(settings: LineSettings) -> LineDefinition:
     """Of the line's kind."""
     return KINDS[settings.kind]

@@ -35,7 +35,7 @@ def port(kind: str) -> PortArguments:
 
 
 def test_every_folder_is_a_kind() -> None:
-    folders = {path.name for path in FOLDER.iterdir() if path.is_dir() and path.name != "__pycache__"}
+    folders = {path.parent.name for path in FOLDER.glob("*/*.py")}
     assert set(KINDS) == folders
 
 
