@@ -8,8 +8,8 @@ from importlib.util import find_spec
 from compd.configuration.sections import Sections
 from compd.documents import Location
 from compd.errors import Problem
-from compd.lines.registry import kinds_that_carry, readable_definition
-from compd.text.number_text import join_words
+from compd.lines import kinds_that_carry, readable_definition
+from compd.text import join_words
 
 
 def line_problems(sections: Sections) -> Iterator[Problem]:

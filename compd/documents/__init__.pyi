@@ -1,6 +1,5 @@
 from .document import CONFIGURATION as CONFIGURATION
 from .document import Document as Document
-from .document import Location as Location
 from .document import read_document as read_document
 from .document import read_entries as read_entries
 from .section import AbsolutePath as AbsolutePath
@@ -16,6 +15,7 @@ from .section import validate as validate
 from .section import validation_problems as validation_problems
 from .section import value_text as value_text
 from .yaml_reader import LARGEST_BYTES as LARGEST_BYTES
+from .yaml_reader import Location as Location
 from .yaml_reader import decode as decode
 from .yaml_reader import parse_yaml as parse_yaml
 from .yaml_reader import read_text as read_text

@@ -13,11 +13,11 @@ from .open import open_stream as open_stream
 from .port import Port as Port
 from .port_arguments import PortArguments as PortArguments
 from .port_arguments import assigned as assigned
-from .registry import KINDS as KINDS
 from .registry import LINES_BY_NAME as LINES_BY_NAME
 from .registry import definition_of as definition_of
 from .registry import kinds_that_carry as kinds_that_carry
 from .registry import polled_definition as polled_definition
 from .registry import polled_kind as polled_kind
+from .registry import readable_definition as readable_definition
 from .stream import StreamLine as StreamLine
 from .stream import shown as shown
