@@ -1,4 +1,4 @@
-// State and reason in words, on top of everything; what is not the present is grey.
+// State and reason in words, on top of everything; outdated ones are grey.
 import { SILENT_S } from "./age.js";
 import { ago, isKnown, tipText } from "./format.js";
 import { appearance, stateName } from "./states.js";

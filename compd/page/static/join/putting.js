@@ -1,4 +1,4 @@
-// How rows are put together, what came of trying it, and a picture of that.
+// The way of joining rows, the result of its trial, and a picture of that.
 import { micro } from "../format.js";
 import { Check, Choice, Quantity } from "./fields.js";
 import { AgreementPicture } from "./agreement.js";

@@ -1,4 +1,4 @@
-// How the export is read: its first rows, above each column what it is taken for, and what else a person may say of it.
+// Reading of the export: its first rows, the role of each column, and further options.
 import { element } from "../format.js";
 import { Check, Choice, Quantity } from "./fields.js";
 
@@ -73,7 +73,7 @@ export class Reading {
     if (focused) document.getElementById(focused)?.focus();
   }
 
-  // What is said of each column, or else guessed.
+  // The chosen or guessed role of each column.
   columns(table) {
     return this.wizard.choices.columns?.length === table.roles.length ? this.wizard.choices.columns : table.roles;
   }
@@ -85,7 +85,7 @@ export class Reading {
     return select;
   }
 
-  // A role that another column has is exchanged: there is one of each.
+  // A role of another column is exchanged, since each is unique.
   change(k, role) {
     const columns = [...this.columns(this.wizard.table)];
     const other = role === "-" ? -1 : columns.findIndex((own, i) => i !== k && bare(own) === bare(role));

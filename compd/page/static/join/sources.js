@@ -1,4 +1,4 @@
-// The recording of the gauges, and the export of the instrument: chosen from a list, or brought from this computer.
+// The recording of the gauges, and the export of the instrument: chosen from a list, or uploaded from this computer.
 import { element } from "../format.js";
 
 export class Sources {

@@ -1,4 +1,4 @@
-// The new recording: its name, what it amounts to as a command line, and where to open it.
+// The new recording: its name, the equivalent command line, and the link to open it.
 import { CommandLine } from "../command_line.js";
 
 export class Writing {

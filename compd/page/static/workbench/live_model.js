@@ -1,4 +1,4 @@
-// The machine that runs: this model as its shadow, then adopted; and beside the recording's error what that does there.
+// The running machine: this model as its shadow, then adopted; its effect there beside the recording's error.
 import { Age } from "../age.js";
 import { describe } from "../banner.js";
 import { scaleFor } from "../bar.js";

@@ -56,7 +56,7 @@ def test_what_leaves_nothing_to_compare_is_taken_back(workbench, path):
 def test_strange_rows_and_old_states_are_refused(workbench):
     with pytest.raises(RecordingError, match="row 5000"):
         workbench.exclude([5000], "fog", workbench.revision)
-    with pytest.raises(StateError, match="somebody else"):
+    with pytest.raises(StateError, match="changed elsewhere"):
         workbench.exclude([10], "fog", workbench.revision - 1)
 
 
