@@ -44,7 +44,7 @@ export class Drawer {
     this.looking = element("ul");
     this.place.replaceChildren(
       element("div", { class: "row head" }, element("h2", {}, "Orders"), button("Close (Esc)", () => this.toggle())),
-      element("p", { class: "note" }, "The page only looks until you arm it. Everybody who looks sees who is armed."),
+      element("p", { class: "note" }, "The page is read-only until you arm it. Every viewer sees who is armed."),
       element("div", { class: "row" }, this.orders.arm),
       element("div", { class: "row" }, order("zero", () => ""), order("accept", () => "all")),
       element("h3", {}, "Model"),

@@ -69,7 +69,7 @@ export class Machine {
     if (!this.scene) {
       context.fillStyle = ink("--soft");
       context.font = "13px system-ui";
-      context.fillText("no valid setpoint: where the machine is, is not known", 12, 24);
+      context.fillText("no valid setpoint: position of the machine unknown", 12, 24);
       return;
     }
     const { plate, supports, base, platform, tip, supports_moved_um, tip_moved_um } = this.scene;

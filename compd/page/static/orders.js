@@ -71,7 +71,7 @@ export class Orders {
 
   // Second step: the order.
   async give(name, subject) {
-    if (!this.armed) return this.say(this.page.role === "operate" ? "Arm the page first." : "This browser may look only.");
+    if (!this.armed) return this.say(this.page.role === "operate" ? "Arm the page first." : "This browser is read-only.");
     this.say("…");
     this.question = null;
     const answer = await post(`orders/${name}`, { id: this.page.id, subject });

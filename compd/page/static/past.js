@@ -46,7 +46,7 @@ export function showMoment(event, at_s) {
   at("frozen-at").textContent = clock(at_s);
   const setpoint = event?.setpoint;
   const sign = setpoint ? appearance(setpoint.state)[1] : "⚡";
-  const state = setpoint ? stateName(setpoint.state) : event ? "NO DAEMON" : "NOTHING IS KNOWN OF IT";
+  const state = setpoint ? stateName(setpoint.state) : event ? "NO DAEMON" : "NO DATA";
   const tip = setpoint?.valid ? `  tip ${tipText(setpoint.tip_M_mm)}` : "";
   at("frozen-state").textContent = `${sign} ${state}${tip}`;
   at("frozen-reason").textContent = setpoint?.reason ?? event?.reason ?? "";

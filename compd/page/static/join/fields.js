@@ -30,7 +30,7 @@ export class Choice extends Field {
   // options: of [value, text]
   constructor(wizard, key, label, options = []) {
     super(wizard, key, label, element("select"));
-    this.options(options, "as found");
+    this.options(options, "detected");
   }
 
   options(options, automatic) {

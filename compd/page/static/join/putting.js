@@ -42,7 +42,7 @@ export class Putting {
     const { by, plan, frame, sigma_urad, link, ball, offset_s, moving } = this.fields;
     const chosen = choices.by || table.by;
     const length = table.axes.includes("length");
-    by.automatic(table.by ? `as found: ${BY[table.by]}` : "choose …");
+    by.automatic(table.by ? `detected: ${BY[table.by]}` : "choose …");
     frame.automatic("the instrument's own, fitted");
     frame.offer(!length);
     plan.offer(chosen === "name");

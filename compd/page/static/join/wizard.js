@@ -73,10 +73,10 @@ export class Wizard extends Session {
 
   // An export from this computer, kept beside the recordings.
   async bring(file) {
-    if (file.size > this.sources.most_bytes) throw new Error(`${file.name} is too large: ${(file.size / 2 ** 20).toFixed(0)} MB; ${this.sources.most_bytes / 2 ** 20} MB may be brought.`);
+    if (file.size > this.sources.most_bytes) throw new Error(`${file.name} is too large: ${(file.size / 2 ** 20).toFixed(0)} MB; ${this.sources.most_bytes / 2 ** 20} MB are allowed.`);
     const response = await fetch(`join/exports?${new URLSearchParams({ name: file.name })}`, { method: "POST", headers: { "Content-Type": "application/octet-stream" }, body: file });
     const answer = await response.json().catch(() => ({}));
-    if (!response.ok) throw new Error(answer.reason ?? `${file.name} could not be brought`);
+    if (!response.ok) throw new Error(answer.reason ?? `${file.name} could not be uploaded`);
     await this.list();
     await this.choose(answer.name);
   }

@@ -13,7 +13,7 @@ export class Writing {
   show({ command, trial, choices, sources }) {
     this.command.write(command);
     this.button.disabled = !sources?.may_write || !choices.name || !trial || Boolean(trial.reason);
-    this.note.textContent = !sources || sources.may_write ? (trial && !trial.reason ? "Give a name, and write it." : "Try it first.") : "This browser may look only; the command line does the same.";
+    this.note.textContent = !sources || sources.may_write ? (trial && !trial.reason ? "Give a name, and write it." : "Try it first.") : "This browser is read-only; the command line does the same.";
     if (this.written !== JSON.stringify(choices)) this.link.hidden = true;
     else this.note.textContent = this.message;
   }

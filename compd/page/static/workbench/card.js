@@ -86,7 +86,7 @@ export class Card {
     const here = alike.map(({ effect: other, cosine }) => element("li", {}, `${words(other)}, cosine ${cosine.toFixed(3)}`));
     const plan = this.plan && alike.length ? [element("button", { type: "button", onclick: () => this.plan([effect, ...alike.map((other) => other.effect)]) }, "Plan what tells them apart …")] : [];
     return [
-      ...(here.length ? [element("p", {}, "On these rows much the same is done by:"), element("ul", {}, ...here), ...plan] : []),
+      ...(here.length ? [element("p", {}, "Similar effects on these rows:"), element("ul", {}, ...here), ...plan] : []),
       ...(mistaken_for.length ? [element("p", { class: "note" }, `May be mistaken for ${mistaken_for.map(words).join(", ")}; told apart by ${separated_by}.`)] : []),
     ];
   }

@@ -11,7 +11,7 @@ export class Effects {
   async begin(bench) {
     Object.assign(this, { effects: [], draft: null, chosen: "" });
     this.draw();
-    this.note.textContent = "what each effect would do …";
+    this.note.textContent = "computing each effect …";
     this.unit = bench.summary.unit;
     const ranking = await bench.get("effects");
     this.effects = ranking.effects;

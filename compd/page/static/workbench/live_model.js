@@ -63,7 +63,7 @@ export class LiveModel {
     if (!own) return;
     const file = summary.ledger.length > 0;
     this.run.disabled = this.adopt.disabled = !file;
-    write(this.why, file ? (page.role === "operate" ? "" : "This browser may look only.") : "Add an effect first: there is no model file yet.");
+    write(this.why, file ? (page.role === "operate" ? "" : "This browser is read-only.") : "Add an effect first: there is no model file yet.");
     this.showBars(page.slow, summary);
   }
 

@@ -44,7 +44,7 @@ export class Strip {
       made.style.width = `${Math.min(100, (100 * value) / (rms || 1))}%`;
       return made;
     };
-    this.bar.setAttribute("aria-label", `The error as a bar: ${rms.toFixed(2)} ${unit} now${tried_rms === null ? "" : `, ${tried_rms.toFixed(2)} with what is tried`}, noise ${floor?.toFixed(2) ?? "not known"}`);
+    this.bar.setAttribute("aria-label", `The error as a bar: ${rms.toFixed(2)} ${unit} now${tried_rms === null ? "" : `, ${tried_rms.toFixed(2)} with the trial`}, noise ${floor?.toFixed(2) ?? "not known"}`);
     this.bar.replaceChildren(part("left", tried_rms ?? rms), part("noise", floor ?? 0));
   }
 }
