@@ -18,13 +18,11 @@ Format = Annotated[str, Field(pattern=r"^[78][NEO][12]$")]
 
 
 class _LineSettings(Section):
-    timeout_s: Positive = Field(description="how long to wait for the first byte of a reply")
+    timeout_s: Positive = Field(description="wait for the first byte of a reply")
     back_off_s: tuple[Positive, Positive] = Field(
         default=(0.5, 10.0), description="wait after a lost line: first and longest, doubling between"
     )
-    poll_every_s: NotNegative = Field(
-        default=0.0, description="time from one round to the next; 0 = as fast as the line goes"
-    )
+    poll_every_s: NotNegative = Field(default=0.0, description="period of rounds; 0 = as fast as the line allows")
     pause_s: NotNegative = Field(
         default=0.0, description="from a reply to the next request, for devices that are deaf after a reply"
     )
@@ -115,7 +113,7 @@ class ModbusRtuLine(_ModbusSerialSettings):
     kind: Literal["modbus_rtu"] = Field(description="Modbus RTU registers")
     skip_bytes: Annotated[int, Field(ge=0, le=MOST_SKIPPED_BYTES)] = Field(
         default=0,
-        description="so many bytes before a reply are damage of a transceiver that changes its direction: they are "
+        description="most bytes before a reply from a transceiver that changes its direction: they are "
         "skipped where the checksum of the rest fits; left out: such a reply counts as damaged",
     )
 

@@ -19,7 +19,7 @@ class PushedLineSettings(Section):
     back_off_s: tuple[Positive, Positive] = Field(
         default=(0.5, 10.0), description="wait after a lost line: first and longest, doubling between"
     )
-    user: Text | None = Field(default=None, description="who logs in; nobody does if left out")
+    user: Text | None = Field(default=None, description="name for the login; omitted for none")
     password_file: AbsolutePath | None = Field(default=None, description="file with the password of `user`, one line")
 
     @model_validator(mode="after")

@@ -2,7 +2,7 @@
 
 The scalars are those of YAML 1.2: `on` is a word, 1e-6 a number, 010 ten. Merge keys (`<<: *anchor`) work. What no
 file of this kind needs is refused with its line, before it costs time or memory: collections as keys, tags, anchors
-within themselves, aliases that unfold into more than anybody writes.
+within themselves, aliases that unfold into more than any hand-written file.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ OF_EFFECT = (
     TableColumn("value", "double", "fitted on this recording, in `unit`"),
     TableColumn("standard_error", "double", "of the value, in `unit`; empty where it is not known"),
     TableColumn("unit", "string", "of value and standard_error"),
-    TableColumn("p_value", "double", "chance that noise looks so much like the effect; empty for effects of the model"),
+    TableColumn("p_value", "double", "probability that noise resembles the effect; empty for effects of the model"),
     TableColumn("plausible", "bool", "whether the value lies in the effect's plausible range"),
     TableColumn("rivals", "string", "effects that would do as well in its place, separated by spaces"),
 )

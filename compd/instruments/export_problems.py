@@ -7,7 +7,7 @@ from pathlib import Path
 
 from compd.errors import Problem, RecordingError
 
-# Lines, and values, that a message lists.
+# Most lines, and values, listed in a message.
 SHOWN = 3
 _VALUE_WIDTH = 60
 

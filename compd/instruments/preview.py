@@ -17,7 +17,7 @@ from compd.instruments.read_limits import ReadLimits
 from compd.instruments.text_file import decode_text, read_content
 
 SHOWN_ROWS = 20
-# Longer lines and cells, more columns and groups than these are not shown whole.
+# Limits of the shown cells, columns and groups.
 _CELL_WIDTH = 200
 _MOST_COLUMNS = 200
 _MOST_GROUPS = 200

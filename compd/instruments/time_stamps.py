@@ -18,7 +18,7 @@ from compd.instruments.export_problems import ExportProblems
 
 DATE_ORDERS = ("dmy", "mdy", "ymd")
 DAY_S = 86400.0
-# By how much a clock is set back in autumn, s. The row after it comes at most so long, s, after the one before.
+# Step (s) of a clock in autumn, and the longest interval (s) of the rows around it.
 SET_BACK_S = 3600.0
 _LONGEST_PAUSE_S = 600.0
 # Two-digit years from here on are of the last century, as POSIX has it.

@@ -18,8 +18,8 @@ LENGTH = "length"
 # 1 / 0.6745: the standard deviation of a normal distribution over its median absolute deviation.
 _STD_PER_MEDIAN = 1.4826
 LEAST_ROWS = 3
-# Of two tracks in one: rows far from the next (mm), and nearer to the one after by this factor; so many, and so many of
-# the rows in between. Two in turn make it of every row, two at random of a quarter.
+# Two tracks in one: least distance (mm) of rows from the next, factor by which the one after is nearer, fewest such
+# rows, and their least share of the rows in between. Two in turn make it of every row, two at random of a quarter.
 _FAR_MM = 0.1
 _BACK = 0.1
 _FEWEST_MIXED = 20

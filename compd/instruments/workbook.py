@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from openpyxl import Workbook
     from openpyxl.worksheet._read_only import ReadOnlyWorksheet
 
-# Rows of a sheet in which a number must stand for the sheet to count as one that holds numbers.
+# First rows of a sheet that must contain a number for the sheet to count as numeric.
 _LOOKED_AT = 2000
 
 

@@ -14,7 +14,7 @@ from compd.errors import Problem, RecordingError
 if TYPE_CHECKING:
     from openpyxl.worksheet._read_only import ReadOnlyWorksheet
 
-# Rows that a sheet can have, and columns that a list of an instrument may have.
+# Most rows of a sheet, and most columns of an instrument's list.
 MOST_ROWS = 1_048_576
 MOST_COLUMNS = 500
 # Kinds of cells. COMMA: a number as text, with a comma; ERROR: of the spreadsheet; NO_VALUE: a formula without one.

@@ -32,9 +32,9 @@ from compd.lines.mqtt_tls import TlsSettings, handshake_failure, tls_context
 from compd.pushed_gauge import Message
 from compd.source_time import Arrival
 
-# How long is waited for the network before paho looks whether the broker is still there, s.
+# Wait (s) for the network before paho checks the broker's presence.
 SLICE_S = 0.1
-# Of one call of `messages`: more waits in the socket meanwhile.
+# Most messages of one call of `messages`; more wait in the socket.
 MOST_MESSAGES = 1000
 LONGEST_PASSWORD = 65535  # bytes, MQTT 3.1.1, 3.1.3.5
 
@@ -65,7 +65,7 @@ class MqttSettings(Protocol):
 class MqttSubscriber:
     """A `PushedLine` over MQTT. Used by one thread."""
 
-    last_request_s = -math.inf  # nobody asks
+    last_request_s = -math.inf  # there are no requests
     unexpected_bytes = 0
     request_came_back = False
 

@@ -41,9 +41,9 @@ logging.getLogger("asyncua").addHandler(logging.NullHandler())
 logging.getLogger("asyncua").propagate = False
 
 MS_PER_S = 1e3
-# A server may forget a subscription of which it has heard nothing for so long, s.
+# Lifetime (s) of a subscription without a request, after which the server may drop it.
 LIFETIME_S = 30.0
-# So many keep-alives may be missing in a row, and the timeout be over, before the server is taken for lost.
+# Missed keep-alives in a row, and after the timeout, that show a lost server.
 MISSED_KEEP_ALIVES = 3
 NOT_FILTERED = (
     StatusCodes.BadMonitoredItemFilterUnsupported,

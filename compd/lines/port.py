@@ -24,7 +24,7 @@ log = structlog.get_logger()
 # Pulling a plug raises SerialException (an OSError), a plain OSError or termios.error, depending on the call.
 PORT_FAULTS = (OSError, termios.error)
 MOST_BYTES = 4096  # of one read: far more than any reply
-# How often, s, ports without a file descriptor (rfc2217://, loop://) are asked: `select` cannot wait for them.
+# Polling interval (s) of ports without a file descriptor (rfc2217://, loop://), for which `select` cannot wait.
 SLICE_S = 5e-3
 
 

@@ -65,7 +65,7 @@ class SerialAsciiOptions(ExchangeOptions):
 
     out: str = Field(default="", description="the request; omitted for a device that sends unsolicited readings")
     dtr_pulse_s: Seconds | None = Field(
-        default=None, description="in place of `out`: the request is DTR, LOW for so long, s"
+        default=None, description="in place of `out`: the request is DTR, LOW for this time, s"
     )
     out_terminator: str = Field(default="", description="what ends every request")
     in_: str = Field(alias="in", default="", description="what the reply looks like")

@@ -89,7 +89,7 @@ class MqttOptions(PushedGaugeOptions):
         default=None,
         gt=0,
         allow_inf_nan=False,
-        description="the device publishes at least so often, changed or not; needed where a channel has no time",
+        description="longest period of publishing, changed or not; needed if a channel has no time",
     )
 
     @model_validator(mode="after")

@@ -167,7 +167,7 @@ class ConformanceSession:
             return readings, None
         except LineFault as caught:
             fault = caught
-        except Exception as error:  # noqa: BLE001  a driver is anybody's code: what it raises is a finding
+        except Exception as error:  # noqa: BLE001  foreign code: any exception of a driver is a finding
             fault = LineFault(Quality.DRIVER_ERROR, f"raised {type(error).__name__}: {error}")
         nothing = bad(self.wire.clock.monotonic(), fault.quality, fault.detail)
         return [nothing] * len(self.gauge.channels), fault

@@ -185,7 +185,7 @@ class LinuxCnc:
     def with_corrections(self) -> None:
         """Allow motion only with an armed bridge, arm it, and wait until the corrections have arrived.
 
-        Raises DaemonError where it cannot be armed, or is not armed so long.
+        Raises DaemonError if it cannot be armed, or does not stay armed.
         """
         self.set_signal("compd-required", "1")
         self.arm()

@@ -68,7 +68,7 @@ class GaugeTrust:
     def receive(self, place: int, reading: Reading, window_s: float, now_s: float) -> Reading:
         """The reading to publish for an unsolicited one of channel number `place`.
 
-        Nobody can ask again: where a value is not where its last readings lead, the next reading is the second answer.
+        There is no second poll: the next reading is the second answer to a value outside its predicted range.
         window_s : by how much later than its time it may have been measured, s.
         """
         channel = self._channels[place]

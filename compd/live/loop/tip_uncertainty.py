@@ -21,7 +21,7 @@ from compd.model.tip_derivatives import tip_derivatives
 from compd.model.uncertainty import GaugeNoise, parameter_variance
 from compd.units import UM_PER_MM
 
-# A length is the difference of so many: now and at machine zero.
+# Number of readings in a length: now and at machine zero.
 _READINGS = 2
 
 
