@@ -247,7 +247,7 @@ WARNINGS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
         [
             ("limits.correction_mm", "200 mm"),
             ("limits.slew_mm_per_s", "stop no jump"),
-            ("sockets.valid_for_s", "a daemon that has died"),
+            ("sockets.valid_for_s", "a dead daemon"),
             ("loop.stale_after_s", "still counts as good"),
             ("loop.hold_s", "5000 s"),
         ],
