@@ -64,7 +64,7 @@ class PushedLine(Protocol):
     def subscribe(self, addresses: Sequence[str]) -> None:
         """Want what these addresses send, from now on. One that is refused sends a message that says so.
 
-        Called again, it asks for those that were refused. Raises LineFault (LINE_LOST) where nobody answers.
+        Called again, it asks for those that were refused. Raises LineFault (LINE_LOST) if nobody answers.
         """
         ...
 
@@ -113,7 +113,7 @@ class PushedGauge(Gauge[PushedLine]):
         """The reading of channel number `index` by a message with a value. Raises LineFault for an unusable one."""
 
     def stamp(self, index: int, message: Message) -> Stamp:
-        """When the value was measured, as the source says. Raises LineFault where a time is missing or makes no sense.
+        """When the value was measured, as the source says. Raises LineFault if a time is missing or makes no sense.
 
         A value without a time that is to have one is not used.
         """

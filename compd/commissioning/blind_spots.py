@@ -84,10 +84,10 @@ class BlindSpot:
     ----------
     name : stable, for programs.
     fault : what happens.
-    shown_by : what shows it, and under which condition; "" where nothing does.
-    vote : the key under `votes:` (`VoteSettings`) for this; "" where it needs none, or there is none.
+    shown_by : what shows it, and under which condition; "" if nothing does.
+    vote : the key under `votes:` (`VoteSettings`) for this; "" if it needs none, or there is none.
     unseen : what remains that nothing shows.
-    cost : its number for a machine; "" where it has none there.
+    cost : its number for a machine; "" if it has none there.
     """
 
     name: str

@@ -292,7 +292,7 @@ def _check_structure(text: str, path: Path) -> None:
 
 
 def _check_size(root: yaml.Node, path: Path) -> None:
-    """Raise ConfigurationError where aliases unfold into more than MOST_NODES nodes, counted without unfolding them."""
+    """Raise ConfigurationError if aliases unfold into more than MOST_NODES nodes, counted without unfolding them."""
     sizes: dict[int, int] = {}
 
     def size(node: yaml.Node) -> int:

@@ -47,7 +47,7 @@ class RecordingResult:
     Attributes
     ----------
     recording : its table's path.
-    machine : name of its machine in the fleet; "" where nothing says which it is.
+    machine : name of its machine in the fleet; "" if nothing says which it is.
     kinematics : how that is built: "tripod_3spr", "hexapod_6ups", or "external"; "" with a problem.
     command : what was done.
     model : the model file that was applied; "" for none.
@@ -60,7 +60,7 @@ class RecordingResult:
     verdict : of `diagnose` its verdict; of `compare` AT_FLOOR, ABOVE_FLOOR or NOISE_NOT_KNOWN. "" with a problem.
     summary : the verdict in words.
     estimates : of the effects that were found, or that the model has.
-    problem : why it could not be examined; "" where it was.
+    problem : why it could not be examined; "" if it was.
     basis : `Examination.basis`, the hash of what the result follows from; "" with a problem.
     """
 

@@ -154,7 +154,7 @@ def earlier_results(path: Path) -> tuple[RecordingResult, ...]:
 
 
 def rows_of(result: RecordingResult) -> Iterator[dict[str, Any]]:
-    """The rows of one recording: column -> value, None where there is none."""
+    """The rows of one recording: column -> value, None if there is none."""
     whole = _cells(result, OF_RECORDING)
     whole |= {"rows": None if result.problem else result.rows, PROBLEM.name: result.problem or None}
     whole[BASIS.name] = result.basis or None

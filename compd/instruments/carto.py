@@ -158,7 +158,7 @@ class _CartoReader:
         return rate_hz, f"by `{RATE_KEY}`"
 
     def _count(self, header: dict[str, _HeaderLine]) -> int | None:
-        """Samples by the header; None where it does not say, which is a problem."""
+        """Samples by the header; None if it does not say, which is a problem."""
         line = header.get(COUNT_KEY)
         if line is not None and line.value.isascii() and line.value.isdigit() and int(line.value):
             return int(line.value)

@@ -260,7 +260,7 @@ def _spans(axes: Sequence[str], raw: dict[str, FloatArray], wanted: str) -> str:
 
 
 def _time(table: RawTable, roles: Roles, options: ReadOptions, problems: ExportProblems) -> StampedTime | None:
-    """The times of the rows; None where they have none."""
+    """The times of the rows; None if they have none."""
     column = roles.column.get("time")
     if column is None:
         if options.rate_hz is None:

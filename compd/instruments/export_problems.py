@@ -38,7 +38,7 @@ class ExportProblems:
         )
 
     def check(self) -> None:
-        """Raise RecordingError where there is a problem."""
+        """Raise RecordingError if there is a problem."""
         if self.problems:
             raise RecordingError(self.problems)
 

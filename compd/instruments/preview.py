@@ -30,7 +30,7 @@ class ExportPreview:
     Attributes
     ----------
     export : the whole of it; None where `problems` say why it cannot be read.
-    shape : one of SHAPES; "" where it is not known.
+    shape : one of SHAPES; "" if it is not known.
     line : of each row that is shown. rows : their cells, one text in each where no columns could be told.
     header : (C,) names of the columns; empty where they have none. roles : (C,) what each is taken for, "-" for
         nothing; empty where no columns could be told.

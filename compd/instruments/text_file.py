@@ -35,7 +35,7 @@ class TextFile:
 
 
 def read_content(path: Path) -> bytes:
-    """The bytes of a regular file. Raises RecordingError where it cannot be read, is empty or too long."""
+    """The bytes of a regular file. Raises RecordingError if it cannot be read, is empty or too long."""
     problems = ExportProblems(path)
     try:
         content = read_small_file(path, MOST_BYTES)

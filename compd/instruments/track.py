@@ -34,7 +34,7 @@ class Track:
     ----------
     path : the export. time_s : (M,) on the instrument's clock, strictly rising.
     position_mm : (M, d) on `axes`: a subset of "x", "y", "z", or "length" alone.
-    rotation_rad : (M, 3) attitude, a rotation vector; None where none was measured.
+    rotation_rad : (M, 3) attitude, a rotation vector; None if none was measured.
     time_std_s : standard uncertainty of one time, beside that of the clock's offset.
     taken : what was taken for what, for a person. left_out : reason -> rows of the export that are not there.
     """
@@ -70,7 +70,7 @@ class Track:
     def rotation_at(self, time_s: FloatArray) -> FloatArray:
         """(N, 3) attitude, a rotation vector, as `position_at`; on the shortest arc between samples.
 
-        Raises ValueError where no attitude was measured.
+        Raises ValueError if no attitude was measured.
         """
         if self.rotation_rad is None:
             raise ValueError("no attitude was measured")
@@ -81,7 +81,7 @@ class Track:
 def track_of(export: InstrumentExport) -> Track:
     """The track of an export whose rows have times.
 
-    Raises RecordingError where they have none, fall or stand still, or are fewer than three.
+    Raises RecordingError if they have none, fall or stand still, or are fewer than three.
     """
     problems = ExportProblems(export.path)
     if export.time_s is None:

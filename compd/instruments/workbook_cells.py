@@ -112,7 +112,7 @@ class SheetReader:
         ]
 
     def _numbered(self, sheet: ReadOnlyWorksheet) -> Iterator[tuple[int, Sequence[Any]]]:
-        """(number, cells) of every row. Raises RecordingError where there are more than a list can have."""
+        """(number, cells) of every row. Raises RecordingError if there are more than a list can have."""
         # what the file says of its size may be wrong, and is what rows are padded to
         sheet.reset_dimensions()
         for number, cells in enumerate(cast(Any, sheet).iter_rows(), start=1):

@@ -100,7 +100,7 @@ def check_workbook_file(path: Path, limits: ReadLimits) -> None:
 
 
 def _check_cells(path: Path, name: str, limits: ReadLimits) -> None:
-    """Raise RecordingError where a part has too many cells, or texts that cells name, whatever it says of its size."""
+    """Raise RecordingError if a part has too many cells, or texts that cells name, whatever it says of its size."""
     count, rest = 0, b""
     with zipfile.ZipFile(path) as archive, archive.open(name) as file:
         while chunk := file.read(_CHUNK):

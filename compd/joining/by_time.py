@@ -56,8 +56,8 @@ class Instrument:
 
     Attributes
     ----------
-    frame : of its x, y, z. sigma_um : standard uncertainty per axis; None where it is not known.
-    sigma_urad : standard uncertainty of an attitude about each axis; None where it is not known.
+    frame : of its x, y, z. sigma_um : standard uncertainty per axis; None if it is not known.
+    sigma_urad : standard uncertainty of an attitude about each axis; None if it is not known.
     link : for a length, the link that it measures (1-based). ball : for a length, the number of the fixed ball, or of
         another fixed end, from which it is measured to the tip.
     """

@@ -46,7 +46,7 @@ class JoinOptions:
 def choose_by(by: JoinBy | None, export: InstrumentExport) -> JoinBy:
     """The chosen way of joining; by default the time, for an export that is a track in time.
 
-    Raises RecordingError where that is not clear: an export without times, or of single points.
+    Raises RecordingError if that is not clear: an export without times, or of single points.
     """
     if by is not None:
         return by

@@ -82,7 +82,7 @@ class ModbusTcp:
 
     @property
     def peer(self) -> str:
-        """Address and port of the device; "" where the connection is closed."""
+        """Address and port of the device; "" if the connection is closed."""
         return "" if self._port is None else self._port.peer
 
     def read_registers(self, unit: int, function: int, address: int, count: int) -> RegisterReply:

@@ -108,7 +108,7 @@ class MqttSubscriber:
 
         One that the broker refuses sends a message with DEVICE_ERROR, and may be asked for again.
 
-        Raises LineFault (LINE_LOST) where the broker does not answer.
+        Raises LineFault (LINE_LOST) if the broker does not answer.
         """
         topics = [topic for topic in dict.fromkeys(addresses) if topic not in self._wanted]
         if not topics:
@@ -164,7 +164,7 @@ class MqttSubscriber:
             self._client.tls_set_context(tls_context(settings.tls))
 
     def _work_until(self, done: Callable[[], bool], what: str) -> None:
-        """Raises LineFault (LINE_LOST) where it is not done within the timeout: the broker `what`."""
+        """Raises LineFault (LINE_LOST) if it is not done within the timeout: the broker `what`."""
         deadline_s = self._clock.monotonic() + self._timeout_s
         while not done():
             if not self._work(deadline_s):

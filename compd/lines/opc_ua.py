@@ -92,7 +92,7 @@ class OpcUaSubscriber:
 
         One that the server refuses sends a message with DEVICE_ERROR, and may be asked for again.
 
-        Raises LineFault (LINE_LOST) where the server does not answer.
+        Raises LineFault (LINE_LOST) if the server does not answer.
         """
         if nodes := [node for node in dict.fromkeys(addresses) if node not in self._sampling_s]:
             self._run(self._monitor(nodes))

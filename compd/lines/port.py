@@ -42,11 +42,11 @@ class Port(Protocol):
         ...
 
     def set_dtr(self, high: bool) -> None:
-        """Set DTR. Raises LineFault (LINE_LOST) where the port has none."""
+        """Set DTR. Raises LineFault (LINE_LOST) if the port has none."""
         ...
 
     def set_break(self, on: bool) -> None:
-        """Begin or end a break. Raises LineFault (LINE_LOST) where the port has none."""
+        """Begin or end a break. Raises LineFault (LINE_LOST) if the port has none."""
         ...
 
     def close(self) -> None:
@@ -197,7 +197,7 @@ class TcpPort:
 
     @property
     def peer(self) -> str:
-        """Address and port of the other end; "" where the connection has ended."""
+        """Address and port of the other end; "" if the connection has ended."""
         try:
             address, port = self._socket.getpeername()[:2]
         except OSError:

@@ -156,7 +156,7 @@ class Orders:
         return Consequence(True, text, command)
 
     def _adopt(self, subject: str) -> Consequence:
-        """Of the model that runs as a shadow: its correction is known. subject : its file's name, its hash, or ""."""
+        """Consequence of adopting the shadow model. subject : its file's name, its hash, or ""."""
         running = (self._link.models or {}).get("shadow", {})
         file, hash_ = str(running.get("file", "")), str(running.get("model", ""))
         command = self._command("adopt", file or "FILE", "--daemon", self._link.path)

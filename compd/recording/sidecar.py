@@ -213,7 +213,7 @@ class Sidecar:
     excluded : spreadsheet row (header = 1) -> the person's reason.
     provenance, notes : how the recording came to be; kept, never interpreted.
     format : number of the format that the file was written in.
-    quantities_at_zero : by name, from which effects count; None where the sidecar does not say.
+    quantities_at_zero : by name, from which effects count; None if the sidecar does not say.
     """
 
     path: Path

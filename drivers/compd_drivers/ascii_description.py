@@ -195,7 +195,7 @@ class Description(NamedTuple):
 
     @property
     def lengths(self) -> tuple[int | None, ...]:
-        """Of every reply the device may give."""
+        """Length of every possible reply of the device."""
         return tuple(form.length for form in (*(poll.reply for poll in self.polls), *(form for form, _ in self.errors)))
 
 

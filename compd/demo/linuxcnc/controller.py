@@ -128,7 +128,7 @@ class LinuxCnc:
     def ask(self, do: str, timeout_s: float = ANSWER_S, **arguments: Any) -> Any:
         """A request to the panel, and its result. What LinuxCNC has shown meanwhile is appended to `errors`.
 
-        Raises DaemonError where LinuxCNC has gone.
+        Raises DaemonError if LinuxCNC has gone.
         """
         assert self._panel is not None
         self._panel.settimeout(timeout_s)
@@ -209,7 +209,7 @@ class LinuxCnc:
         return self.values([name])[name]
 
     def values(self, names: Sequence[str]) -> dict[str, Any]:
-        """Of pins and signals, by name."""
+        """Values of pins and signals by name."""
         result: dict[str, Any] = self.ask("values", names=list(names))
         return result
 
@@ -230,7 +230,7 @@ class LinuxCnc:
 
         attend : called with the reason, about once a second, while the feed is held: what an operator does then.
 
-        Raises DaemonError where it does not come to its end; ProgramStopped where LinuxCNC shows an error.
+        Raises DaemonError if it does not come to its end; ProgramStopped where LinuxCNC shows an error.
         """
         shown, start_s = len(self.errors), time.monotonic()
         self.start(program)

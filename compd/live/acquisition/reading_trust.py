@@ -196,8 +196,7 @@ class ReadingTrust:
         return max(known, default=math.nan)
 
     def _unexplained_mm(self, sample: GaugeSample) -> float:
-        """By how much (mm) a joint or the frame has changed while the machine stood; 0 within its noise, and over times
-        in which it may drift."""
+        """Change (mm) of a joint or the frame at rest; 0 within its noise, and over times of possible drift."""
         memory, i = self._memory, self._i
         if i < memory.scales or not self._history or sample.time_s - memory.time_s[i] > LONGEST_WINDOW_S:
             return 0.0

@@ -43,7 +43,7 @@ class OpenedRecording:
 
     @cached_property
     def comparison(self) -> Comparison:
-        """Of the recording with the model as it is."""
+        """The comparison of the recording with the present model."""
         return compare(self.aligned, self.model.fitted, self.model.covariance)
 
     @cached_property

@@ -1,1 +1,1 @@
-"""What the length gauges of a machine say of each other: one module for each kind of contradiction."""
+"""Cross-checks between the length gauges of a machine: one module for each kind of contradiction."""
