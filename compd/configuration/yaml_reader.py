@@ -198,7 +198,7 @@ class _Reading:
             key = self._key(key_node, location)
             here = (*location, key)
             if key in own_lines:
-                first = f"said twice, first in line {own_lines[key]}"
+                first = f"given twice, first in line {own_lines[key]}"
                 self._add(line, here, first, next_step="keep one of them")
             own_lines[key] = self.lines[here] = line
             data[key] = self.plain(value_node, here)

@@ -138,7 +138,7 @@ def read_table(path: Path) -> tuple[RecordingResult, ...]:
                 what="was written by another release of compd",
                 value=table.schema.metadata[FORMAT_KEY].decode(errors="replace"),
                 allowed=FORMAT.decode(),
-                next_step="make the table anew",
+                next_step="create the table again",
             )
         )
     by_recording = groupby(table.to_pylist(), key=lambda row: (row["recording"], row["command"]))

@@ -192,9 +192,9 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
         problems.append(
             Problem(
                 where=str(track.path),
-                what="is a length; of what is not said" if instrument.link is None else "is one length",
+                what="is a length of an unknown object" if instrument.link is None else "is one length",
                 allowed="--link or --ball",
-                next_step="say which link it measures with --link, or with --ball from which fixed ball to the tip",
+                next_step="name its link with --link, or its fixed ball with --ball",
             )
         )
     if length and instrument.link is not None and not 1 <= instrument.link <= links:

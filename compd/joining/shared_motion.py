@@ -62,7 +62,7 @@ class SharedMotion:
         return RecordingError(
             Problem(
                 where=str(self.track.path),
-                what=f"the clock offset cannot be told: {what}",
+                what=f"the clock offset cannot be determined: {what}",
                 value=value,
                 allowed=allowed,
                 next_step="record with moves between dwells of different length, or give --offset S; join points at "

@@ -27,7 +27,7 @@ _TIMEOUT_S = 30.0
 # Length of a model's hash in the daemon's messages.
 _HASH = re.compile("[0-9a-f]{16}")
 _NO_HASH = "the model that runs as a shadow is adopted, and named by its hash"
-_NOT_OFFERED = "this is none of the model files in the list"
+_NOT_OFFERED = "this is not a model file in the list"
 _NAME_IT = "choose one of them; another one is given on the command line"
 
 

@@ -179,7 +179,7 @@ class _PlanFileReader:
             if name not in names:
                 close = difflib.get_close_matches(name, names, n=1)
                 next_step = f"did you mean {close[0]}?" if close else "delete the column, or plan for another pair"
-                what = "is nothing that this machine can be told"
+                what = "is no setting of this machine"
                 self._add(f":1 column {name}", what, name, ", ".join(names), next_step)
         for name in NEEDED_COLUMNS:
             if name not in header:

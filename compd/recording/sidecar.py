@@ -129,7 +129,7 @@ def _checked_quantities(value: Any) -> dict[str, float] | None:
         raise refusal(
             "is no mapping of quantities to numbers",
             "temperature_link_1_degC: 20.31",
-            "write each with its unit in its name, as its column is called",
+            "write each under the name of its column, which has the unit",
         )
     return {name: float(number) for name, number in value.items()}
 

@@ -78,7 +78,7 @@ class SerialAsciiOptions(ExchangeOptions):
     errors: tuple[ErrorReply, ...] = Field(
         default=(), description="looked at before the value; the first that fits counts"
     )
-    init: tuple[Exchange, ...] = Field(default=(), description="said before the first poll and after every fault")
+    init: tuple[Exchange, ...] = Field(default=(), description="sent before the first poll and after every fault")
     echo: Echo | None = Field(default=None, description="finds a reply that is one behind")
     silent_in_menu: bool = Field(default=False, description="the device does not answer while in its menu")
 
@@ -129,7 +129,7 @@ class SerialAsciiOptions(ExchangeOptions):
             if unknown := [number for number in numbers if number not in names]:
                 yield f"`in` has a number {unknown[0] or 'without name'}, channels are {', '.join(names)}"
             if doubled := repeated(numbers):
-                yield f"channel {doubled or 'without name'} stands in several replies"
+                yield f"channel {doubled or 'without name'} is in several replies"
         if shadowed := description.error_like_a_value():
             yield "error {!r} fits nearly every value of the form {!r}".format(*shadowed)
 

@@ -60,7 +60,7 @@ class MqttChannel(MeasuredChannel):
         default="", pattern=_POINTER, description="JSON Pointer to the number; left out: the payload is the number"
     )
     time: Pointer | None = Field(
-        default=None, pattern=_POINTER, description="JSON Pointer to the time of measurement; left out: there is none"
+        default=None, pattern=_POINTER, description="JSON Pointer to the time of measurement; omitted for none"
     )
     time_format: Literal["iso8601", "unix_s", "unix_ms", "unix_us", "unix_ns"] = Field(
         default="iso8601", description="iso8601: text with Z or another offset from UTC; unix: a number since 1970, UTC"

@@ -203,7 +203,7 @@ class ConformanceSession:
                 wrong.append(f"{channel.name}: {reading.value!r} as ok is no number")
                 continue
             if not self.exchanges:
-                event = "said in this poll" if self.wire.pause_s else "asked"
+                event = "sent in this poll" if self.wire.pause_s else "asked"
                 wrong.append(f"{channel.name}: {reading.value:.9g} {channel.unit} as ok, and nothing was {event}")
                 continue
             if not right and not self.replies.is_right(channel.name, reading.value, self.exchanges):
