@@ -138,9 +138,9 @@ class Workbench:
             "effects": self.sources.paths,
         }
 
-    def rows(self, every: bool) -> bytes:
+    def rows(self, all_rows: bool) -> bytes:
         """See `OpenedRecording.rows`."""
-        return self.opened.rows(every=every)
+        return self.opened.rows(all_rows=all_rows)
 
     def effects(self) -> dict[str, Any]:
         """See `Candidates.summary`; `own` says which effects are not of the library."""
