@@ -31,7 +31,7 @@ from compd.units import UM_PER_MM
 
 # Periods that are tried with the effect's own columns; more would be chance.
 PEAKS = 5
-# Difference of neighbouring periods, in turns over the range of the quantity.
+# Periods that differ by so many turns over the range of the quantity are neighbours.
 QUARTER_TURN = 0.25
 # Fewer rows show no period.
 FEWEST_ROWS = 12

@@ -35,7 +35,7 @@ from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.diagnosis.words.summary import summary
 from compd.model.effect import Effect, FittedEffect
 
-# Rows to which a longer recording is thinned: effects of a fiftieth of the noise still show in them.
+# A longer recording is thinned to so many rows: effects of a fiftieth of the noise still show in them.
 MOST_ROWS = 5000
 
 

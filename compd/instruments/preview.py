@@ -17,7 +17,7 @@ from compd.instruments.read_limits import ReadLimits
 from compd.instruments.text_file import decode_text, read_content
 
 SHOWN_ROWS = 20
-# Limits of the shown cells, columns and groups.
+# Longer lines and cells, more columns and groups than these are not shown whole.
 _CELL_WIDTH = 200
 _MOST_COLUMNS = 200
 _MOST_GROUPS = 200
@@ -30,7 +30,7 @@ class ExportPreview:
     Attributes
     ----------
     export : the whole of it; None where `problems` say why it cannot be read.
-    shape : one of SHAPES; "" if it is not known.
+    shape : one of SHAPES; "" where it is not known.
     line : of each row that is shown. rows : their cells, one text in each where no columns could be told.
     header : (C,) names of the columns; empty where they have none. roles : (C,) what each is taken for, "-" for
         nothing; empty where no columns could be told.

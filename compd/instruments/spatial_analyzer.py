@@ -25,7 +25,7 @@ from compd.units import unit_named
 _FRAME = re.compile(r"coordinate\s+frame\s*:?\s*'?([^']*?)'?\s*$", re.IGNORECASE)
 _AXES = re.compile(r"axes\s*=\s*(\w+)\s*:?\s*([^(]*?)\s*(?:\(\s*([^)]*?)\s*\))?\s*$", re.IGNORECASE)
 _NAMES_BEFORE = {1: ("name",), 2: ("group", "name"), 3: ("collection", "group", "name")}
-# Lines searched for comments, which are at the top.
+# The comments stand at the top.
 _LOOKED_AT = 50
 
 

@@ -23,10 +23,10 @@ PolledLine = StreamLine | RtuMaster | AsciiMaster | ModbusTcp
 Line: TypeAlias = "PolledLine | MqttSubscriber | OpcUaSubscriber"
 WrapPort = Callable[[Port], Port]
 
-# Silence before a request, so that a late or repeated reply is noticed before it. On TCP, without character times, a
-# second copy of a reply follows the first within this time (s).
+# Silence before a request, by which a late or repeated reply is noticed before the next one is asked for.
+# TCP has no character times: a second copy of a reply follows the first within this, s.
 TCP_GAP_S = 1e-3
-# On serial lines, as for Modbus RTU: silence in characters,
+# On any serial line, as Modbus RTU asks: in characters,
 QUIET_CHARACTERS = 3.5
 # and at least this, s: a USB adapter hands over what has come once a millisecond.
 SERIAL_GAP_S = 2e-3

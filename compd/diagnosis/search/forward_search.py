@@ -8,7 +8,7 @@ from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
 
 # Members of a set: more causes at once than this no recording can prove.
 MOST_MEMBERS = 7
-# Members tried beyond the last fall of the score: two effects may gain only together.
+# The search goes on while the score falls, and for so many members more: two effects may gain only together.
 FURTHER = 2
 # Sets that are looked at, the best first, for one that is plausible.
 MOST_RANKED = 400

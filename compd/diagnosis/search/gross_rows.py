@@ -21,7 +21,7 @@ EXPONENT = 2.0
 ROUNDS = 12
 # With more columns than this share of the measured numbers a fit of them says nothing of single rows.
 MOST_COLUMNS = 0.4
-# Fewest gross rows of a run, and their largest distance: something happened there.
+# A stretch with so many gross rows, at most so far apart, is a run: something happened there.
 FEWEST_IN_RUN, WIDEST_GAP = 4, 3
 
 

@@ -32,7 +32,7 @@ MOST_LINES = 12
 WIDTH = 80
 # Effects, rivals and untested effects that are said here.
 MOST_NAMED = 3
-# Largest ratio of mean squares, to that of the noise, that is called noise.
+# A mean square up to so many times that of the noise is called noise.
 NOISE_RATIO = 1.25
 NO_RIVAL = "no other effect that was tried does as well"
 # A probability above this is said before the numbers.
