@@ -283,7 +283,7 @@ class Gauge(ABC, Generic[LineT]):
     absolute : whether the device shows the same value again after its power was off (an LVDT, an absolute encoder). One
         that counts from where it was switched on does not; False also where it is not known.
     usual_line : baud rate and format as the device is delivered, for `compd gauge scan --probe`.
-    about : what the device speaks and where that was read; "" where the module's docstring says it.
+    about : what the device speaks and where that was read; "" if the module's docstring says it.
     """
 
     Options: ClassVar[type[GaugeOptions]] = GaugeOptions
@@ -309,7 +309,7 @@ class Gauge(ABC, Generic[LineT]):
         """Poll the device once.
 
         Returns one reading per channel, in their order, each with its own time and quality.
-        Raises LineFault where the poll as a whole failed. Any other exception is reported as a defect of the driver.
+        Raises LineFault if the poll as a whole failed. Any other exception is reported as a defect of the driver.
         """
 
     @property
@@ -323,7 +323,7 @@ class Gauge(ABC, Generic[LineT]):
 
     @property
     def reply_identity(self) -> str | None:
-        """How every reply with a value begins, where that says whose it is; None where it does not.
+        """How every reply with a value begins, where that says whose it is; None if it does not.
 
         On a line with several gauges whose replies do not differ in it, a late reply looks like the answer to the next
         request: see `replies_tell_whose`. Register lines tell replies apart themselves.

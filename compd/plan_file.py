@@ -92,7 +92,7 @@ def write_text_file(path: Path, text: str) -> None:
 class PlanLine:
     """One row of the file.
 
-    line : number in the file, for messages. purpose : "" where none is written.
+    line : number in the file, for messages. purpose : "" if none is written.
     values : column -> number, for the columns that the file has; nan where the cell is wrong, and a problem was noted.
     """
 
@@ -116,7 +116,7 @@ def read_plan_file(
     """Read a plan for a machine with this many links; faults go to `problems`.
 
     limits : column -> (lowest, highest) of each quantity that the machine can hold, and of SPEED_COLUMN; other
-        columns are refused. Raises CompdError where there is no header that could be read.
+        columns are refused. Raises CompdError if there is no header that could be read.
     """
     return _PlanFileReader(path, links, limits, problems).read()
 
@@ -179,7 +179,7 @@ class _PlanFileReader:
             if name not in names:
                 close = difflib.get_close_matches(name, names, n=1)
                 next_step = f"did you mean {close[0]}?" if close else "delete the column, or plan for another pair"
-                what = "is nothing that this machine can be told"
+                what = "is no setting of this machine"
                 self._add(f":1 column {name}", what, name, ", ".join(names), next_step)
         for name in NEEDED_COLUMNS:
             if name not in header:

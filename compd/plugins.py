@@ -26,9 +26,9 @@ SIMULATED_GAUGES = "compd.simulated_gauges"
 GAUGE_PRESETS = "compd.gauge_presets"
 EFFECTS = "compd.effects"
 _KIND = {GAUGES: "driver", SIMULATED_GAUGES: "simulated device", EFFECTS: "effect"}
-# Where a refusal leaves the hash of a file to whoever may read it.
+# Placeholder in a refusal for the hash of a file, which the reader computes.
 HASH_PLACE = "HASH"
-# Far more than anybody writes by hand.
+# Far above any hand-written file.
 _LARGEST_CODE_BYTES = 10_000_000
 _PATH = re.compile(r"^(?P<file>/.+\.py):(?P<name>[A-Za-z_]\w*)$")
 

@@ -46,13 +46,13 @@ class Stamp(NamedTuple):
 
 
 class Heard(NamedTuple):
-    """What one channel reads by a message.
+    """The reading of one channel by a message.
 
-    place : of the channel, in the order of `channels`. window_s : by how much later than `reading.time_s` it may have
-    been measured, s. note : what is wrong with the source's clock, though the reading counts.
+    channel_index : in the order of `channels`. window_s : largest delay (s) of the measurement after `reading.time_s`.
+    note : fault of the source's clock with a valid reading.
     """
 
-    place: int
+    channel_index: int
     reading: Reading
     window_s: float = 0.0
     note: str = ""
@@ -64,7 +64,7 @@ class PushedLine(Protocol):
     def subscribe(self, addresses: Sequence[str]) -> None:
         """Want what these addresses send, from now on. One that is refused sends a message that says so.
 
-        Called again, it asks for those that were refused. Raises LineFault (LINE_LOST) where nobody answers.
+        Called again, it asks for those that were refused. Raises LineFault (LINE_LOST) if nobody answers.
         """
         ...
 
@@ -100,8 +100,8 @@ class PushedGauge(Gauge[PushedLine]):
     def __init__(self, options: Any) -> None:
         super().__init__(options)
         self._times = [SourceTime(options.time_from, self.period_s) for _ in self.channels]
-        self._sent: dict[int, tuple[float, float]] = {}  # by place: the last time of the source, and the value
-        self._newest: dict[int, Reading] = {}  # by place, for `read`
+        self._sent: dict[int, tuple[float, float]] = {}  # by index: the last time of the source, and the value
+        self._newest: dict[int, Reading] = {}  # by index, for `read`
 
     @property
     @abstractmethod
@@ -109,11 +109,11 @@ class PushedGauge(Gauge[PushedLine]):
         """The topic or node of every channel, in their order."""
 
     @abstractmethod
-    def decode(self, place: int, message: Message, time_s: float) -> Reading:
-        """What channel number `place` reads by a message with a value. Raises LineFault where that cannot be used."""
+    def decode(self, index: int, message: Message, time_s: float) -> Reading:
+        """The reading of channel number `index` by a message with a value. Raises LineFault for an unusable one."""
 
-    def stamp(self, place: int, message: Message) -> Stamp:
-        """When the value was measured, as the source says. Raises LineFault where a time is missing or makes no sense.
+    def stamp(self, index: int, message: Message) -> Stamp:
+        """When the value was measured, as the source says. Raises LineFault if a time is missing or makes no sense.
 
         A value without a time that is to have one is not used.
         """
@@ -128,8 +128,8 @@ class PushedGauge(Gauge[PushedLine]):
         """What the channels of the message's address read by it; none for a message that came before."""
         return [
             received
-            for place, address in enumerate(self.addresses)
-            if address == message.address and (received := self._received(place, message)) is not None
+            for index, address in enumerate(self.addresses)
+            if address == message.address and (received := self._received(index, message)) is not None
         ]
 
     def read(self, line: PushedLine) -> Sequence[Reading]:
@@ -146,37 +146,37 @@ class PushedGauge(Gauge[PushedLine]):
                 break
             for message in messages:
                 received = self.receive(message)
-                self._newest.update({each.place: each.reading for each in received})
+                self._newest.update({each.channel_index: each.reading for each in received})
                 received_any = received_any or bool(received)
         if not received_any:
             raise LineFault(Quality.TIMEOUT, f"nothing came on {', '.join(sorted(set(self.addresses)))}")
         return [
-            self._newest.get(place, bad(-math.inf, Quality.TIMEOUT, f"nothing came on {address}"))
-            for place, address in enumerate(self.addresses)
+            self._newest.get(index, bad(-math.inf, Quality.TIMEOUT, f"nothing came on {address}"))
+            for index, address in enumerate(self.addresses)
         ]
 
-    def _received(self, place: int, message: Message) -> Heard | None:
+    def _received(self, index: int, message: Message) -> Heard | None:
         arrived_s = message.arrival.arrived_s
         if message.quality is not Quality.OK:
-            self._sent.pop(place, None)  # the value before it counts again when the source says so
-            return Heard(place, bad(arrived_s, message.quality, message.detail))
+            self._sent.pop(index, None)  # the value before it counts again when the source says so
+            return Heard(index, bad(arrived_s, message.quality, message.detail))
         try:
-            stamp = self.stamp(place, message)
-            time = self._times[place].of(message.arrival, stamp.utc_s, stamp.resolution_s)
-            reading = self.decode(place, message, time.time_s)
-            if self._is_repeated(place, stamp, reading) and not message.arrival.holds:
+            stamp = self.stamp(index, message)
+            time = self._times[index].of(message.arrival, stamp.utc_s, stamp.resolution_s)
+            reading = self.decode(index, message, time.time_s)
+            if self._is_repeated(index, stamp, reading) and not message.arrival.holds:
                 return None
         except LineFault as fault:
-            return Heard(place, bad(arrived_s, fault.quality, fault.detail))
+            return Heard(index, bad(arrived_s, fault.quality, fault.detail))
         except OutOfOrderError as error:
-            return Heard(place, bad(arrived_s, Quality.MISMATCH, str(error)))
+            return Heard(index, bad(arrived_s, Quality.MISMATCH, str(error)))
         except AgeUnknownError as error:
-            return Heard(place, bad(arrived_s, Quality.STALE, str(error)))
-        return Heard(place, reading, time.window_s, time.note)
+            return Heard(index, bad(arrived_s, Quality.STALE, str(error)))
+        return Heard(index, reading, time.window_s, time.note)
 
-    def _is_repeated(self, place: int, stamp: Stamp, reading: Reading) -> bool:
+    def _is_repeated(self, index: int, stamp: Stamp, reading: Reading) -> bool:
         """Whether this is a second copy of the last value: only a time of the source that counts can show it."""
         if self.options.time_from == "arrival" or math.isnan(stamp.utc_s):
             return False
-        sent, self._sent[place] = self._sent.get(place), (stamp.utc_s, reading.value)
-        return sent == self._sent[place]
+        sent, self._sent[index] = self._sent.get(index), (stamp.utc_s, reading.value)
+        return sent == self._sent[index]

@@ -36,7 +36,7 @@ class Quality(StrEnum):
     DISTRUSTED = "distrusted", "there is a value, which is not believed before a person has accepted it: `compd accept`"
 
 
-# Of a gauge that is read every so often, the next reading is due after so many of these intervals.
+# Intervals of a gauge's readings after which the next one is due.
 ROUNDS_UNTIL_DUE = 2.5
 
 
@@ -48,12 +48,12 @@ class ReadingMotion(NamedTuple):
     speed_mm_per_s : at the time of the reading, mm/s; 0 where it does not move, or not steadily.
     braking_mm_per_s2 : by how much its size falls, mm/s2; 0 where it does not brake.
     u_mm_per_s : standard uncertainty of the speed, mm/s; nan where there are not enough readings yet.
-    horizon_s : for so long after a reading, s, the motion may be taken to go on.
+    horizon_s : time (s) after a reading for which the motion may be assumed to go on.
     mean_mm_per_s : mean speed over the last `window_s`, as the readings show it, mm/s; 0 where none is known.
     window_s : how long before the reading the first one is that counts for `mean_mm_per_s`, s.
-    due_s : so long after a reading, s, the next one is there at the latest, unless the gauge is silent.
+    due_s : latest time (s) of the next reading after this one, unless the gauge is silent.
     scatter_mm : standard deviation of one reading at rest, as the last ones show it, mm; nan before it is known.
-    rest_s : for so long, s, no reading has shown motion; of the last readings, so that it ends somewhere.
+    rest_s : time (s) without motion in the last readings.
     late_s : by how much later than the reading's time the device may have sampled, s.
     """
 

@@ -17,7 +17,7 @@ import math
 from typing import Literal, NamedTuple
 
 TimeFrom = Literal["source", "arrival"]
-# A clock may be ahead of this computer's by so much, s, before it counts as wrong: NTP keeps it within 0.01 s on a LAN.
+# Largest lead (s) of a clock over this computer's; a larger one counts as wrong. NTP keeps it within 0.01 s on a LAN.
 CLOCK_TOLERANCE_S = 0.1
 # So far two readings of this computer's clocks, s, are apart at most: times that differ by less are the same.
 SAME_TIME_S = 1e-3
@@ -34,7 +34,7 @@ class Arrival(NamedTuple):
     arrived_utc_s : the same by this computer's calendar clock, s since 1970, UTC.
     earliest_s : the earliest monotonic time, s, at which it can have been measured, where the protocol tells; else nan.
     holds : it still held at `earliest_s`, whenever it was measured.
-    kept : somebody had kept it from before, nobody knows since when.
+    kept : retained from before, since an unknown time.
     """
 
     arrived_s: float
@@ -57,7 +57,7 @@ class MeasurementTime(NamedTuple):
 
 
 class AgeUnknownError(ValueError):
-    """There is a value, but nobody knows how old it is."""
+    """The value's age is unknown."""
 
 
 class OutOfOrderError(ValueError):

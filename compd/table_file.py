@@ -16,7 +16,7 @@ SUFFIXES = (CSV, PARQUET)
 def table_path(path: Path) -> Path:
     """The table's file of a recording, given by itself or by its sidecar NAME.yaml.
 
-    Raises RecordingError where two tables have this sidecar: a copy may have been changed since.
+    Raises RecordingError if two tables have this sidecar: a copy may have been changed since.
     """
     if path.suffix not in (".yaml", ".yml"):
         return path

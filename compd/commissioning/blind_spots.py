@@ -80,10 +80,10 @@ class BlindSpot:
     ----------
     name : stable, for programs.
     fault : what happens.
-    shown_by : what shows it, and under which condition; "" where nothing does.
-    vote : the key under `votes:` (`VoteSettings`) for this; "" where it needs none, or there is none.
+    shown_by : what shows it, and under which condition; "" if nothing does.
+    vote : the key under `votes:` (`VoteSettings`) for this; "" if it needs none, or there is none.
     unseen : what remains that nothing shows.
-    cost : its number for a machine; "" where it has none there.
+    cost : its number for a machine; "" if it has none there.
     """
 
     name: str
@@ -177,7 +177,7 @@ def _stuck_comparator(figures: Figures) -> str:
         for gauge in dict.fromkeys(d.gauge for d in figures.drifts if not d.length.startswith("scale"))
         if math.isnan(figures.configuration.noise_of(gauge).um)
     ]
-    without = f"; no `noise_um`, so nobody can tell: {', '.join(silent)}" if silent else ""
+    without = f"; no `noise_um`, so it is unknown: {', '.join(silent)}" if silent else ""
     return f"a joint that moves by {DRIFT_UM:g} um unseen: {figures.largest_um('joint'):.1f} um{without}"
 
 
@@ -469,7 +469,7 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
     ),
     BlindSpot(
         "count_lost_in_a_gap",
-        "a gauge loses its count while its replies are lost, or nobody reads it",
+        "a gauge loses its count while its replies are lost, or it is not read",
         "at rest: it shows another value, and no other gauge has moved. On the move: the ways of the other links, or "
         "its own speed, say where it must be; where they do not, or the gap was longer than `stale_after_s`, a person "
         "is asked for",

@@ -51,7 +51,7 @@ class CycleTime(NamedTuple):
 def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> CycleTime:
     """Run the loop of this configuration for half a second, with readings near machine zero that scatter by 0.1 um.
 
-    The model of `state.model_file` is in it. Raises CompdError where that cannot be used.
+    The model of `state.model_file` is in it. Raises CompdError if that cannot be used.
     """
     clock = clock or MonotonicClock()
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
@@ -89,7 +89,7 @@ def python_effect_times(configuration: Configuration, clock: Clock | None = None
     """Time (s) of each effect in plain Python of `state.model_file` per cycle in CMM mode, by the effect's id.
 
     The effects of the library and formulas are compiled; all of them together take some microseconds. Raises CompdError
-    where the model cannot be used.
+    if the model cannot be used.
     """
     clock = clock or MonotonicClock()
     file = configuration.state.model_file

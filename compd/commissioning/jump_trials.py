@@ -115,7 +115,7 @@ def reply_warnings(configuration: Configuration) -> list[Problem]:
     return [
         Problem(
             where=configuration.where("lines", line),
-            what=f"replies on this line do not say whose they are: one of {named_together(unnamed)} that comes late "
+            what=f"replies on this line are anonymous: one of {named_together(unnamed)} that comes late "
             "looks like the answer of another gauge, and costs a pause until the line is in step again",
             next_step="let replies carry an address (see `compd gauge show DRIVER`), or give each gauge a line",
         )

@@ -72,7 +72,7 @@ def _measures_lengths(configuration: Configuration, line: str) -> bool:
 def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[Problem]:
     """One line's warnings. `stale_after_s`: the shortest of its gauges; `where`: the line's place in the file."""
     if budget.unknown:
-        text = f"cannot be planned: {', '.join(budget.unknown)} does not say how many bytes it moves"
+        text = f"cannot be planned: {', '.join(budget.unknown)} does not state its bytes per poll"
         return [
             Problem(where=where, what=text, next_step="give the driver `traffic`, or measure with `compd gauge watch`")
         ]

@@ -61,7 +61,7 @@ def line_slips(sections: Sections) -> Iterator[Problem]:
 
 def _why_no_port(port: str, scheme: str) -> str:
     if scheme:
-        return "" if scheme in _SCHEMES else f"{scheme}:// is nothing that a serial line can be reached by"
+        return "" if scheme in _SCHEMES else f"{scheme}:// is no scheme of a serial line"
     if not port.startswith("/"):
         return "is no port of this computer"
     try:

@@ -229,7 +229,7 @@ class Configuration:
 class Examined(NamedTuple):
     """The readable part of a file: its problems, and the configuration if there are none.
 
-    geometry, wiring : None where they have a problem.
+    geometry, wiring : None if they have a problem.
     """
 
     document: Document
@@ -259,7 +259,7 @@ def in_order(problems: Sequence[Problem]) -> list[Problem]:
 def examine(path: Path) -> Examined:
     """Read a configuration as far as possible, with every check on its readable parts.
 
-    Raises ConfigurationError where the file as a whole cannot be read.
+    Raises ConfigurationError if the file as a whole cannot be read.
     """
     document = read_document(path)
     problems: list[Problem] = []

@@ -104,7 +104,7 @@ class LoopSettings(Section):
         "less over hold_s, then stop; degrade: let joints, frame or effects alone fade, then go on without them; stop: "
         "invalid at once"
     )
-    hold_s: Positive = Field(description="how long hold or fade lasts before the setpoint becomes invalid")
+    hold_s: Positive = Field(description="duration of hold or fade before the setpoint becomes invalid")
     extrapolate: bool = Field(
         default=True,
         description="carry every length on to the time of the cycle, by the speed that its own last readings show, "
@@ -277,7 +277,7 @@ class TargetSettings(Section):
 
     valid_for_s: Positive = Field(
         default=5.0,
-        description="how long a target may be used: a controller that sends none for so long gets `stop`, until it "
+        description="lifetime of a target: a controller that sends none for this time gets `stop`, until it "
         "sends one again or its role ends",
     )
     unix_only: bool = Field(default=False, description="true: only clients of the Unix socket may send one")
@@ -292,7 +292,7 @@ class SocketSettings(Section):
         default=None, description="where every setpoint goes as a packet of fixed size; left out: none is sent"
     )
     target: TargetSettings = Field(default=TargetSettings(), description="what a controller may do")
-    valid_for_s: Positive = Field(description="how long a setpoint may be used: valid_until = time + this")
+    valid_for_s: Positive = Field(description="lifetime of a setpoint: valid_until = time + this")
 
 
 class StateSettings(Section):

@@ -119,7 +119,7 @@ def _open_socket_warnings(document: Document, sockets: SocketSettings | None) ->
         "encrypted, the token neither",
         value=f"{sockets.tcp.host}, allowed from {', '.join(sockets.tcp.allow)}",
         allowed="127.0.0.1, or ::1, for this computer alone",
-        next_step="put a proxy with TLS in front of 127.0.0.1, or see that the network has nobody else in it; `target: "
+        next_step="put a proxy with TLS in front of 127.0.0.1, or keep everyone else off the network; `target: "
         "{unix_only: true}` lets other computers only watch",
     )
 

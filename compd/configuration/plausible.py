@@ -47,7 +47,7 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
     PlausibleRange(
         "loop.hold_s", 0.01, 600, "s",
         "too short for a line to be opened again: this is `on_stale: stop`",
-        "joints and frame drift by micrometres in ten minutes, and the correction would be held so long",
+        "joints and frame drift by micrometres in ten minutes, and the correction would be held for longer",
     ),
     PlausibleRange(
         "limits.correction_mm", 0.001, 5, "mm",
@@ -67,17 +67,17 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
     PlausibleRange(
         "sockets.valid_for_s", 0.002, 2, "s",
         "a setpoint would have ended before it arrives",
-        "a controller may go on so long with the last setpoint of a daemon that has died",
+        "a controller could use the last setpoint of a dead daemon for this time",
     ),
     PlausibleRange(
         "sockets.target.valid_for_s", 0.05, 60, "s",
         "a controller would have to send its target many times a second",
-        "a controller that hangs keeps the machine at its last target so long",
+        "a hanging controller keeps the machine at its last target for this time",
     ),
     PlausibleRange(
         "lines.*.timeout_s", 0.005, 5, "s",
         "devices take 1 to 100 ms to answer: good replies would come too late",
-        "one lost reply keeps all gauges of the line waiting so long",
+        "one lost reply keeps all gauges of the line waiting for this time",
     ),
     PlausibleRange(
         "lines.*.back_off_s.*", 0.01, 60, "s",

@@ -2,7 +2,7 @@
 
 A number is right if the device, with its sensor at that number, would have sent what it sent: no more than the last
 digit of the device lies between them. A number out of a damaged reply that is not right is either the driver's fault,
-or the device would itself have sent these very bytes for it: then nobody can know that they are damaged.
+or the device would itself have sent these very bytes for it: then the damage is undetectable.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class DeviceReplies:
         """The replies of these exchanges with other values of some channels; None if the simulated device fails."""
         try:
             return self._peer.would_answer((e.request for e in exchanges), {**self._sensors.values, **values})
-        except Exception:  # noqa: BLE001  a simulated device is anybody's code: it may have no form for such a value
+        except Exception:  # noqa: BLE001  foreign code: a simulated device may have no form for such a value
             return None
 
     def is_right(self, channel: str, number: float, exchanges: Sequence[Exchange]) -> bool:

@@ -167,7 +167,7 @@ class ConformanceSession:
             return readings, None
         except LineFault as caught:
             fault = caught
-        except Exception as error:  # noqa: BLE001  a driver is anybody's code: what it raises is a finding
+        except Exception as error:  # noqa: BLE001  foreign code: any exception of a driver is a finding
             fault = LineFault(Quality.DRIVER_ERROR, f"raised {type(error).__name__}: {error}")
         nothing = bad(self.wire.clock.monotonic(), fault.quality, fault.detail)
         return [nothing] * len(self.gauge.channels), fault
@@ -203,7 +203,7 @@ class ConformanceSession:
                 wrong.append(f"{channel.name}: {reading.value!r} as ok is no number")
                 continue
             if not self.exchanges:
-                event = "said in this poll" if self.wire.pause_s else "asked"
+                event = "sent in this poll" if self.wire.pause_s else "asked"
                 wrong.append(f"{channel.name}: {reading.value:.9g} {channel.unit} as ok, and nothing was {event}")
                 continue
             if not right and not self.replies.is_right(channel.name, reading.value, self.exchanges):

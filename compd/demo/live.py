@@ -24,7 +24,7 @@ def run_live(configuration: Configuration, seed: int, serve: Callable[[str], Non
     """Start the simulated machine and its daemon, take machine zero, and `serve`; stop both when that returns.
 
     serve : called with the daemon's Unix socket; returns when a person has had enough.
-    Raises DaemonError where one does not start.
+    Raises DaemonError if one does not start.
     """
     with simulated_daemon(configuration, seed, LIVE_SPEEDUP, ZERO_HOLD_S) as directory:
         take_zero(directory / "compd.sock")

@@ -66,7 +66,7 @@ Watcher = Callable[[DemoSession, float, dict[str, Any]], None]
 def run_demo(configuration: Configuration, seconds: float, seed: int, on_change: Watcher) -> DemoSession:
     """Start the simulated machine and the daemon for it, run a session of `seconds`, stop both.
 
-    seed : of weather, joints and targets. on_change : see `run_session`. Raises DaemonError where one does not start.
+    seed : of weather, joints and targets. on_change : see `run_session`. Raises DaemonError if one does not start.
     """
     with simulated_daemon(configuration, seed, SPEEDUP, ZERO_HOLD_S) as directory:
         return run_session(configuration, directory, seconds, seed, on_change)

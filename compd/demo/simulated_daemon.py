@@ -20,7 +20,7 @@ def simulated_daemon(
     seed : of weather, joints and targets.  speedup : of the weather.  zero_hold_s : how long the machine stands at
     machine zero, s.  effects : hidden in the machine, as for `compd simulate --effect`.
 
-    Raises DaemonError where one does not start.
+    Raises DaemonError if one does not start.
     """
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
         directory = Path(temporary)

@@ -88,7 +88,7 @@ def readable(kind: Any, value: Any) -> Any:
     """The readable part of `value` as `kind`, for checks in spite of other faults.
 
     A section with a faulty key becomes a namespace with the same attributes, None for what is missing or cannot be
-    read; of a list or mapping the faulty entries do. None where nothing can be read.
+    read; of a list or mapping the faulty entries do. None if nothing can be read.
     """
     try:
         return TypeAdapter(kind).validate_python(value)

@@ -2,7 +2,7 @@
 
 The scalars are those of YAML 1.2: `on` is a word, 1e-6 a number, 010 ten. Merge keys (`<<: *anchor`) work. What no
 file of this kind needs is refused with its line, before it costs time or memory: collections as keys, tags, anchors
-within themselves, aliases that unfold into more than anybody writes.
+within themselves, aliases that unfold into more than any hand-written file.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ class _Reading:
             key = self._key(key_node, location)
             here = (*location, key)
             if key in own_lines:
-                first = f"said twice, first in line {own_lines[key]}"
+                first = f"given twice, first in line {own_lines[key]}"
                 self._add(line, here, first, next_step="keep one of them")
             own_lines[key] = self.lines[here] = line
             data[key] = self.plain(value_node, here)
@@ -291,7 +291,7 @@ def _check_structure(text: str, path: Path) -> None:
 
 
 def _check_size(root: yaml.Node, path: Path) -> None:
-    """Raise ConfigurationError where aliases unfold into more than MOST_NODES nodes, counted without unfolding them."""
+    """Raise ConfigurationError if aliases unfold into more than MOST_NODES nodes, counted without unfolding them."""
     sizes: dict[int, int] = {}
 
     def size(node: yaml.Node) -> int:

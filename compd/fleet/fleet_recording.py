@@ -21,8 +21,8 @@ class FleetRecording:
     ----------
     path : its table, absolute.
     machine : name of the machine among those of the fleet.
-    configuration : name of the machine's configuration, as the sidecar has it; "" where that cannot be read.
-    started_at : when the campaign began, UTC; None where nothing says so.
+    configuration : name of the machine's configuration, as the sidecar has it; "" if that cannot be read.
+    started_at : when the campaign began, UTC; None if nothing says so.
     """
 
     path: Path

@@ -65,7 +65,7 @@ class Examination:
         """Hash of all inputs of its result besides the code: results with equal hashes are equal.
 
         The recording's files and its machine's name, the configuration, the model, effects of one's own, the command
-        and the release. "" where a file cannot be read.
+        and the release. "" if a file cannot be read.
         """
         content = content_hash(recording.path)
         files = [self.machines.of(recording), self.models.of(recording), *self._effect_files]

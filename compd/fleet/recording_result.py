@@ -23,9 +23,10 @@ class FleetEstimate:
     ----------
     effect, parameter : as the effect's equation names it; with ``_1``, ``_x`` where there is one per link or axis.
     value, standard_error : in `unit`; a standard error that is not known is nan.
-    p_value : chance that noise alone looks so much like the effect, corrected for all effects that were tried; nan for
+    p_value : probability that noise alone resembles the effect as much, corrected for all effects that were tried; nan
+    for
         an effect that the model has already.
-    plausible : whether the value lies in the range that the effect declares; None where nobody looked.
+    plausible : whether the value lies in the range that the effect declares; None if not examined.
     rivals : effects that would explain this recording as well, in this one's place.
     """
 
@@ -46,7 +47,7 @@ class RecordingResult:
     Attributes
     ----------
     recording : its table's path.
-    machine : name of its machine in the fleet; "" where nothing says which it is.
+    machine : name of its machine in the fleet; "" if nothing says which it is.
     kinematics : how that is built: "tripod_3spr", "hexapod_6ups", or "external"; "" with a problem.
     command : what was done.
     model : the model file that was applied; "" for none.
@@ -59,7 +60,7 @@ class RecordingResult:
     verdict : of `diagnose` its verdict; of `compare` AT_FLOOR, ABOVE_FLOOR or NOISE_NOT_KNOWN. "" with a problem.
     summary : the verdict in words.
     estimates : of the effects that were found, or that the model has.
-    problem : why it could not be examined; "" where it was.
+    problem : why it could not be examined; "" if it was.
     basis : `Examination.basis`, the hash of what the result follows from; "" with a problem.
     """
 

@@ -59,7 +59,7 @@ OF_EFFECT = (
     TableColumn("value", "double", "fitted on this recording, in `unit`"),
     TableColumn("standard_error", "double", "of the value, in `unit`; empty where it is not known"),
     TableColumn("unit", "string", "of value and standard_error"),
-    TableColumn("p_value", "double", "chance that noise looks so much like the effect; empty for effects of the model"),
+    TableColumn("p_value", "double", "probability that noise resembles the effect; empty for effects of the model"),
     TableColumn("plausible", "bool", "whether the value lies in the effect's plausible range"),
     TableColumn("rivals", "string", "effects that would do as well in its place, separated by spaces"),
 )
@@ -137,7 +137,7 @@ def read_table(path: Path) -> tuple[RecordingResult, ...]:
                 what="was written by another release of compd",
                 value=table.schema.metadata[FORMAT_KEY].decode(errors="replace"),
                 allowed=FORMAT.decode(),
-                next_step="make the table anew",
+                next_step="create the table again",
             )
         )
     by_recording = groupby(table.to_pylist(), key=lambda row: (row["recording"], row["command"]))
@@ -153,7 +153,7 @@ def earlier_results(path: Path) -> tuple[RecordingResult, ...]:
 
 
 def rows_of(result: RecordingResult) -> Iterator[dict[str, Any]]:
-    """The rows of one recording: column -> value, None where there is none."""
+    """The rows of one recording: column -> value, None if there is none."""
     whole = _cells(result, OF_RECORDING)
     whole |= {"rows": None if result.problem else result.rows, PROBLEM.name: result.problem or None}
     whole[BASIS.name] = result.basis or None

@@ -145,7 +145,7 @@ def number_questions(
                 start,
                 f"has {places} decimals of {unit or 'its unit'}: are the last ones a checksum or a status?",
                 texts[:3],
-                f"--decimals {places} if the display shows so many; --decimals {places - 2} where it shows two less",
+                f"--decimals {places} if the display shows all; --decimals {places - 2} where it shows two less",
             )
     yield from _glued(texts, start, mark, answers)
 

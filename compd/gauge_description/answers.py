@@ -29,7 +29,7 @@ class Answers:
     factors : words beside a number that multiply it, in the manner of a description: "mm=1|um=0.001", "+=1|-=-1".
     constants : digits in front of a number that are no part of it: an address.
     decimals : how many the device shows: digits behind them are skipped; of whole numbers, how many are decimals.
-    decimal_mark : "." or ","; "" where the replies say it.
+    decimal_mark : "." or ","; "" if the replies say it.
     skipped_end : how many characters at the end of every reply are skipped.
     plain : every digit belongs to its number: no address, checksum or status is glued to it.
     """

@@ -33,7 +33,7 @@ class GaugeDescription:
 def learn_gauge(captured: Sequence[CapturedReply], answers: Answers) -> tuple[GaugeDescription, list[str]]:
     """The description of a gauge, and its values of every reply.
 
-    Raises DescriptionError where no description follows, with every question that is open, or where a reply does not
+    Raises DescriptionError if no description follows, with every question that is open, or where a reply does not
     fit the one that does.
     """
     description = describe_replies(captured, answers)

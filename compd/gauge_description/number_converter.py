@@ -12,7 +12,7 @@ _SIGNED = re.compile(rb" *[+-]")
 def number_converter(texts: Sequence[bytes], mark: str, name: str, shown_decimals: int | None) -> tuple[str, str]:
     """The converter of a number, and a note for looking up in the manual ("" for none).
 
-    texts : the number in every reply. mark : its decimal mark. name : its channel, "" where there is one.
+    texts : the number in every reply. mark : its decimal mark. name : its channel, "" if there is one.
     shown_decimals : how many decimals belong to the number; the digits behind them are skipped.
     """
     exponent = any(b"e" in text.lower() for text in texts)

@@ -116,7 +116,7 @@ class ObservedChannels:
                 self.problems.append(
                     Problem(
                         where=where,
-                        what="the replies say another unit",
+                        what="the replies name another unit",
                         value=unit,
                         allowed=", ".join(filter(None, reply_units)),
                         next_step="leave out --unit, or set the device to one unit; to multiply the number, "

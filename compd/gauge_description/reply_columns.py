@@ -65,7 +65,7 @@ def columns_of(
 
     mark : the decimal mark. words : tables of words that may stand for each other, whatever their lengths, as units
     and signs may. constants : digits in front of a number that are no part of it.
-    Raises DescriptionError where one reply is built differently.
+    Raises DescriptionError if one reply is built differently.
     """
     split = [_parts(body, mark) for body in bodies]
     for k, parts in enumerate(split):

@@ -29,7 +29,7 @@ class CatalogueEntry:
 
 @dataclass(frozen=True)
 class DriverOption:
-    """One key of a gauge in the configuration; `default` is Python's text of it, "" where the option is needed."""
+    """One key of a gauge in the configuration; `default` is Python's text of it, "" if the option is needed."""
 
     name: str
     default: str

@@ -31,12 +31,13 @@ NOT_TRIED = "Renishaw CARTO .rtx, read by a description of the format: no file o
 _DATA = re.compile(rb"^Data:[ \t]*\r?\n", re.MULTILINE)
 _END = b"EOF::"
 _NUMBER_BYTES = 8
-# The header has some twenty lines; 100 million samples are half an hour at the fastest rate, 50 kHz.
+# Longest header and file (bytes). The header has some twenty lines; 100 million samples are half an hour at the fastest
+# rate, 50 kHz.
 _LONGEST_HEADER = 64 * 1024
 _LONGEST_FILE = 800_000_000
 _NUMBER = re.compile(r"\+?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _SHOWN = 5
-# Options that say something about text or about positions.
+# Options for text or for positions, without a meaning here.
 _OF_OTHERS = ("columns", "names", "angle_unit", "decimal", "dates", "group", "sheet")
 
 
@@ -157,7 +158,7 @@ class _CartoReader:
         return rate_hz, f"by `{RATE_KEY}`"
 
     def _count(self, header: dict[str, _HeaderLine]) -> int | None:
-        """Samples by the header; None where it does not say, which is a problem."""
+        """Samples by the header; None if it does not say, which is a problem."""
         line = header.get(COUNT_KEY)
         if line is not None and line.value.isascii() and line.value.isdigit() and int(line.value):
             return int(line.value)

@@ -12,15 +12,15 @@ from compd.instruments.export_problems import ExportProblems
 
 NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 _WITH_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[.,' ]\d{3})+(?:[.,]\d+)?", re.ASCII)
-# A comma that can be no mark of thousands: not three digits behind it, four or more or a single 0 before it.
+# A comma that must be decimal: not three digits behind it, or four or more or a single 0 before it.
 _SURELY_DECIMAL = re.compile(
     r"^[-+]?(?:\d*,(?:\d{0,2}|\d{4,})|(?:0|\d{4,})?,\d{3})(?:[eE][-+]?\d+)?$|^[-+]?\d*,\d*[eE]", re.ASCII | re.MULTILINE
 )
-# No length or time in any unit is larger.
+# Largest plausible length or time in any unit.
 LARGEST = 1e30
 OTHER_CHARACTERS = re.compile(r"[^0-9+\-.,eE]")
 _TWO_MARKS, _POINT, _COMMA = re.compile(r"[.,][^\n.,]*[.,]"), re.compile(r"\."), re.compile(",")
-# A column is one of numbers where so many of its first cells are; the others are then refused.
+# A column is numeric if at least this fraction of its first cells is; its other cells are then refused.
 _SHARE = 0.5
 _LOOKED_AT = 500
 
@@ -86,7 +86,7 @@ def decimal_mark(
         )
     else:
         problems.ask(
-            "the decimal mark cannot be told: every comma has three digits behind it",
+            "ambiguous decimal separator: every comma is followed by three digits",
             cell,
             [f"--decimal , ({cell.replace(',', '.')})", f"--decimal . ({cell.replace(',', '')})"],
             int(line[row]),
@@ -133,9 +133,9 @@ def with_points(cells: Sequence[str], decimal: str) -> list[str]:
 
 
 def numbers(cells: Sequence[str], line: IntArray, what: str, problems: ExportProblems) -> FloatArray:
-    """(N,) what the cells are worth; nan where one is empty. A problem is added for each that is no number.
+    """(N,) the cells as floats, nan for empty ones. Adds a problem for each that is no number.
 
-    line : (N,) of the cells. what : for a person, what the column holds.
+    line : (N,) of the cells. what : the column's content in words.
     """
     if not OTHER_CHARACTERS.search("".join(cells)):
         try:

@@ -20,7 +20,7 @@ from compd.units import unit_named
 AXES = (*POSITION_AXES, *ATTITUDE_AXES, *LENGTH_AXES)
 # `collection` and `date` go with `group` and `time`; "-" is a column that is not used.
 ROLES = ("time", "date", *AXES, "name", "group", "collection", "-")
-# What the distances between rows of two triples differ by, rms, as a share of them: nominal and measured ones.
+# Largest relative rms difference of the distances between rows of two triples: nominal and measured ones.
 _ALIKE = 0.1
 _HALF_DAY = frozenset(("AM", "PM"))
 

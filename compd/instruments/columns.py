@@ -28,14 +28,14 @@ from compd.instruments.time_stamps import (
 from compd.units import unit_factor, unit_named
 
 ALL_GROUPS = "all"
-# Groups that a question lists.
+# Most groups listed in a question.
 _SHOWN_GROUPS = 20
 _SHOWN_MARKERS = 2
 _HALF_DAY = frozenset(("AM", "PM"))
-# Trackers and interferometers give up to 10 000 positions a second that are written with a time.
+# Shortest interval (s) of rows: trackers and interferometers write up to 10 000 timed positions a second.
 FASTEST_ROWS_S = 1e-4
-# Days as a spreadsheet counts them, of the years 1954 to 2119. A second has five decimals; rows of one measurement are
-# less than half an hour apart.
+# Serial days of spreadsheets for the years 1954 to 2119. A second has five decimals; rows of one measurement are less
+# than half an hour apart.
 SERIAL_DAYS = (20_000.0, 80_000.0)
 _DAY_DECIMALS = 5
 _LONGEST_DAY_STEP = 0.02
@@ -260,7 +260,7 @@ def _spans(axes: Sequence[str], raw: dict[str, FloatArray], wanted: str) -> str:
 
 
 def _time(table: RawTable, roles: Roles, options: ReadOptions, problems: ExportProblems) -> StampedTime | None:
-    """The times of the rows; None where they have none."""
+    """The times of the rows; None if they have none."""
     column = roles.column.get("time")
     if column is None:
         if options.rate_hz is None:

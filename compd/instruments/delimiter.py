@@ -9,14 +9,14 @@ from collections.abc import Sequence
 
 from compd.instruments.cells import is_number
 
-# In the order in which they are believed: a comma may be a decimal mark too.
+# Delimiters in order of precedence: a comma may be a decimal mark, too.
 DELIMITERS = {"\t": "tab", ";": "semicolon", "|": "pipe", ",": "comma"}
 BLANKS = " "
 WIDE_BLANKS = "  "
 NAMES = {**DELIMITERS, BLANKS: "blanks", WIDE_BLANKS: "two blanks or more"}
 _TWO_NUMBERS = re.compile(r"[-+]?[\d.]+\s+[-+]?[\d.]+")
 _WIDE = re.compile(r"\s{2,}")
-# A delimiter stands in so many of the lines.
+# Least share of the lines with the delimiter.
 _SHARE = 0.6
 _LOOKED_AT = 400
 

@@ -59,7 +59,7 @@ class InstrumentExport:
     values : (N, d) mm; attitude: rotation vector, rad.
     time_s : (N,) on the instrument's clock; None where rows have no time.
     time_std_s : standard uncertainty of one time, beside the offset of the clock, s; 0 for stamps as fine as needed.
-    name : (N,) names of the points; None where they have none.
+    name : (N,) names of the points; None if they have none.
     taken : what was taken for what, in words for a person: role -> "column 4 'X', mm by the header".
     left_out : reason -> rows that are not there.
     """

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from compd.errors import Problem, RecordingError
 
-# Lines, and values, that a message lists.
+# Most lines, and values, listed in a message.
 SHOWN = 3
 _VALUE_WIDTH = 60
 
@@ -38,7 +38,7 @@ class ExportProblems:
         )
 
     def check(self) -> None:
-        """Raise RecordingError where there is a problem."""
+        """Raise RecordingError if there is a problem."""
         if self.problems:
             raise RecordingError(self.problems)
 

@@ -12,7 +12,7 @@ _PARTS = re.compile(r"[^0-9a-z]+")
 _UNIT_BEHIND = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*?)\s*[\])>}]\s*$")
 _LETTERS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "µ": "u", "μ": "u"})
 
-# Words, tidied, by what they make of a column, in English and German.
+# Normalised words by the role of their column, in English and German.
 _WORDS = {
     "not measured": "nominal nom soll sollwert theo theoretical dev deviation abweichung delta error err fehler sigma "
     "std rms uncertainty unsicherheit tol tolerance toleranz min max offset",
@@ -29,7 +29,7 @@ _WORDS = {
     **{axis: axis for axis in (*POSITION_AXES, *ATTITUDE_AXES)},
 }
 _MEANING = {word: meaning for meaning, words in _WORDS.items() for word in words.split()}
-# These count as the last word of a name too: "Tracker X", "raw time".
+# Words that also count at the end of a name: "Tracker X", "raw time".
 _LAST = ("time", *POSITION_AXES, *ATTITUDE_AXES, "length")
 _LINK = re.compile(r"link_?\d+")
 

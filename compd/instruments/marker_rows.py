@@ -14,12 +14,12 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 
-# Nothing but nines, three or more: -9999, 99999.999, 9.99e+37.
+# Numbers of three or more nines only: -9999, 99999.999, 9.99e+37.
 _NINES = re.compile(r"[-+]?(?=(?:\.?9){3})9*\.?9*(?:[eE][-+]?\d+)?")
 _ZERO = re.compile(r"[-+]?0*\.?0*(?:[eE][-+]?\d+)?")
-# So far beyond the others, as a share of the longest side of the box around them.
+# Least distance from the others, as a share of the longest side of their bounding box.
 _FAR = 0.5
-# Without so many others nobody can say what is far from them.
+# Fewest other rows for judging a distance from them.
 _FEWEST_OTHERS = 3
 
 

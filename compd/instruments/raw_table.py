@@ -18,7 +18,7 @@ class RawTable:
     path : the file. shape : one of SHAPES.
     columns : (C) columns of (N,) cells each, stripped, "" where empty. A number has "." as its decimal mark already.
     line : (N,) line of the file, or row of the sheet, from 1.
-    header : (C,) names of the columns; None where the file has none. header_line : its line; 0 without one.
+    header : (C,) names of the columns; None if the file has none. header_line : its line; 0 without one.
     unit : of the lengths, where the file says it beside the columns' names ("mm", "m", "inch" ...); "" if not.
     decimal : "." or ",", as it was in the file.
     assumed : in words for a person, what was found: "delimiter" -> "semicolon", "decimal mark" -> "comma", ...

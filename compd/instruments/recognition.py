@@ -12,7 +12,7 @@ from compd.instruments.cells import is_number
 from compd.instruments.time_stamps import is_stamp
 
 _LOOKED_AT = 500
-# Of the cells of a table that are no dates more than half are numbers; of a longer one at least half.
+# Least share of numbers among a table's cells without dates; more than this share in a short table.
 _LEAST_SHARE = 1 / 2
 _LONGER_ROWS = 3
 _BETWEEN = re.compile(r"[;\t,]|\s+")

@@ -11,7 +11,7 @@ from compd.files import read_small_file
 from compd.instruments.export_problems import ExportProblems
 from compd.instruments.read_limits import ReadLimits
 
-# Some four million rows; a tracker with 50 samples a second writes them in a day.
+# Largest file (bytes): some four million rows, a day of a tracker with 50 samples a second.
 MOST_BYTES = 256 * 2**20
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _CONTROL_BYTES = bytes([*range(9), *range(14, 32), 127])
@@ -35,7 +35,7 @@ class TextFile:
 
 
 def read_content(path: Path) -> bytes:
-    """The bytes of a regular file. Raises RecordingError where it cannot be read, is empty or too long."""
+    """The bytes of a regular file. Raises RecordingError if it cannot be read, is empty or too long."""
     problems = ExportProblems(path)
     try:
         content = read_small_file(path, MOST_BYTES)

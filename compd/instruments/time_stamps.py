@@ -18,7 +18,7 @@ from compd.instruments.export_problems import ExportProblems
 
 DATE_ORDERS = ("dmy", "mdy", "ymd")
 DAY_S = 86400.0
-# By how much a clock is set back in autumn, s. The row after it comes at most so long, s, after the one before.
+# Step (s) of a clock in autumn, and the longest interval (s) of the rows around it.
 SET_BACK_S = 3600.0
 _LONGEST_PAUSE_S = 600.0
 # Two-digit years from here on are of the last century, as POSIX has it.
@@ -187,7 +187,7 @@ class _Parsed:
         self.failed = self.failed or bool(wrong)
 
     def _parse_minutes(self, cells: Sequence[str], line: IntArray) -> list[int] | None:
-        """As `_parse_each`, but each minute once: a million stamps with fractions share few. None where this cannot be
+        """As `_parse_each`, but each minute once: a million stamps with fractions share few. None if this cannot be
         done, as the cells do not all end in seconds and one zone."""
         ending = _ENDING.search(cells[0])
         behind = ending[0] if ending else ""
@@ -263,7 +263,7 @@ def _has_zone(cell: str) -> bool:
 
 
 def _ordinal(key: DateKey, order: str) -> int | None:
-    """The day's ordinal where a date reads so in this order; None where there is no such day."""
+    """The day's ordinal where a date reads so in this order; None if there is no such day."""
     first, _, middle, last = key
     parts = dict(zip(order, (first, middle, last), strict=True))
     if len(parts["d"]) > 2 or len(parts["m"]) > 2 or len(parts["y"]) not in (2, 4):

@@ -18,8 +18,8 @@ LENGTH = "length"
 # 1 / 0.6745: the standard deviation of a normal distribution over its median absolute deviation.
 _STD_PER_MEDIAN = 1.4826
 LEAST_ROWS = 3
-# Of two tracks in one: rows far from the next (mm), and nearer to the one after by this factor; so many, and so many of
-# the rows in between. Two in turn make it of every row, two at random of a quarter.
+# Two tracks in one: least distance (mm) of rows from the next, factor by which the one after is nearer, fewest such
+# rows, and their least share of the rows in between. Two in turn make it of every row, two at random of a quarter.
 _FAR_MM = 0.1
 _BACK = 0.1
 _FEWEST_MIXED = 20
@@ -34,7 +34,7 @@ class Track:
     ----------
     path : the export. time_s : (M,) on the instrument's clock, strictly rising.
     position_mm : (M, d) on `axes`: a subset of "x", "y", "z", or "length" alone.
-    rotation_rad : (M, 3) attitude, a rotation vector; None where none was measured.
+    rotation_rad : (M, 3) attitude, a rotation vector; None if none was measured.
     time_std_s : standard uncertainty of one time, beside that of the clock's offset.
     taken : what was taken for what, for a person. left_out : reason -> rows of the export that are not there.
     """
@@ -70,7 +70,7 @@ class Track:
     def rotation_at(self, time_s: FloatArray) -> FloatArray:
         """(N, 3) attitude, a rotation vector, as `position_at`; on the shortest arc between samples.
 
-        Raises ValueError where no attitude was measured.
+        Raises ValueError if no attitude was measured.
         """
         if self.rotation_rad is None:
             raise ValueError("no attitude was measured")
@@ -81,7 +81,7 @@ class Track:
 def track_of(export: InstrumentExport) -> Track:
     """The track of an export whose rows have times.
 
-    Raises RecordingError where they have none, fall or stand still, or are fewer than three.
+    Raises RecordingError if they have none, fall or stand still, or are fewer than three.
     """
     problems = ExportProblems(export.path)
     if export.time_s is None:

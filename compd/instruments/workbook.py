@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from openpyxl import Workbook
     from openpyxl.worksheet._read_only import ReadOnlyWorksheet
 
-# Rows of a sheet in which a number must stand for the sheet to count as one that holds numbers.
+# First rows of a sheet that must contain a number for the sheet to count as numeric.
 _LOOKED_AT = 2000
 
 
@@ -97,7 +97,7 @@ def _read(path: Path, options: ReadOptions) -> RawTable:
 
 
 def _choose_sheet(path: Path, book: Workbook, wanted: str | None) -> ReadOnlyWorksheet:
-    """The sheet with numbers, or the one that is wanted. Raises RecordingError where it is not clear which."""
+    """The sheet with numbers, or the one that is wanted. Raises RecordingError if it is not clear which."""
     sheets = {sheet.title: sheet for sheet in book.worksheets}
     if wanted is not None:
         if wanted not in sheets:

@@ -14,7 +14,7 @@ from compd.errors import Problem, RecordingError
 if TYPE_CHECKING:
     from openpyxl.worksheet._read_only import ReadOnlyWorksheet
 
-# Rows that a sheet can have, and columns that a list of an instrument may have.
+# Most rows of a sheet, and most columns of an instrument's list.
 MOST_ROWS = 1_048_576
 MOST_COLUMNS = 500
 # Kinds of cells. COMMA: a number as text, with a comma; ERROR: of the spreadsheet; NO_VALUE: a formula without one.
@@ -112,7 +112,7 @@ class SheetReader:
         ]
 
     def _numbered(self, sheet: ReadOnlyWorksheet) -> Iterator[tuple[int, Sequence[Any]]]:
-        """(number, cells) of every row. Raises RecordingError where there are more than a list can have."""
+        """(number, cells) of every row. Raises RecordingError if there are more than a list can have."""
         # what the file says of its size may be wrong, and is what rows are padded to
         sheet.reset_dimensions()
         for number, cells in enumerate(cast(Any, sheet).iter_rows(), start=1):

@@ -11,16 +11,16 @@ from pathlib import Path
 from compd.errors import Problem, RecordingError
 from compd.instruments.read_limits import ReadLimits
 
-# Of the file on the disk.
+# Largest file (bytes) on the disk.
 MOST_BYTES = 200_000_000
-# What the reading of a damaged file ends with; a SyntaxError is XML that is not well formed.
+# Exceptions of reading a damaged file; a SyntaxError stands for malformed XML.
 BROKEN = (
     *(ValueError, KeyError, IndexError, TypeError, AttributeError, SyntaxError, EOFError, OSError, OverflowError),
     *(NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error),
 )
 _ZIP, _OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _CHUNK = 1 << 20
-# Longer than what is looked for, which may lie across two chunks.
+# Overlap (bytes) of chunks, longer than the searched text, which may lie across two of them.
 _OVERLAP = 100
 _FORMULA = re.compile(rb"<(?:\w+:)?f[ >/]")
 # Of a sheet, and of the table of texts.
@@ -100,7 +100,7 @@ def check_workbook_file(path: Path, limits: ReadLimits) -> None:
 
 
 def _check_cells(path: Path, name: str, limits: ReadLimits) -> None:
-    """Raise RecordingError where a part has too many cells, or texts that cells name, whatever it says of its size."""
+    """Raise RecordingError if a part has too many cells, or texts that cells name, whatever it says of its size."""
     count, rest = 0, b""
     with zipfile.ZipFile(path) as archive, archive.open(name) as file:
         while chunk := file.read(_CHUNK):

@@ -39,7 +39,7 @@ def find_table(place: str, rows: Sequence[Row]) -> SheetTable:
     The header is the row of text alone, over every column in which most rows have a number, that the most rows follow.
     A row of units below it counts to it.
 
-    Raises RecordingError where no row holds a number, or another header stands in the middle.
+    Raises RecordingError if no row holds a number, or another header stands in the middle.
     """
     columns = _columns_of_numbers(rows)
     if not columns:
@@ -103,7 +103,7 @@ def _names(row: Row) -> tuple[str, ...]:
 
 
 def _unit_in(text: str) -> str | None:
-    """The unit in a cell such as "mm", "[mm]" or "-"; None where it holds something else."""
+    """The unit in a cell such as "mm", "[mm]" or "-"; None if it holds something else."""
     match = _UNIT.fullmatch(text.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0C", "degC"))
     if match is None:
         return None

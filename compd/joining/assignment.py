@@ -32,7 +32,7 @@ class Assignment:
     limit_mm : points farther from their dwell than this have none.
     other : (G,) the dwell that each point fits next best, -1 for none.
     unclear : (G,) points that would fit another dwell as well; they have none in what a search returns.
-    next_best : (by how many dwells all points are shifted, rms in mm), None where there is no other.
+    next_best : (by how many dwells all points are shifted, rms in mm), None if there is no other.
     """
 
     dwell: IntArray

@@ -42,7 +42,7 @@ class RestJoin:
     residual_mm : (G,) how far each point is from its dwell once all are laid over the dwells; nan for none.
     first, last : (line of the export, dwell) of the first and the last pair.
     rms_mm : root mean square of what the distances between points differ by from those of the machine's kinematics.
-    next_best : (shift by so many dwells, its rms in mm), of an assignment by order; None where there is no other.
+    next_best : (shift in dwells, its rms in mm) of an assignment by order; None if there is no other.
     left_out : reason -> points or dwells, in words, that are in no row.
     of_lengths : whether the points are lengths along a link.
     """

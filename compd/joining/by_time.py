@@ -53,8 +53,8 @@ class Instrument:
 
     Attributes
     ----------
-    frame : of its x, y, z. sigma_um : standard uncertainty per axis; None where it is not known.
-    sigma_urad : standard uncertainty of an attitude about each axis; None where it is not known.
+    frame : of its x, y, z. sigma_um : standard uncertainty per axis; None if it is not known.
+    sigma_urad : standard uncertainty of an attitude about each axis; None if it is not known.
     link : for a length, the link that it measures (1-based). ball : for a length, the number of the fixed ball, or of
         another fixed end, from which it is measured to the tip.
     """
@@ -189,9 +189,9 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
         problems.append(
             Problem(
                 where=str(track.path),
-                what="is a length; of what is not said" if instrument.link is None else "is one length",
+                what="is a length of an unknown object" if instrument.link is None else "is one length",
                 allowed="--link or --ball",
-                next_step="say which link it measures with --link, or with --ball from which fixed ball to the tip",
+                next_step="name its link with --link, or its fixed ball with --ball",
             )
         )
     if length and instrument.link is not None and not 1 <= instrument.link <= links:

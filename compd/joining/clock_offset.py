@@ -58,7 +58,7 @@ class ClockOffset:
         dwell no offset is better than another). nan for an offset that a person gave.
     agreement : share of the instrument's variance that a polynomial of the scales explains, at most 1; nan where
         too few places were visited.
-    runner_up : (offset_s, agreement) of the next best; None where there is none.
+    runner_up : (offset_s, agreement) of the next best; None if there is none.
     """
 
     offset_s: float
@@ -82,7 +82,7 @@ class AgreementCurve:
 def estimate_offset(time_s: FloatArray, scale_mm: FloatArray, track: Track) -> ClockOffset:
     """Estimate the offset from the recording's (N,) times and (N, n) scales, and the instrument's track.
 
-    Raises RecordingError where one of them stands still, too few rows overlap, or several offsets fit.
+    Raises RecordingError if one of them stands still, too few rows overlap, or several offsets fit.
     """
     motion = SharedMotion(time_s, scale_mm, track)
     motion.check()
@@ -119,7 +119,7 @@ def evaluate_offset(time_s: FloatArray, scale_mm: FloatArray, track: Track, offs
 def agreement_curve(time_s: FloatArray, scale_mm: FloatArray, track: Track) -> AgreementCurve:
     """The agreement over all offsets at which the two overlap, more closely where `estimate_offset` looks: a picture.
 
-    Raises RecordingError where one of them stands still, or too few places were visited.
+    Raises RecordingError if one of them stands still, or too few places were visited.
     """
     motion = SharedMotion(time_s, scale_mm, track)
     motion.check()

@@ -37,7 +37,7 @@ class Dwell:
     number : from 1, in the order of time.
     rows : (R,) positions of the rows in the recording.
     time_s : (2,) of the first and the last of them.
-    point : id of the place as the recording has it; "" where it has none.
+    point : id of the place as the recording has it; "" if it has none.
     """
 
     number: int
@@ -63,7 +63,7 @@ def find_dwells(recording: Recording) -> tuple[Dwell, ...]:
     or within what its noise can imitate, for LEAST_ROWS rows and LEAST_S seconds. Rows that a person excluded are in
     no dwell.
 
-    Raises RecordingError where there is none.
+    Raises RecordingError if there is none.
     """
     stretches = _stretches_of_points(recording) if recording.point is not None else _still_stretches(recording)
     if not stretches:

@@ -45,7 +45,7 @@ class JoinOptions:
 def choose_by(by: JoinBy | None, export: InstrumentExport) -> JoinBy:
     """The chosen way of joining; by default the time, for an export that is a track in time.
 
-    Raises RecordingError where that is not clear: an export without times, or of single points.
+    Raises RecordingError if that is not clear: an export without times, or of single points.
     """
     if by is not None:
         return by
@@ -88,7 +88,7 @@ def match_export(gauges: Path, export: InstrumentExport, options: JoinOptions) -
     """
     by = choose_by(options.by, export)
     if option := unfit_option(by, options):
-        raise RecordingError(Problem(where=option, what=f"does not go with --by {by}", next_step="leave it out"))
+        raise RecordingError(Problem(where=option, what=f"contradicts --by {by}", next_step="leave it out"))
     if by == "time":
         recording = read_recording(gauges, needs_reference=False)
         return match_by_time(recording, track_of(export), options.instrument, options.offset_s, options.moving)

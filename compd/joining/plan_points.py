@@ -36,7 +36,7 @@ def dwell_of_plan_rows(expected_mm: FloatArray, plan_mm: FloatArray, path: Path)
 
     expected_mm : (S, 3) places of the dwells in {M}, in the order of time. plan_mm : (K, 3) of the plan's rows, in the
         order of measuring; rows at one place, such as those with different loads, may share a dwell.
-    A dwell may be LARGEST_RMS_MM from the plan's place, no more. Raises RecordingError where none is at any place.
+    A dwell may be LARGEST_RMS_MM from the plan's place, no more. Raises RecordingError if none is at any place.
     """
     residual_mm = np.linalg.norm(expected_mm[:, None, :] - plan_mm[None, :, :], axis=2)
     match = match_in_order(residual_mm, LARGEST_RMS_MM)

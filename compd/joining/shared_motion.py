@@ -26,7 +26,7 @@ class SharedMotion:
     ----------
     all_time_s, all_scale_mm : (M,), (M, n) rows with every scale.
     time_s : (N,) of the thinned rows. travel : (N,) path so far in units of the places' spread.
-    terms : (N, p) monomials of the scales; None where there are too few places for any.
+    terms : (N, p) monomials of the scales; None if there are too few places for any.
     period_s : median time between two rows.
     """
 
@@ -62,7 +62,7 @@ class SharedMotion:
         return RecordingError(
             Problem(
                 where=str(self.track.path),
-                what=f"the clock offset cannot be told: {what}",
+                what=f"the clock offset cannot be determined: {what}",
                 value=value,
                 allowed=allowed,
                 next_step="record with moves between dwells of different length, or give --offset S; join points at "

@@ -48,7 +48,7 @@ class TriggerWrite(Section):
     )
     unit: Annotated[int, Field(ge=0, le=247)] = Field(
         default=BROADCAST,
-        description="to whom; 0 on a serial line: to all, and nobody answers. Over Modbus TCP every unit must answer",
+        description="unit; 0 on a serial line: all, without an answer. Over Modbus TCP every unit must answer",
     )
     settle_s: SettleTime | None = Field(
         default=None,
@@ -63,7 +63,7 @@ class TriggerWrite(Section):
             raise refusal("a coil is 0 or 1", "values: [1]", "write another value by function 6")
         if self.unit == BROADCAST and self.settle_s is None:
             raise refusal(
-                "nobody answers unit 0: `settle_s` must say when the devices listen again",
+                "unit 0 gives no answer: `settle_s` must say when the devices listen again",
                 "0.1 to 0.2 s as a rule (Modbus over Serial Line V1.02, 2.4.1), less where the manual says so",
                 "look it up in the devices' manual",
             )

@@ -37,7 +37,7 @@ CONFIRMED = 4  # bytes behind the function of a write's confirmation: the addres
 MOST_REGISTERS, MOST_BITS = 125, 2000  # of one reply
 COIL_ON = 0xFF00
 BROADCAST = 0  # the unit that is all slaves of a serial line
-# What a slave may do about a register that it does not have; damage on the wire says nothing about it.
+# Qualities of a slave's answer for a missing register; damage on the wire does not count.
 REFUSALS = (Quality.DEVICE_ERROR, Quality.TIMEOUT, Quality.MISMATCH)
 
 # Unit, function, first address, count.

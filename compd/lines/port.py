@@ -24,7 +24,7 @@ log = structlog.get_logger()
 # Pulling a plug raises SerialException (an OSError), a plain OSError or termios.error, depending on the call.
 PORT_FAULTS = (OSError, termios.error)
 MOST_BYTES = 4096  # of one read: far more than any reply
-# How often, s, ports without a file descriptor (rfc2217://, loop://) are asked: `select` cannot wait for them.
+# Polling interval (s) of ports without a file descriptor (rfc2217://, loop://), for which `select` cannot wait.
 SLICE_S = 5e-3
 
 
@@ -42,11 +42,11 @@ class Port(Protocol):
         ...
 
     def set_dtr(self, high: bool) -> None:
-        """Set DTR. Raises LineFault (LINE_LOST) where the port has none."""
+        """Set DTR. Raises LineFault (LINE_LOST) if the port has none."""
         ...
 
     def set_break(self, on: bool) -> None:
-        """Begin or end a break. Raises LineFault (LINE_LOST) where the port has none."""
+        """Begin or end a break. Raises LineFault (LINE_LOST) if the port has none."""
         ...
 
     def close(self) -> None:
@@ -197,7 +197,7 @@ class TcpPort:
 
     @property
     def peer(self) -> str:
-        """Address and port of the other end; "" where the connection has ended."""
+        """Address and port of the other end; "" if the connection has ended."""
         try:
             address, port = self._socket.getpeername()[:2]
         except OSError:

@@ -12,19 +12,19 @@ from compd.lines.echo import is_echo
 from compd.lines.port import Port
 
 SHOWN_BYTES = 40  # of a broken reply, in a fault's detail
-# A line that is never quiet is drained for at most so many timeouts.
+# Longest draining (timeouts) of a line that never becomes quiet.
 MOST_DRAIN_TIMEOUTS = 10
-# If the rest of a reply takes longer than this on the wire, s, it is waited for as a whole instead of byte by byte.
+# Least time (s) of a reply's rest on the wire for waiting as a whole instead of byte by byte.
 WORTH_SLEEPING_S = 1e-3
 # Replies of which the longest pause is kept in mind, and so many of them are needed.
 RESTS_IN_MIND, FEWEST_RESTS = 256, 20
 # The rest of a reply may take so much longer than it ever did beyond its time on the wire, and so much, s: an adapter
 # hands over what has come after its latency timer.
 SLOWER_REST, LATER_REST_S = 1.25, 10e-3
-# At least this share of the timeout: a device may pause within a reply now and then.
+# Least wait for a reply's rest, as a share of the timeout: a device may pause within a reply.
 SHORTEST_REST = 0.5
-# A reply whose rest is given up may have lost a byte. The device has become slower where the rest comes after all, or
-# after so many such replies in a row.
+# Replies in a row with an abandoned rest, or one whose rest comes after all, that show a slower device; a single one
+# may have lost a byte.
 MOST_GIVEN_UP = 5
 
 
@@ -108,7 +108,7 @@ class StreamLine:
             self._port.set_break(False)
 
     def rest_until(self, time_s: float) -> None:
-        """Wait until the monotonic time `time_s` (s), for a device that is busy so long."""
+        """Wait until the monotonic time `time_s` (s), for a busy device."""
         rest_s = time_s - self._clock.monotonic()
         if rest_s > 0:
             self._clock.wait(self._no_event, rest_s)

@@ -173,7 +173,7 @@ class ModelDocument(FilePart):
     )
     checksum: str = Field(
         default="",
-        description="of all other keys; whoever changes the file by hand removes this line, and is warned in its use",
+        description="of all other keys; to change the file by hand, remove this line; its use then gives a warning",
     )
 
 

@@ -1,7 +1,7 @@
 """Limits on the connections of the page's server, and which one is closed for a new one.
 
-Whoever reaches the port may connect, so that connections without a token are few, and the oldest of them goes when one
-more comes: nobody can keep a person out. Each token has a share of the others.
+Every host that reaches the port may connect. Connections without a token are therefore few, and a new one replaces the
+oldest, so that no host can lock a person out. Each token has a share of the others.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ _log = structlog.get_logger()
 class CountedLog:
     """Counts by kind; used by the event loop's thread alone.
 
-    time_s : monotonic time, s. later : calls a function after so many s; both those of the running loop if left out.
+    time_s : monotonic time, s. later : calls a function after a time (s). Both default to those of the running loop.
     """
 
     def __init__(

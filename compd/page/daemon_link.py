@@ -1,7 +1,7 @@
 """The page's connection to the daemon: the newest message of each class, and whether the daemon is reachable.
 
 One connection watches READINGS, another asks for STATUS, MODEL and BUDGET. Both are made again by themselves; meanwhile
-`connected` is False and there are no messages, so that nobody shows what was.
+`connected` is False and there are no messages, so that outdated values disappear.
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ class Traces:
             self._ring.put(time_s, [gauge.get("value", math.nan) for gauge in gauges])
 
     def minute(self, end_s: float) -> dict[str, Any]:
-        """The minute before `end_s`: `times_s`, and `values` of each channel at them, None where there was none."""
+        """The minute before `end_s`: `times_s`, and `values` of each channel at them, None if there was none."""
         times_s, values = self._ring.table()
         chosen = (times_s > end_s - FINE_S) & (times_s <= end_s)
         columns = values[chosen].T.round(7)

@@ -48,7 +48,7 @@ class ModelEffects:
 
     def summary(self) -> dict[str, Any]:
         """`applied_um`: what the effects of the applied model move the tip by, in x, y, z, um; `beyond_um`: what the
-        shadow moves it by beyond all that is applied. None where there is nothing. `seconds`: how long they are of.
+        shadow moves it by beyond all that is applied. None if there is nothing. `seconds`: how long they are of.
         """
         if not self._rows:
             return {"seconds": 0.0, "applied_um": None, "beyond_um": None}

@@ -27,7 +27,7 @@ _TIMEOUT_S = 30.0
 # Length of a model's hash in the daemon's messages.
 _HASH = re.compile("[0-9a-f]{16}")
 _NO_HASH = "the model that runs as a shadow is adopted, and named by its hash"
-_NOT_OFFERED = "this is none of the model files in the list"
+_NOT_OFFERED = "this is not a model file in the list"
 _NAME_IT = "choose one of them; another one is given on the command line"
 
 
@@ -156,7 +156,7 @@ class Orders:
         return Consequence(True, text, command)
 
     def _adopt(self, subject: str) -> Consequence:
-        """Of the model that runs as a shadow: its correction is known. subject : its file's name, its hash, or ""."""
+        """Consequence of adopting the shadow model. subject : its file's name, its hash, or ""."""
         running = (self._link.models or {}).get("shadow", {})
         file, hash_ = str(running.get("file", "")), str(running.get("model", ""))
         command = self._command("adopt", file or "FILE", "--daemon", self._link.path)

@@ -14,7 +14,7 @@ from starlette.types import Scope
 from compd.text import nan_to_null
 
 LONGEST_BODY_BYTES = 8192
-LOOKS_ONLY = "this browser may look only"
+LOOKS_ONLY = "this browser is read-only"
 LONGEST_LINE = 200
 # Most characters of a person's name in a log line, which leaves room for role and address.
 _LONGEST_NAME = 100

@@ -45,7 +45,7 @@ def run_page(
     started : called with the origin, as "http://127.0.0.1:7760", once browsers can connect.
     behind : origin of a proxy with TLS in front of this server, as "https://machine.example"; only it is used then.
     machine : the daemon's configuration, by which recordings of this machine are opened.
-    Raises DaemonError where the port is taken.
+    Raises DaemonError if the port is taken.
     """
     listener = _listener(host, port)
     port = listener.getsockname()[1]

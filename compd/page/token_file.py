@@ -28,7 +28,7 @@ class _File(BaseModel):
 def read_tokens(path: Path) -> list[Token]:
     """The tokens in the file, none in an empty one.
 
-    Raises ConfigurationError where others may read it, or it is no such file.
+    Raises ConfigurationError if others may read it, or it is no such file.
     """
     try:
         mode = path.stat().st_mode

@@ -36,7 +36,8 @@ DIRECTIONS = 500
 WARM_UP_HOURS, EVERY_S = 10.0, 600.0
 # Step of the central differences of the tip by each distance, mm.
 _STEP_MM = 1e-3
-# Timing: one row per call, as in the daemon's cycle; many rows in one call, as in a comparison; the best of so many.
+# Timing: one row per call, as in the daemon's cycle; many rows in one call, as in a comparison; and repetitions, of
+# which the best counts.
 ROWS_PER_CALL = 10_000
 _CALLS, _TURNS = 1000, 15
 

@@ -22,7 +22,7 @@ from compd.instruments import (
 from compd.plan_file import NOT_SET, PURPOSE_COLUMN, SPEED_COLUMN, TIP_COLUMNS
 
 PlanFormat = Literal["plan", "sa", "csv", "gcode"]
-# At rest for so long, an instrument takes the mean of its readings, and every gauge is read anew.
+# Dwell (s) in which an instrument averages its readings, and every gauge is read again.
 DWELL_S = 3.0
 # What the first bytes of such a file contain.
 MARKS: Mapping[str, bytes] = {"sa": SA_MARK.encode(), "csv": CSV_MARK.encode(), "gcode": MARK.encode()}

@@ -83,7 +83,7 @@ def _problems(source: Path, sidecar: Path, destination: Path, overwrite: bool) -
         problems.append(
             Problem(
                 where=str(destination),
-                what=f"is nothing into which {source.name} can be converted",
+                what=f"is no format into which {source.name} can be converted",
                 value=destination.suffix,
                 allowed=" or ".join(allowed),
                 next_step="end the name in this",

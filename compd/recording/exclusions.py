@@ -25,7 +25,7 @@ def exclude_rows(recording: Path, rows: Collection[int], reason: str) -> None:
     reason : why; it must be written.
 
     A row that is left out already gets the new reason. Comments in the sidecar stay, and so does the order of its keys.
-    Raises RecordingError where there is no reason, no row, or the sidecar cannot be used.
+    Raises RecordingError if there is no reason, no row, or the sidecar cannot be used.
     """
     if not reason.strip() or not rows:
         what = "needs a reason" if rows else "needs a row"
@@ -41,7 +41,7 @@ def exclude_rows(recording: Path, rows: Collection[int], reason: str) -> None:
 def include_rows(recording: Path, rows: Collection[int]) -> None:
     """Let rows that a person left out count again; others stay unchanged.
 
-    Raises RecordingError where the sidecar cannot be used.
+    Raises RecordingError if the sidecar cannot be used.
     """
     _write(recording, *_with_rows_free(recording, rows))
 

@@ -198,7 +198,7 @@ def _check_reference(
                 "",
                 f"{', '.join(present)}: the sidecar names no reference",
                 allowed="`reference:` in the sidecar",
-                next_step="say in the sidecar what the reference is, or delete the columns",
+                next_step="describe the reference in the sidecar, or delete the columns",
             )
         return
     quantity = sidecar.reference.quantity

@@ -25,7 +25,7 @@ _RENUMBERED = tuple(name for name in ID_COLUMNS if name != "ball")
 
 
 class MergeResult(NamedTuple):
-    """What `merge_recordings` wrote.
+    """Result of `merge_recordings`.
 
     rows : of each recording. starts_s : merged time at which each begins.
     gap_known : whether the sidecars say when the recordings began; if not, ASSUMED_GAP_S lies between them.

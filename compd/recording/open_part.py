@@ -28,7 +28,7 @@ class OpenPartFormat:
         self.head = bytes(self._schema.serialize())
 
     def batch(self, columns: Mapping[str, Sequence[float | None]]) -> bytes:
-        """One batch. columns : name -> (N,) values, None where nothing was measured."""
+        """One batch. columns : name -> (N,) values, None if nothing was measured."""
         return bytes(arrow_batch(self._path, self._schema, columns).serialize())
 
 

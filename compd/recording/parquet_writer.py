@@ -22,7 +22,7 @@ Block = Mapping[str, ArrayLike | Sequence[float | str | None]]
 def arrow_schema(path: Path, names: Iterable[str], text_columns: Iterable[str] = ()) -> Any:
     """The schema of a recording's table: float64, or text in `text_columns`, each field with its `unit`.
 
-    path : the file that needs it. Raises RecordingError where pyarrow is not installed.
+    path : the file that needs it. Raises RecordingError if pyarrow is not installed.
     """
     arrow, _ = arrow_modules(path)
     text = set(text_columns)
@@ -43,7 +43,7 @@ def arrow_batch(path: Path, schema: Any, block: Block) -> Any:
 def write_parquet(file: BinaryIO, path: Path, schema: Any, batches: Iterable[Any]) -> None:
     """Write record batches of the schema to `file` as Parquet, in row groups of ROW_GROUP_ROWS rows.
 
-    path : as messages name it. Raises OSError where the disk does not take it.
+    path : as messages name it. Raises OSError if the disk does not take it.
     """
     arrow, parquet = arrow_modules(path)
     with parquet.ParquetWriter(file, schema, compression="zstd", write_page_checksum=True) as writer:

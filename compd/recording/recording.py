@@ -48,7 +48,7 @@ class Recording:
     row : (N,) row as a spreadsheet shows it, the header being row 1.
     time_s : (N,) seconds from the start, strictly rising, never nan; without `has_time` the number of the row.
     has_time : whether the file has the time of each row; an external model's rows may be in order without it.
-    session, visit, point : (N,) int or None where the column is absent; -1 where the cell is empty.
+    session, visit, point : (N,) int or None if the column is absent; -1 where the cell is empty.
         Text ids of points are numbered in sorted order; `point_labels` has the texts, empty where ids are numbers.
     scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
         None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.

@@ -84,7 +84,7 @@ class RecordingBuilder:
     def build(self, table: Table | None, table_problems: ProblemList, last: bool = True) -> Recording:
         """The Recording of the rows that follow those of the last call.
 
-        table : None where the file has none.  table_problems : what was wrong with it as it was read; what else is
+        table : None if the file has none.  table_problems : what was wrong with it as it was read; what else is
         wrong is added.  last : no more rows follow.
 
         Raises RecordingError with every problem of these rows, with the first also those of the sidecar, with the last

@@ -90,7 +90,7 @@ class Reference(Section):
     @field_validator("quantity", mode="before")
     @classmethod
     def _known_quantity(cls, quantity: Any) -> Any:
-        return _one_of(quantity, get_args(Quantity), "say what the instrument measured")
+        return _one_of(quantity, get_args(Quantity), "name the measured quantity")
 
     @model_validator(mode="before")
     @classmethod
@@ -122,7 +122,7 @@ class Reference(Section):
             return "machine"
         if unit != "um" and frame == "instrument":
             raise refusal(f"only lengths have a frame to be fitted, not {unit}", "machine, or nothing", "delete it")
-        return _one_of(frame, get_args(Frame), "say in which frame the reference columns are")
+        return _one_of(frame, get_args(Frame), "name the frame of the reference columns")
 
     @field_validator("sigma_um", "sigma", mode="before")
     @classmethod
@@ -130,7 +130,7 @@ class Reference(Section):
         unit = info.data.get("unit", "um")
         key = sigma_key(unit)
         if info.field_name != key:
-            raise refusal(f"does not go with the unit {unit}", f"{key}, in {unit}", f"write `{key}:`")
+            raise refusal(f"contradicts the unit {unit}", f"{key}, in {unit}", f"write `{key}:`")
         sigmas = sigma if isinstance(sigma, list) else [sigma]
         numbers = [value for value in sigmas if isinstance(value, int | float) and not isinstance(value, bool)]
         if not sigmas or len(numbers) != len(sigmas) or not all(0 < number < math.inf for number in numbers):

@@ -128,7 +128,7 @@ def _checked_quantities(value: Any) -> dict[str, float] | None:
         raise refusal(
             "is no mapping of quantities to numbers",
             "temperature_link_1_degC: 20.31",
-            "write each with its unit in its name, as its column is called",
+            "write each under the name of its column, which has the unit",
         )
     return {name: float(number) for name, number in value.items()}
 
@@ -212,7 +212,7 @@ class Sidecar:
     excluded : spreadsheet row (header = 1) -> the person's reason.
     provenance, notes : how the recording came to be; kept, never interpreted.
     format : number of the format that the file was written in.
-    quantities_at_zero : by name, from which effects count; None where the sidecar does not say.
+    quantities_at_zero : by name, from which effects count; None if the sidecar does not say.
     """
 
     path: Path

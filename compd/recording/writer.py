@@ -47,7 +47,7 @@ def write_recording(
 def write_recording_files(contents: Mapping[Path, Content]) -> None:
     """Write files of a recording, all whole or none; the last names the directory in messages.
 
-    Raises RecordingError where the disk does not take them.
+    Raises RecordingError if the disk does not take them.
     """
     try:
         # everyone who works on the recording must be able to read it

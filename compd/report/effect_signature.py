@@ -83,7 +83,7 @@ class Signature(NamedTuple):
 def compute_signature(effect: Effect, model: MachineModel, details: MachineDetails) -> Signature:
     """Arrows and curves of one effect with parameters from the middle of their plausible range.
 
-    Raises CompdError where this machine lacks what the effect needs (a plate thickness, revolute axes).
+    Raises CompdError if this machine lacks what the effect needs (a plate thickness, revolute axes).
     """
     needed = needed_quantities(effect, model.links)
     on_machine = _EffectOnMachine(effect, model, details, needed)

@@ -26,7 +26,7 @@ from compd.text import estimate_text, fall_text, nan_to_null, number_text, perce
 def evidence(diagnosis: Diagnosis) -> dict[str, Any]:
     """Plain data: `verdict`, `lines`, `effects`, tables of other findings, and the next measurement.
 
-    A table is `head`, `rows` and `caption`; None where there is nothing to tell.
+    A table is `head`, `rows` and `caption`; None if there is nothing to tell.
     """
     fall = error_fall(diagnosis)
     plain: dict[str, Any] = nan_to_null(

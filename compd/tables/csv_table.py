@@ -38,7 +38,7 @@ def read_table(
     is_header : whether these cells are the header that is looked for.
     id_columns : columns that may hold text; their cells become codes 0, 1, 2 ... in sorted order.
 
-    Returns None where there is no table at all.
+    Returns None if there is no table at all.
     """
     try:
         content = path.read_bytes()
@@ -113,7 +113,7 @@ def _names_are_valid(names: Sequence[str]) -> bool:
 def _read_plain(path: Path, names: list[str], body: bytes, lines: list[str], first_row: int) -> Table | None:
     """The table of a file of plain numbers, parsed at once. lines : those of `body`.
 
-    None where a cell is no number after all: then `_read_any` reports which.
+    None if a cell is no number after all: then `_read_any` reports which.
     """
     number = np.array([number for number, line in enumerate(lines, start=first_row) if line], dtype=np.int64)
     values = _arrow_columns(body, names) if len(body) >= _LEAST_BYTES_FOR_ARROW else None
@@ -133,7 +133,7 @@ def _read_plain(path: Path, names: list[str], body: bytes, lines: list[str], fir
 def _arrow_columns(body: bytes, names: list[str]) -> list[FloatArray] | None:
     """The columns of plain lines by Arrow: the same numbers as Python's in a fifth of its time.
 
-    None where it is not installed, and for a cell that it takes for no number, or an infinite one.
+    None if it is not installed, and for a cell that it takes for no number, or an infinite one.
     """
     try:
         import pyarrow

@@ -30,7 +30,7 @@ _READ_AHEAD_BYTES = 1 << 18
 def arrow_modules(path: Path) -> tuple[Any, Any]:
     """The modules pyarrow and pyarrow.parquet. path : the file that needs them.
 
-    Raises RecordingError where they are not installed.
+    Raises RecordingError if they are not installed.
     """
     try:
         import pyarrow
@@ -52,7 +52,7 @@ class ParquetTable:
     def __init__(self, path: Path, id_columns: Collection[str] = ()) -> None:
         """Open the file. id_columns : columns that may hold text.
 
-        Raises RecordingError where pyarrow is not installed, and for a file that is no Parquet, or cut off, or has
+        Raises RecordingError if pyarrow is not installed, and for a file that is no Parquet, or cut off, or has
         columns that are no numbers.
         """
         self._path = path

@@ -162,5 +162,5 @@ def _check_once(inputs: tuple[AnalogueInput, ...]) -> tuple[AnalogueInput, ...]:
     """ValueError for a repeated input."""
     numbers = [wired.input for wired in inputs]
     if doubled := sorted({number for number in numbers if numbers.count(number) > 1}):
-        raise ValueError(f"input {doubled[0]} stands twice")
+        raise ValueError(f"input {doubled[0]} is given twice")
     return inputs

@@ -65,7 +65,7 @@ class SerialAsciiOptions(ExchangeOptions):
 
     out: str = Field(default="", description="the request; omitted for a device that sends unsolicited readings")
     dtr_pulse_s: Seconds | None = Field(
-        default=None, description="in place of `out`: the request is DTR, LOW for so long, s"
+        default=None, description="in place of `out`: the request is DTR, LOW for this time, s"
     )
     out_terminator: str = Field(default="", description="what ends every request")
     in_: str = Field(alias="in", default="", description="what the reply looks like")
@@ -78,7 +78,7 @@ class SerialAsciiOptions(ExchangeOptions):
     errors: tuple[ErrorReply, ...] = Field(
         default=(), description="looked at before the value; the first that fits counts"
     )
-    init: tuple[Exchange, ...] = Field(default=(), description="said before the first poll and after every fault")
+    init: tuple[Exchange, ...] = Field(default=(), description="sent before the first poll and after every fault")
     echo: Echo | None = Field(default=None, description="finds a reply that is one behind")
     silent_in_menu: bool = Field(default=False, description="the device does not answer while in its menu")
 
@@ -129,7 +129,7 @@ class SerialAsciiOptions(ExchangeOptions):
             if unknown := [number for number in numbers if number not in names]:
                 yield f"`in` has a number {unknown[0] or 'without name'}, channels are {', '.join(names)}"
             if doubled := repeated(numbers):
-                yield f"channel {doubled or 'without name'} stands in several replies"
+                yield f"channel {doubled or 'without name'} is in several replies"
         if shadowed := description.error_like_a_value():
             yield "error {!r} fits nearly every value of the form {!r}".format(*shadowed)
 
@@ -195,7 +195,7 @@ class Description(NamedTuple):
 
     @property
     def lengths(self) -> tuple[int | None, ...]:
-        """Of every reply the device may give."""
+        """Length of every possible reply of the device."""
         return tuple(form.length for form in (*(poll.reply for poll in self.polls), *(form for form, _ in self.errors)))
 
 

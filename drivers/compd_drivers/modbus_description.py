@@ -93,7 +93,7 @@ class ModbusWrite(DescriptionSection):
             raise ValueError("a coil is 0 or 1")
         if self.unit == BROADCAST and self.settle_s == 0:
             raise ValueError(
-                "nobody answers unit 0: `settle_s` says when the devices listen again, 0.1 to 0.2 s as a rule"
+                "unit 0 gives no answer: `settle_s` says when the devices listen again, 0.1 to 0.2 s as a rule"
             )
         return self
 

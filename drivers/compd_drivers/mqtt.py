@@ -60,7 +60,7 @@ class MqttChannel(MeasuredChannel):
         default="", pattern=_POINTER, description="JSON Pointer to the number; left out: the payload is the number"
     )
     time: Pointer | None = Field(
-        default=None, pattern=_POINTER, description="JSON Pointer to the time of measurement; left out: there is none"
+        default=None, pattern=_POINTER, description="JSON Pointer to the time of measurement; omitted for none"
     )
     time_format: Literal["iso8601", "unix_s", "unix_ms", "unix_us", "unix_ns"] = Field(
         default="iso8601", description="iso8601: text with Z or another offset from UTC; unix: a number since 1970, UTC"
@@ -89,7 +89,7 @@ class MqttOptions(PushedGaugeOptions):
         default=None,
         gt=0,
         allow_inf_nan=False,
-        description="the device publishes at least so often, changed or not; needed where a channel has no time",
+        description="longest period of publishing, changed or not; needed if a channel has no time",
     )
 
     @model_validator(mode="after")
@@ -140,9 +140,9 @@ class Mqtt(PushedGauge):
         period_s: float | None = self.options.period_s
         return period_s
 
-    def stamp(self, place: int, message: Message) -> Stamp:
+    def stamp(self, index: int, message: Message) -> Stamp:
         """The time in the payload. Raises LineFault (MISMATCH) if a required one is missing."""
-        described = self._described[place]
+        described = self._described[index]
         if described.time is None or self.options.time_from == "arrival":
             return Stamp(math.nan)
         value = _at(self._json(message), described.time)
@@ -151,8 +151,8 @@ class Mqtt(PushedGauge):
             raise LineFault(Quality.MISMATCH, f"no time in {described.time_format}: {value!r}"[:SHOWN_BYTES])
         return stamp
 
-    def decode(self, place: int, message: Message, time_s: float) -> Reading:
-        described = self._described[place]
+    def decode(self, index: int, message: Message, time_s: float) -> Reading:
+        described = self._described[index]
         if described.status is not None:
             status = _at(self._json(message), described.status.at)
             if not any(status == ok and type(status) is type(ok) for ok in described.status.ok):

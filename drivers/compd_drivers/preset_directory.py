@@ -88,7 +88,7 @@ class PresetDirectory:
 def driver_class(name: str, preset: Preset, base: type[Gauge[Any]]) -> type[Gauge[Any]]:
     """A class that differs from its base driver only in its options.
 
-    Raises ValueError where an option is `like` one that the base driver has not, ValidationError where `sample`
+    Raises ValueError if an option is `like` one that the base driver has not, ValidationError where `sample`
     are no options of this preset.
     """
     camel = _camel(name)

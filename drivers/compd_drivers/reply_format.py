@@ -235,7 +235,7 @@ class ReplyFormat:
             raise ValueError("a number cannot be optional")
         name = match["name"] or ""
         if name in self.channels:
-            raise ValueError(f"channel {name!r} stands twice in the reply")
+            raise ValueError(f"channel {name!r} is twice in the reply")
         number = NumberForm(name, match["kind"], match["flags"] or "", width, decimals, self._mark)
         group = f"n{len(self._numbers)}"
         self._numbers.append(number)

@@ -102,7 +102,9 @@ class FrameChannel(MeasuredChannel):
     at: Annotated[int, Field(ge=0)] = Field(description="its first byte, from 0")
     type: NumberType = Field(description="how the number is stored")
     byte_order: Literal["little", "big"] = Field(default="little", description="of a number in several bytes")
-    invalid: dict[float, ReplyQuality] = Field(default={}, description="numbers that are none, and what they mean")
+    invalid: dict[float, ReplyQuality] = Field(
+        default={}, description="numbers with a special meaning, and their qualities"
+    )
 
     @property
     def length(self) -> int:
@@ -150,7 +152,7 @@ class SerialFrameOptions(ExchangeOptions):
         if self.checksum is not None:
             self.checksum.check(frame, "frame")
         elif frame.checksum.stop:
-            raise ValueError("`frame` has bytes CS, `checksum` must say how they are made")
+            raise ValueError("`frame` has bytes CS, `checksum` must describe them")
         elif sum(byte is not None for byte in frame.fixed) < FEWEST_FIXED_BYTES:
             raise ValueError(f"a frame without a checksum needs {FEWEST_FIXED_BYTES} fixed bytes to be known by")
         for channel in self.channels:

@@ -67,7 +67,7 @@ class SerialGateway:
             self.connections += 1
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._open.append(connection)
-            threading.Thread(target=self._hear, args=[connection], daemon=True).start()
+            threading.Thread(target=self._receive, args=[connection], daemon=True).start()
 
     def _receive(self, connection: socket.socket) -> None:
         with connection, connection.makefile("rb") as stream:

@@ -109,7 +109,7 @@ def join(
     options = JoinOptions(instrument, by.value if by else None, offset, moving, machine, plan)
     chosen = choose_by(options.by, exported)
     if option := unfit_option(chosen, options):
-        raise typer.BadParameter(f"does not go with --by {chosen}", param_hint=option)
+        raise typer.BadParameter(f"contradicts --by {chosen}", param_hint=option)
     joined = match_export(gauges, exported, options)
     write_recording(out, joined.columns, joined.sidecar)
     for line in summary_lines(joined):

@@ -41,7 +41,7 @@ def fault(
             raise CompdError(
                 Problem(
                     where="FAULT",
-                    what=f"is none that {line} can have" if kind else f"{line} needs one",
+                    what=f"is no fault of {line} can have" if kind else f"{line} needs one",
                     value=kind or "",
                     allowed=_quoted([*faults, NO_FAULT]),
                 )

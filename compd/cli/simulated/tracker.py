@@ -104,7 +104,7 @@ def _check_options(shape: ExportFormat, link: int | None, points: bool, unit: st
             Problem(where="--unit", what="is no unit of a length", value=unit, allowed=", ".join(UNIT_KINDS[0]))
         )
     if shape is ExportFormat.carto and link is None:
-        problems.append(Problem(where="--as carto", what="is one length", next_step="say of which link: --link 1"))
+        problems.append(Problem(where="--as carto", what="is one length", next_step="name the link: --link 1"))
     if shape is ExportFormat.carto and points:
         problems.append(Problem(where="--as carto", what="is a track", next_step="leave --points out"))
     if shape is ExportFormat.sa and link is not None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 
-# A bin holds the numbers that agree in sign, exponent and so many bits of the fraction: it is 1 / 1024 wide at most.
+# Bits of the fraction in which the numbers of a bin agree, besides sign and exponent: it is 1 / 1024 wide at most.
 FRACTION_BITS = 10
 _SHIFT = 52 - FRACTION_BITS
 # um; amounts below the first count in the first bin, above the last in the last one.

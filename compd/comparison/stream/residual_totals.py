@@ -14,7 +14,7 @@ from compd.comparison.contributions import Contribution
 from compd.comparison.stream.magnitude_histogram import MagnitudeHistogram
 from compd.comparison.stream.time_envelope import TimeEnvelope
 
-# Outliers of which the rows are kept; nobody reads more.
+# Most outliers whose rows are kept.
 MOST_OUTLIERS_LISTED = 1000
 
 

@@ -128,7 +128,7 @@ class LinuxCnc:
     def ask(self, do: str, timeout_s: float = ANSWER_S, **arguments: Any) -> Any:
         """A request to the panel, and its result. What LinuxCNC has shown meanwhile is appended to `errors`.
 
-        Raises DaemonError where LinuxCNC has gone.
+        Raises DaemonError if LinuxCNC has gone.
         """
         assert self._panel is not None
         self._panel.settimeout(timeout_s)
@@ -185,7 +185,7 @@ class LinuxCnc:
     def with_corrections(self) -> None:
         """Allow motion only with an armed bridge, arm it, and wait until the corrections have arrived.
 
-        Raises DaemonError where it cannot be armed, or is not armed so long.
+        Raises DaemonError if it cannot be armed, or does not stay armed.
         """
         self.set_signal("compd-required", "1")
         self.arm()
@@ -209,7 +209,7 @@ class LinuxCnc:
         return self.values([name])[name]
 
     def values(self, names: Sequence[str]) -> dict[str, Any]:
-        """Of pins and signals, by name."""
+        """Values of pins and signals by name."""
         result: dict[str, Any] = self.ask("values", names=list(names))
         return result
 
@@ -230,7 +230,7 @@ class LinuxCnc:
 
         attend : called with the reason, about once a second, while the feed is held: what an operator does then.
 
-        Raises DaemonError where it does not come to its end; ProgramStopped where LinuxCNC shows an error.
+        Raises DaemonError if it does not come to its end; ProgramStopped where LinuxCNC shows an error.
         """
         shown, start_s = len(self.errors), time.monotonic()
         self.start(program)

@@ -84,7 +84,7 @@ def run_linuxcnc_demo(
     program : G-code, to be run at the machine's zero, which it comes back to.
     speedup : factor by which weather and warm-up run faster than the machine moves.
 
-    Raises CompdError where LinuxCNC is not installed, something does not start, or the program stops.
+    Raises CompdError if LinuxCNC is not installed, something does not start, or the program stops.
     """
     demo = LinuxCncDemo()
     with simulated_daemon(configuration, seed, speedup, ZERO_HOLD_S, effects) as directory:

@@ -85,7 +85,7 @@ class SampleClock:
     def __init__(self) -> None:
         self._offset_s = math.nan
 
-    def heard(self, number: int, now_s: float) -> None:
+    def received(self, number: int, now_s: float) -> None:
         """The newest sample's number, as it arrives."""
         late_s = now_s - number * PERIOD_S
         if not abs(late_s - self._offset_s) < CLOCK_GAP_S:
@@ -153,7 +153,7 @@ class Link:
             *lines, self._rest = (self._rest + piece).split(b"\n")
             samples = [read_sample(line) for line in lines if line and not line.startswith(b"overrun")]
             if samples:
-                self._clock.heard(samples[-1].number, time.monotonic())
+                self._clock.received(samples[-1].number, time.monotonic())
                 self._hand_over(samples)
 
     def end(self) -> None:

@@ -77,7 +77,7 @@ class Operator:
         return self._wait(lambda: bool(self._stat.interp_state == linuxcnc.INTERP_IDLE), COMMAND_S)
 
     def values(self, names: list[str]) -> dict[str, Any]:
-        """Of pins and signals."""
+        """Values of pins and signals."""
         return {name: hal.get_value(name) for name in names}
 
     def held_by(self) -> str:

@@ -19,7 +19,7 @@ from compd.statistics import ridge_inverse, solve_ridge
 
 # Ridge of a parameter without a plausible range, as a share of its column's sum of squares: conditioning alone.
 LEAST_RIDGE = 1e-9
-# Sets of columns are solved in batches of about so many elements of normal equations.
+# Approximate number of elements of normal equations in a batch of sets of columns.
 BATCH = 2_000_000
 
 

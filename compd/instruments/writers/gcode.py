@@ -16,7 +16,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.instruments.writers.target import TargetPoint
 
-# By this a file is known as a programme of compd, which may be written over.
+# Mark of a programme by compd, which may be overwritten.
 MARK = "(compd plan"
 # LinuxCNC reads lines of 255 characters; a person reads 100.
 _COMMENT_WIDTH = 90

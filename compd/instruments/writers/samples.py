@@ -25,7 +25,7 @@ class Samples:
     axes : names of the columns of `values`, as in `InstrumentExport`.
     values : (N, d) mm, attitude in rad.
     time_s : (N,) on the instrument's clock; None for points without a time.
-    names : (N,) of the points; None where they have none.
+    names : (N,) of the points; None if they have none.
     unit : in which lengths are to be written.
     start : calendar time at which `time_s` is 0; needed by shapes that stamp their rows with a date.
     group : of the points, for shapes that have groups.
@@ -41,7 +41,7 @@ class Samples:
 
     @property
     def written_values(self) -> FloatArray:
-        """(N, d) lengths in `unit`, attitude in rad. Raises CompdError where `unit` is no unit of a length."""
+        """(N, d) lengths in `unit`, attitude in rad. Raises CompdError if `unit` is no unit of a length."""
         factor = unit_factor("mm", self.unit)
         if factor is None:
             raise CompdError(Problem(where="unit", what="is no unit of a length", value=self.unit))
@@ -55,7 +55,7 @@ class Samples:
         return (len(self.time_s) - 1) / float(self.time_s[-1] - self.time_s[0])
 
     def header(self, time_name: str) -> list[str]:
-        """Names of the columns with their units. time_name : of the column of the time; "" where there is none."""
+        """Names of the columns with their units. time_name : of the column of the time; "" if there is none."""
         units = ["rad" if axis in ATTITUDE_AXES else self.unit for axis in self.axes]
         return [
             *([time_name] if time_name else []),
@@ -72,7 +72,7 @@ class Samples:
         return [self.start + timedelta(seconds=time_s) for time_s in self.time_s.tolist()]
 
     def need(self, shape: str, *allowed: tuple[str, ...], time: bool = False) -> None:
-        """Raise CompdError where this shape cannot hold the samples.
+        """Raise CompdError if this shape cannot hold the samples.
 
         allowed : sets of axes that it takes. time : whether it needs a time.
         """

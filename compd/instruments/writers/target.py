@@ -12,7 +12,7 @@ from compd.arrays import FloatArray
 class Way:
     """How the tip comes to a place so that every link comes from the side that is wanted.
 
-    via_M_mm : (3,) where it begins. end_M_mm : (3,) where it ends; None where it ends at the place, at rest.
+    via_M_mm : (3,) where it begins. end_M_mm : (3,) where it ends; None if it ends at the place, at rest.
     speed_mm_per_s : of the tip on the way; 0 where any will do.
     """
 
@@ -28,11 +28,11 @@ class TargetPoint:
     Attributes
     ----------
     name : unique in the plan, "P007". purpose : what it is for.
-    tip_M_mm : (3,) place of the tool's tip in {M}; None where the plan sets something else.
+    tip_M_mm : (3,) place of the tool's tip in {M}; None if the plan sets something else.
     settings : what is to be set or held, by name with unit, in the order in which it is shown.
     begins : whether it begins a programme. time_s : after the programme's beginning.
-    way : None where the tip may come as it likes, or where no straight way is as wanted.
-    no_way : why there is no such way; "" where there is one, or none is wanted.
+    way : None if the tip may come as it likes, or where no straight way is as wanted.
+    no_way : why there is no such way; "" if there is one, or none is wanted.
     """
 
     name: str

@@ -1,9 +1,9 @@
 """Polling interval of an unresponsive gauge whose silence makes the others on its line stale.
 
-A gateway before a serial bus serves nobody while it waits for a unit that does not answer, whatever the line's timeout
+A gateway before a serial bus serves no unit while it waits for one that does not answer, whatever the line's timeout
 is. What such a request has cost is known when the next gauge answers. Where that gauge's reading has gone stale
-meanwhile, twice in a row, the silent gauge is asked again only after `TIMES_COST` as long. A gauge that costs nobody a
-reading rests as `PolledGauge` has it.
+meanwhile, twice in a row, the silent gauge is asked again only after `TIMES_COST` as long. A gauge that costs no other
+gauge a reading rests as `PolledGauge` has it.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ The slopes of the windows before, each as long, say more:
   uncertainty, with what the delays of the first and the last reading of the window make of it.
 
 It also says until when the next reading is due: a gauge that is silent for longer may have begun to move. And for how
-long there was no motion: a part that has come to rest just now may leave again before anybody sees it.
+long there was no motion: a part that has just come to rest may leave again unnoticed.
 """
 
 from __future__ import annotations

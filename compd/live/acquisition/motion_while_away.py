@@ -41,7 +41,7 @@ def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -
 def stood_still(memory: TrustMemory, i: int) -> bool:
     """Whether every comparable channel beside `i` has kept its value since `i` was last believed.
 
-    False where there is none.
+    False if there is none.
     """
     n, before = memory.lengths, memory.witness[i]
     compared = (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(before)

@@ -115,8 +115,8 @@ class PolledGauge:
         for reading in readings:
             _check(reading, now_s)
         readings = self._trust.judge(readings, now_s)
-        for place, reading in enumerate(readings):
-            self._publish_unless_kept(place, reading, now_s)
+        for index, reading in enumerate(readings):
+            self._publish_unless_kept(index, reading, now_s)
         self._count(readings, readings, now_s)
 
     def receive(self, received: Sequence[Heard], now_s: float) -> None:
@@ -130,9 +130,9 @@ class PolledGauge:
             _check(each.reading, now_s)
         judged = []
         for each in received:
-            reading = self._trust.receive(each.place, self._if_young(each.reading, now_s), each.window_s, now_s)
-            self._received[each.place] = reading
-            self._publish_unless_kept(each.place, reading, now_s)
+            reading = self._trust.receive(each.channel_index, self._if_young(each.reading, now_s), each.window_s, now_s)
+            self._received[each.channel_index] = reading
+            self._publish_unless_kept(each.channel_index, reading, now_s)
             judged.append(reading)
         self._count(judged, self._received, now_s)
 
@@ -168,7 +168,7 @@ class PolledGauge:
         self.faults[quality] += 1
         self._trust.fail(quality, now_s)
         published = bad(now_s, quality, detail)
-        kept = sum(self._publish_unless_kept(place, published, now_s) for place in range(len(self._slots)))
+        kept = sum(self._publish_unless_kept(index, published, now_s) for index in range(len(self._slots)))
         self._note(quality, detail)
         if not kept:
             self._log_change()
@@ -187,9 +187,9 @@ class PolledGauge:
         """Give every channel `quality` without a poll, for a lost line."""
         self._trust.fail(quality, now_s)
         self.faults[quality] += 1
-        for place in range(len(self._slots)):
-            self._received[place] = bad(now_s, quality, detail)
-            self._publish(place, self._received[place])
+        for index in range(len(self._slots)):
+            self._received[index] = bad(now_s, quality, detail)
+            self._publish(index, self._received[index])
         self._note(quality, detail)
         self._log_change()
 
@@ -201,20 +201,20 @@ class PolledGauge:
         """End a rest."""
         self.rests_until_s = -math.inf
 
-    def _publish_unless_kept(self, place: int, reading: Reading, now_s: float) -> bool:
+    def _publish_unless_kept(self, index: int, reading: Reading, now_s: float) -> bool:
         """Publish a reading; keep a good last reading through a transient fault. Returns whether it was kept."""
-        last = self._published[place]
+        last = self._published[index]
         if reading.quality in TRANSIENT_FAULTS and self._is_fresh(last, now_s):
             return True
-        self._publish(place, reading)
+        self._publish(index, reading)
         return False
 
     def _is_fresh(self, reading: Reading, now_s: float) -> bool:
         return reading.ok and now_s - reading.time_s <= self._stale_after_s
 
-    def _publish(self, place: int, reading: Reading) -> None:
-        self._published[place] = reading
-        self._latest.put(self._slots[place], reading)
+    def _publish(self, index: int, reading: Reading) -> None:
+        self._published[index] = reading
+        self._latest.put(self._slots[index], reading)
 
     def _note(self, quality: Quality, detail: str) -> None:
         self.quality = quality

@@ -30,7 +30,7 @@ class _Listener:
 
     gauge: PolledGauge
     driver: PushedGauge
-    place: int
+    index: int
     address: str
     stale_after_s: float
     received_s: float = math.nan
@@ -59,10 +59,10 @@ class PushedRound:
         self._back_off = back_off
         self._subscribe_s = -math.inf  # time of the next request for refused addresses
         self._listeners = [
-            _Listener(gauge, gauge.driver, place, address, stale_after_s[gauge.name])
+            _Listener(gauge, gauge.driver, index, address, stale_after_s[gauge.name])
             for gauge in gauges
             if isinstance(gauge.driver, PushedGauge)
-            for place, address in enumerate(gauge.driver.addresses)
+            for index, address in enumerate(gauge.driver.addresses)
         ]
         self._noted: dict[str, bool] = {}  # whether the clock was wrong, by gauge
 
@@ -104,7 +104,7 @@ class PushedRound:
             self._note_clock(gauge, received)
             for listener in listeners:
                 for each in received:
-                    if listener.gauge is gauge and listener.place == each.place:
+                    if listener.gauge is gauge and listener.index == each.channel_index:
                         listener.received_s, listener.quality = now_s, each.reading.quality
 
     def _note_clock(self, gauge: PolledGauge, received: Sequence[Heard]) -> None:
@@ -126,5 +126,5 @@ class PushedRound:
             if listener.quality in (Quality.OK, Quality.NEVER_READ, Quality.TIMEOUT):
                 hint = listener.driver.silence_hint
                 text = f"nothing new on {listener.address} for {listener.stale_after_s:g} s{'; ' if hint else ''}{hint}"
-                listener.gauge.receive([Heard(listener.place, bad(now_s, Quality.TIMEOUT, text))], now_s)
+                listener.gauge.receive([Heard(listener.index, bad(now_s, Quality.TIMEOUT, text))], now_s)
                 listener.quality = Quality.TIMEOUT

@@ -4,7 +4,7 @@ A reading that is not where the last ones lead is asked for once more. If the se
 first one was damaged. If it agrees with the first, the measured part has moved, where its acceleration and speed allow
 that; else the gauge has jumped, and is not believed before a person accepts it.
 
-A gauge that was away (its line was lost, or nobody had a reading of it until its last one was stale) may count anew. It
+A gauge that was away (its line was lost, or its last reading became stale) may count anew. It
 is believed where it shows what it showed before and no other gauge has moved meanwhile; else a person accepts it. After
 a shorter gap it may have moved, where other gauges have, too; a scale as far as the other links or its own speed say.
 One that is absolute, or goes on counting while its cable is out, is believed at once.
@@ -196,8 +196,7 @@ class ReadingTrust:
         return max(known, default=math.nan)
 
     def _unexplained_mm(self, sample: GaugeSample) -> float:
-        """By how much (mm) a joint or the frame has changed while the machine stood; 0 within its noise, and over times
-        in which it may drift."""
+        """Change (mm) of a joint or the frame at rest; 0 within its noise, and over times of possible drift."""
         memory, i = self._memory, self._i
         if i < memory.scales or not self._history or sample.time_s - memory.time_s[i] > LONGEST_WINDOW_S:
             return 0.0

@@ -10,7 +10,7 @@ requests since then: if every reply is late from now on, they come at the interv
 ends with it does not count either, since another reply may have been lost. What this cannot see is a reply of an
 earlier round that comes while another is lost for good.
 
-A line with one gauge need not listen for so long. The first answer after a missed reply is thrown away, and the gauge
+A line with one gauge listens for a shorter time. The first answer after a missed reply is thrown away, and the gauge
 is asked again at once: no two requests before were so close, so that an answer which comes as quickly as ever, with
 nothing behind it, belongs to the second of them. Where something comes behind it, the same is tried once more. With
 a timeout of 0.15 s, a gauge that misses two replies in a row, or is late by 0.25 s, is back within 0.5 s.
@@ -152,7 +152,7 @@ class ReplyOrder:
             self.missed(now_s)
 
     def is_noise(self, count: int) -> bool:
-        """Whether so many bytes more than wanted are no reply of a line with one gauge: they are too few."""
+        """Whether this many surplus bytes are too few for a reply of a line with one gauge."""
         return self._one and count < self._shortest
 
     def rest_s(self, passed_s: float) -> float:

@@ -31,18 +31,18 @@ class Step(NamedTuple):
 
 
 class Steps:
-    """Of one length."""
+    """Detects the steps of one length."""
 
     def __init__(self, least_mm: float, tolerance_mm: float) -> None:
-        """`least_mm`: of a step that counts; `tolerance_mm`: readings that differ by no more agree."""
+        """`least_mm`: least size of a step; `tolerance_mm`: largest difference of agreeing readings."""
         self._least_mm = max(least_mm, tolerance_mm)
         self._tolerance_mm = tolerance_mm
-        self._run: list[GaugeSample] = []  # the last readings, which agree with each other
-        self._stood: tuple[float, float] | None = None  # where it stood before (mm), and until when (s)
-        self._is_seen = False  # on the way from there
+        self._run: list[GaugeSample] = []  # the last readings, in agreement with each other
+        self._stood: tuple[float, float] | None = None  # previous rest (mm), and its end (s)
+        self._is_seen = False  # readings since then
 
     def note(self, sample: GaugeSample) -> Step | None:
-        """A reading, in the order of time; the step that it completes, where it completes one."""
+        """Add a reading, in the order of time; return the step that it completes, if any."""
         run = self._run
         if run and abs(sample.value - run[0].value) > self._tolerance_mm:
             if _stands(run):

@@ -47,7 +47,7 @@ def way_by_links(
 ) -> ExpectedWay | None:
     """The way of scale `i` from the last sample before a gap to the first after it, by the motion of the other links.
 
-    None where they do not say: they have not been read for long enough since, or have not moved before nor after.
+    None if they do not say: they have not been read for long enough since, or have not moved before nor after.
     """
     links = [j for j in range(memory.scales) if j != i and memory.doubt[j] == Doubt.NONE]
     paths = [_Path(readings) for readings in map(memory.recent, links) if len(readings) > 1]
@@ -103,7 +103,7 @@ def _side_start(before: Sequence[GaugeSample]) -> GaugeSample:
 
 
 def _side_end(after: Sequence[GaugeSample]) -> GaugeSample | None:
-    """The sample until which the ratio after a gap is taken; None where it has not come yet."""
+    """The sample until which the ratio after a gap is taken; None if it has not come yet."""
     return next((sample for sample in after if sample.time_s >= after[0].time_s + SIDE_S), None)
 
 

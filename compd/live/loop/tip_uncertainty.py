@@ -18,7 +18,7 @@ from compd.model import EffectMemory, GaugeNoise, MachineModel, parameter_varian
 from compd.stated_noise import SCATTER_RATIO
 from compd.units import UM_PER_MM
 
-# A length is the difference of so many: now and at machine zero.
+# Number of readings in a length: now and at machine zero.
 _READINGS = 2
 
 

@@ -13,7 +13,7 @@ from compd.live.acquisition import LOOK_EVERY_S, Acquisition
 from compd.live.memory import Control, Phase, SharedMessage
 from compd.live.system import LARGEST_SHARE, OUT_OF_MEMORY, RationedPriority, limit_memory
 
-# A driver in the middle of a poll may take so long to let go of its line.
+# Longest time (s) for a driver to release its line in the middle of a poll.
 _STOP_WITHIN_S = 0.5
 # Processor time of a line that polls as fast as it goes, with a margin: 115200 baud takes 0.04 (benchmarks/).
 _SHARE_OF_A_FAST_LINE = 0.1

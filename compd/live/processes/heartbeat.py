@@ -8,7 +8,7 @@ _FIRST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 5.0
 # Looks that a process may take until its first beat.
 _STARTS_WITHIN = 100
-# A process that has run for so long has recovered.
+# Time (s) after which a running process has recovered.
 _RECOVERED_S = 10.0
 
 

@@ -12,10 +12,10 @@ import structlog
 
 from compd.clock import Clock
 
-# What a process may log: so many lines per second on average, and so many at once after a quiet time.
+# Limits of a process's log: lines per second on average, and lines at once after a quiet time.
 LINES_PER_S = 50.0
 BURST_LINES = 200
-# A source is read at most so much, so often. A process that prints more waits for its own pipe.
+# Largest read of a source, and its interval. A process that prints more waits for its own pipe.
 READ_BYTES = 64 * 1024
 ROUND_S = 0.05
 LONGEST_LINE_BYTES = 4096

@@ -12,7 +12,7 @@ from compd.clock import Clock
 from compd.errors import DaemonError
 from compd.live.record.table_rows import Message
 
-# A daemon that starts takes seconds; whoever waits for it costs it nothing.
+# Wait (s) for a starting daemon, which takes seconds; waiting costs it nothing.
 _TRY_EVERY_S = 0.5
 
 

@@ -1,4 +1,4 @@
-"""How many clients there may be, and which of them lose their place: nobody on the network can shut the owner out."""
+"""Limits on clients, and which of them lose their place, so that no host on the network can shut the owner out."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAX_TCP_CLIENTS = 24
 IDLE_AFTER_S = 60.0
 # A TCP client that has to show a token first.
 AUTH_WITHIN_S = 5.0
-# After a wrong token: at one try a second nobody guesses one.
+# Delay (s) after a wrong token, which prevents guessing.
 WRONG_TOKEN_REST_S = 1.0
 
 # A peer whose computer or cable is gone is noticed after about 10 s, tcp(7).

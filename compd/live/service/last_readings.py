@@ -25,9 +25,9 @@ from compd.live.system import changed_ports
 
 FILE_NAME = "last-readings.json"
 _FORMAT = 1
-# In tolerances, within which a gauge must come back: so much it may drift and is not written again.
+# Drift of a gauge that is not written again, as a share of the tolerance within which it must come back.
 _WRITTEN_SHARE = 0.5
-# The file is written at most so often, s, and only when a gauge has moved or is not believed any more.
+# Least interval (s) of writing the file, which happens only after a motion or a distrust of a gauge.
 _LOOK_EVERY_S = 1.0
 _END_WITHIN_S = 0.5
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")

@@ -25,8 +25,8 @@ from compd.units import UM_PER_MM
 def tried(gauges: Path, export: InstrumentExport, options: JoinOptions) -> dict[str, Any]:
     """The result of `match_export` for a browser; no file is written.
 
-    `reason` : why they cannot be put together, "" where they can. `lines` : what the command prints. `by` : what puts
-    the rows together, "" where that is not clear. `time` : curve and offset. `rest` : each point with its dwell.
+    `reason` : why they cannot be put together, "" if they can. `lines` : what the command prints. `by` : what puts
+    the rows together, "" if that is not clear. `time` : curve and offset. `rest` : each point with its dwell.
     """
     answer: dict[str, Any] = {"reason": "", "lines": [], "by": "", "time": None, "rest": None}
     joined: JoinResult | RestJoin | None = None

@@ -2,9 +2,9 @@
 // event that took longer than that one is late by the difference. A page that was stalled gets the events that the
 // system kept for it, each later than the next: none of them may pass for the present.
 
-// The two clocks may differ in pace by so much.
+// Largest difference in rate of the two clocks (relative).
 const DRIFT = 2e-4;
-// An event that is later than this, s, is not shown as the present; without any for as long as this the page is alone.
+// Delay (s) from which an event is no longer shown as the present; after as long a silence the page is disconnected.
 export const LATE_S = 0.5;
 export const SILENT_S = 1.5;
 
@@ -31,7 +31,7 @@ export class Age {
     return this.late_s;
   }
 
-  // Seconds since the last event, where that is too long; else how late the last event was, where that is too late.
+  // Seconds since the last event if too long; else the delay of the last event if too late.
   get behind_s() {
     const silent_s = this.now() - this.arrived_s;
     if (silent_s > SILENT_S) return silent_s + this.late_s;

@@ -1,4 +1,4 @@
-// State and reason in words, on top of everything; what is not the present is grey.
+// State and reason in words, on top of everything; outdated ones are grey.
 import { SILENT_S } from "./age.js";
 import { ago, isKnown, tipText } from "./format.js";
 import { appearance, stateName } from "./states.js";
@@ -13,7 +13,7 @@ export function describe(page, behind_s) {
     const text = live ? `no news from the page's server for ${ago(behind_s)}` : "waiting for the page's server";
     return { state: "gone", tone: "gone", sign: "⚡", name: "NOT CONNECTED", reason: text };
   }
-  if (behind_s) return { state: "late", tone: "gone", sign: "⏲", name: "LATE", reason: `what comes is ${ago(behind_s)} old` };
+  if (behind_s) return { state: "late", tone: "gone", sign: "⏲", name: "LATE", reason: `events are ${ago(behind_s)} old` };
   if (!live.connected || !live.setpoint) {
     return { state: "gone", tone: "gone", sign: "⚡", name: "NO DAEMON", reason: live.reason || "it has told nothing yet" };
   }
@@ -42,7 +42,7 @@ export function showBanner(page, behind_s) {
   write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
   write("tip", setpoint?.valid ? tipText(setpoint.tip_M_mm, setpoint.u_tip_um) : "");
   const skew = setpoint?.skew_s === undefined ? "" : `, skew ${ago(setpoint.skew_s)}`;
-  write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${skew}${isKnown(setpoint.u_tip_um) ? "" : "; how far it may be wrong is not known"}` : "");
+  write("age", setpoint?.valid ? `oldest gauge ${ago(setpoint.age_s)}${skew}${isKnown(setpoint.u_tip_um) ? "" : "; bound of its error unknown"}` : "");
   const own = page.slow?.browsers ?? [];
   const armed = own.filter((browser) => browser.armed_s > 0);
   write("connected", own.length ? `${own.length} looking${armed.length ? `, ${armed.map((b) => b.name).join(", ")} armed` : ""}` : "");

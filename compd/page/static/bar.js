@@ -1,14 +1,14 @@
-// A bar of parts about a middle that is nought: what each cause adds, their sum, and beside it what a shadow model adds.
+// A bar of contributions about a middle of zero: each cause, their sum, and beside it that of a shadow model.
 import { causeColour, element } from "./format.js";
 
-// The scale is one of these, µm, so that it does not jump with every number.
+// Possible scales (µm), so that the scale does not jump with every number.
 const SCALES_UM = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 
 export function scaleFor(largest_um) {
   return SCALES_UM.find((scale) => scale >= largest_um) ?? largest_um;
 }
 
-// The scale that is kept while the largest number fits and is not lost in it.
+// The scale, kept while the largest number fits and stays visible.
 export function keptScale(scale_um, largest_um) {
   const wanted = scaleFor(Math.max(largest_um, 0.5));
   return wanted > scale_um || wanted < scale_um / 4 ? wanted : scale_um;
@@ -37,7 +37,7 @@ export function stack(bar, parts_um, scale_um) {
   bar.replaceChildren(...pieces, element("i", { class: "nought" }), sum);
 }
 
-// The sum of the shadow model, from nought.
+// The sum of the shadow model, from zero.
 export function outline(bar, value_um, scale_um) {
   const end = placeOf(value_um, scale_um);
   const made = element("i", { class: "shadow", title: "the shadow model, which is not applied" });
@@ -46,7 +46,7 @@ export function outline(bar, value_um, scale_um) {
   bar.append(made);
 }
 
-// To both sides of a value, as far as its uncertainty.
+// Uncertainty to both sides of a value.
 export function whisker(bar, value_um, u_um, scale_um) {
   const [from, to] = [placeOf(value_um - u_um, scale_um), placeOf(value_um + u_um, scale_um)];
   const made = element("i", { class: "whisker" });

@@ -1,4 +1,4 @@
-// What has moved the tip: one bar for each axis, stacked by cause, with the bound of the tip's error as a whisker where
+// Displacement of the tip: one bar for each axis, stacked by cause, with the bound of the tip's error as a whisker where
 // it is no longer than the bar, and the shadow model's sum as an outline.
 import { keptScale, outline, stack, whisker } from "./bar.js";
 import { causeColour, element, isKnown, signed } from "./format.js";

@@ -1,4 +1,4 @@
-// The command line that something on the page amounts to, to be copied.
+// The equivalent command line of a choice on the page, for copying.
 import { copyButton } from "./copy.js";
 import { element } from "./format.js";
 
@@ -12,7 +12,7 @@ export class CommandLine {
   write(text) {
     this.row.hidden = !text;
     if (this.code.textContent === text) return;
-    // a word is broken where it does not fit a line, and not at its hyphens
+    // long words break at the line's end, never at their hyphens
     this.code.replaceChildren(...text.split(" ").flatMap((word, k) => [k ? " " : "", element("span", {}, word)]));
   }
 }

@@ -8,7 +8,7 @@ export function copyButton(source, title) {
     document.execCommand("copy");
   };
   async function copy() {
-    // a page that is neither on this computer nor behind TLS has no clipboard: there the text is selected, and copied
+    // without TLS, a page from another computer has no clipboard: the text is selected, and copied
     if (navigator.clipboard) await navigator.clipboard.writeText(source.textContent).catch(select);
     else select();
     button.textContent = "Copied";

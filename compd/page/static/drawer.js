@@ -6,7 +6,7 @@ import { Recordings } from "./recordings.js";
 
 // The address as a picture for the camera of another device, which then asks for a token of its own.
 function elsewhere() {
-  if (["127.0.0.1", "localhost"].includes(location.hostname)) return []; // nobody else reaches it
+  if (["127.0.0.1", "localhost"].includes(location.hostname)) return []; // unreachable for other devices
   const code = element("img", { src: "/address.svg", alt: `QR code of ${location.origin}`, loading: "lazy", width: 180 });
   return [element("p", {}, "Open it on another device, with a token of its own: ", element("b", {}, location.origin)), code];
 }
@@ -44,7 +44,7 @@ export class Drawer {
     this.looking = element("ul");
     this.place.replaceChildren(
       element("div", { class: "row head" }, element("h2", {}, "Orders"), button("Close (Esc)", () => this.toggle())),
-      element("p", { class: "note" }, "The page only looks until you arm it. Everybody who looks sees who is armed."),
+      element("p", { class: "note" }, "The page is read-only until you arm it. Every viewer sees who is armed."),
       element("div", { class: "row" }, this.orders.arm),
       element("div", { class: "row" }, order("zero", () => ""), order("accept", () => "all")),
       element("h3", {}, "Model"),

@@ -1,23 +1,23 @@
-// Numbers with their sign and always as many decimals, so that nothing jumps.
+// Numbers with sign and a fixed number of decimals, so that the text does not jump.
 export function signed(value, digits = 1) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const text = Math.abs(value).toFixed(digits);
   return (value < 0 && Number(text) !== 0 ? "−" : "+") + text;
 }
 
-// The tip in {M}, and how far it may be from there; blanks as wide as a figure keep y and z where they are, as far as a
+// The tip in {M}, and the bound of its error; blanks as wide as a figure keep y and z where they are, as far as a
 // metre.
 export function tipText(tip_M_mm, u_tip_um) {
   const axes = ["x", "y", "z"].map((axis, k) => `${axis} ${signed(tip_M_mm[k], 4)}`.padStart(k ? 11 : 0, "\u2007"));
   return `${axes.join("  ")} mm${isKnown(u_tip_um) ? `, within ${u_tip_um.toFixed(u_tip_um < 100 ? 1 : 0)} µm` : ""}`;
 }
 
-// Whether a bound of the tip's error is told: it is null where it is not known, and absent in an invalid setpoint.
+// Whether the bound of the tip's error is known: it is null if unknown, and absent in an invalid setpoint.
 export function isKnown(u_tip_um) {
   return Number.isFinite(u_tip_um);
 }
 
-// Date and time by ISO 8601, in this computer's zone: no country reads them otherwise.
+// Date and time by ISO 8601 in this computer's zone, unambiguous in every country.
 export function dateText(date) {
   const two = (number) => String(number).padStart(2, "0");
   return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${date.toTimeString().slice(0, 8)}`;

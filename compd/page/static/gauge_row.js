@@ -1,10 +1,10 @@
-// One gauge in the table. Its cells stay where they are and only what has changed is written, so that a button in it can
+// One gauge in the table. Its cells stay in place and only changes are written, so that a button in it can
 // be pressed and the focus is not lost.
 import { ago, element, signed } from "./format.js";
 import { drawSpark, rangeOf } from "./spark.js";
 
 const UNITS = { degC: "°C", percent: "%", um: "µm" };
-// What is smaller than this is drawn as flat: mm of a length, else in the quantity's unit.
+// Changes below this are drawn flat: mm for a length, else the quantity's unit.
 const LEAST_MM = 0.001;
 const LEAST_QUANTITY = 0.1;
 
@@ -48,7 +48,7 @@ export class GaugeRow {
     );
   }
 
-  // reading : of a live event. faults : {total, recent} of this gauge, where they are known.
+  // reading : of a live event. faults : {total, recent} of this gauge, if known.
   show(reading, faults) {
     const digits = this.wire.kind === "quantity" ? 2 : 4;
     this.share = reading.fault ? Infinity : (reading.age_s ?? Infinity) / this.wire.stale_after_s;

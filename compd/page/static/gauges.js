@@ -3,9 +3,9 @@ import { ago, element } from "./format.js";
 import { GaugeRow } from "./gauge_row.js";
 import { Traces } from "./spark.js";
 
-// The table is written so often, ms: numbers that change faster cannot be read.
+// Interval (ms) of updates of the table: faster numbers cannot be read.
 const WRITE_EVERY_MS = 500;
-// Good gauges change places when their age has gone from one of so many parts of what is allowed to another.
+// Good gauges are sorted by age in this many classes of the allowed age, so that they seldom change places.
 const PARTS_OF_AGE = 4;
 
 export class Gauges {
@@ -49,14 +49,14 @@ export class Gauges {
     this.since.textContent = !faults ? "" : faults.hour ? "in the last hour" : `since ${new Date(faults.since_s * 1000).toTimeString().slice(0, 5)}`;
   }
 
-  // Every event that was not late, frozen or not: the lines go on behind.
+  // Every event in time, also while frozen: the lines go on in the background.
   note({ unix_s, gauges }) {
     if (!gauges || !this.traces) return;
     if (!this.recalled) this.recall(this.traces, unix_s);
     this.traces.note(unix_s, gauges);
   }
 
-  // An event; with `minute` one that has been, of which faults are not counted.
+  // An event; with `minute` a past one, whose faults are not counted.
   show(event, minute) {
     [this.event, this.minute] = [event, minute];
     const readings = event.gauges;
@@ -84,7 +84,7 @@ export class Gauges {
     return { total: this.faults.total[gauge], recent: this.faults.recent[gauge] };
   }
 
-  // The rows to be shown, in the table in their order.
+  // The visible rows, in the order of the table.
   sorted() {
     const part = (row) => Math.floor(PARTS_OF_AGE * Math.min(row.share, 1));
     const sorted = this.rows.filter((row) => this.open || row.bad).sort((a, b) => b.bad - a.bad || part(b) - part(a));

@@ -1,4 +1,4 @@
-// The last hour: its states as a tape, and what has moved the tip; a click goes there, and what is shown stands still.
+// The last hour: its states as a tape, and the displacement of the tip; a click goes to a moment and freezes the page.
 import { element, ink, prepared } from "./format.js";
 import { NOT_KEPT, clock as exactly } from "./past.js";
 import { appearance, COLOURS, NAMES } from "./states.js";
@@ -8,7 +8,7 @@ const MINUTE_S = 60;
 const HOW_TO = "Click to go there; ← → scrub, space stops and goes on.";
 const clock = (time_s) => new Date(time_s * 1000).toTimeString().slice(0, 5);
 const DRAW_EVERY_MS = 1000;
-// The worse a state, the higher it stands on the tape, px from its edges: not by colour alone.
+// Height of states on the tape, as px from its edges: worse ones are higher, so that colour is not the only sign.
 const INSET = { good: 8, care: 4, bad: 0, gone: 12 };
 
 export class Hour {
@@ -19,7 +19,7 @@ export class Hour {
     tape.addEventListener("click", (event) => this.go(this.timeAt(event.offsetX)));
   }
 
-  // Fetch what has been, and go on from there.
+  // Fetch the past, and continue from there.
   async begin() {
     const response = await fetch("history");
     if (!response.ok) return;
@@ -90,7 +90,7 @@ export class Hour {
       const state = Number.isNaN(row[0]) ? null : NAMES[row[0]];
       const tone = state === null ? "gone" : appearance(state)[0];
       context.fillStyle = COLOURS[tone];
-      // what is not good is never thinner than two pixels
+      // bad states are at least two pixels wide
       const wide = Math.max(pixel * 1.05, tone === "good" ? 0.5 : 2);
       const inset = INSET[tone];
       context.fillRect(width - (this.end_s - this.times[k] + 1) * pixel, inset, wide, height - 2 * inset);
@@ -133,12 +133,12 @@ export class Hour {
     };
   }
 
-  // Stand still at the event that is shown.
+  // Freeze at the shown event.
   stop(event) {
     if (event) this.go(event.unix_s, event);
   }
 
-  // Stand still at `time_s`, or what is kept next to it; of that, `event` is known already.
+  // Freeze at `time_s`, or the nearest stored moment, whose `event` is known already.
   go(time_s, event = null) {
     if (!this.times.length) return;
     const newest_s = Math.max(this.end_s, event?.unix_s ?? 0);

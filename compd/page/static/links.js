@@ -1,11 +1,11 @@
-// One strip for each link: the correction of the last minute with its limits, the number, and what it is made of.
+// One strip for each link: the correction of the last minute with its limits, its value, and its contributions.
 import { keptScale, outline, stack } from "./bar.js";
 import { element, ink, signed } from "./format.js";
 
 const SPAN_S = 60;
-// Charts are drawn so often, ms: a line moves by a pixel a tenth of a second at most.
+// Interval (ms) of drawing the charts: a line moves by at most a pixel in a tenth of a second.
 const DRAW_EVERY_MS = 100;
-// Of a strip, px: on a small screen the tip stands below them without scrolling.
+// Height (px) of a strip: on a small screen the tip fits below them without scrolling.
 const heightOf = (count) => (count === 6 ? 54 : window.innerHeight <= 820 ? 80 : 108);
 
 export class Links {
@@ -81,7 +81,7 @@ export class Links {
     this.rows?.forEach(({ row }, k) => row.classList.toggle("selected", k + 1 === this.page.selected));
   }
 
-  // Every event that was not late, frozen or not: the lines go on behind.
+  // Every event in time, also while frozen: the lines go on in the background.
   note({ setpoint, unix_s: now_s }) {
     if (!setpoint || !this.charts) return;
     this.times.push(now_s);
@@ -103,7 +103,7 @@ export class Links {
     this.corrections = this.corrections.map((line, link) => [...earlier.map((k) => (Number.isNaN(corrections_um[k][link]) ? null : corrections_um[k][link])), ...line]);
   }
 
-  // The minute before a moment that has been: what came by tenths of a second, and before that the seconds of the hour.
+  // The minute before a past moment: events by tenths of a second, and before them by seconds.
   lines({ at_s, times, corrections_um }) {
     const end = this.times.findIndex((time) => time > at_s);
     const fine = this.times.slice(0, end < 0 ? undefined : end);
@@ -113,7 +113,7 @@ export class Links {
     return this.corrections.map((line, link) => [all, [...numbers(link), ...line.slice(0, fine.length)]]);
   }
 
-  // An event; with `minute` one that has been.
+  // An event; with `minute` a past one.
   show({ setpoint }, minute) {
     const now_ms = performance.now();
     if (minute) {

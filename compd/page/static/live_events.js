@@ -1,6 +1,6 @@
-// The events of the page's server: what the machine does, twenty times a second, and what changes slowly.
+// The events of the page's server: motion twenty times a second, and slow changes.
 
-// page: gets id and role of this connection, and the newest events. age: notes how late they are.
+// page: gets id and role of this connection, and the newest events. age: notes their delays.
 // take: {machine(message), live(message, late_s), slow(message)}
 export function listen(page, age, take) {
   const source = new EventSource("live");

@@ -4,11 +4,11 @@ import { Turn } from "./orbit_control.js";
 
 const RODS = { t1: ["supports", 0, "supports", 1], t2: ["supports", 1, "supports", 2], t3: ["supports", 2, "supports", 0], u1: ["supports", 0, "plate", 0], u2: ["supports", 0, "plate", 2], u3: ["supports", 1, "plate", 0], u4: ["supports", 1, "plate", 1], u5: ["supports", 2, "plate", 1], u6: ["supports", 2, "plate", 2] };
 const TRAIL_S = 10;
-// The colour scale ends no nearer to nought, µm: noise does not look like a movement.
+// Least end of the colour scale, µm: noise must not look like a movement.
 const LEAST_UM = 1;
 const VIEWS = { f: [0, 0], s: [Math.PI / 2, 0], t: [0, Math.PI / 2 - 1e-3] };
 
-// Blue below nothing, grey at nothing, vermilion above.
+// Blue below zero, grey at zero, vermilion above.
 export function diverging(share) {
   const [from, to] = [[139, 148, 158], share < 0 ? [0, 114, 178] : [213, 94, 0]];
   const part = Math.min(1, Math.abs(share));
@@ -44,7 +44,7 @@ export class Machine {
     this.turn.look(...VIEWS[key]);
   }
 
-  // An event; with `minute` one that has been.
+  // An event; with `minute` a past one.
   show({ scene, setpoint, gauges }, minute) {
     this.scene = scene;
     if (minute || this.past) this.trail = [];
@@ -69,7 +69,7 @@ export class Machine {
     if (!this.scene) {
       context.fillStyle = ink("--soft");
       context.font = "13px system-ui";
-      context.fillText("no valid setpoint: where the machine is, is not known", 12, 24);
+      context.fillText("no valid setpoint: position of the machine unknown", 12, 24);
       return;
     }
     const { plate, supports, base, platform, tip, supports_moved_um, tip_moved_um } = this.scene;

@@ -27,7 +27,7 @@ const gauges = new Gauges(at("gauge-table"), at("gauges-summary"), {
 const hour = new Hour(at("tape"), at("hour-chart"), at("scrub"), links);
 const parts = [machine, links, budget, gauges];
 const past = new Past((event) => page.frozen && showPast(event, event?.unix_s ?? hour.at_s));
-// In the place of a setpoint that is not there: the numbers before it are not shown on.
+// Stands for a missing setpoint, so that old numbers disappear.
 const NOTHING = { setpoint: { valid: false }, scene: null, budget: null, gauges: null };
 
 function begin(description) {
@@ -51,7 +51,7 @@ function paint() {
   for (const part of parts) part.show(known ? page.live : NOTHING);
 }
 
-// All parts as they were at `at_s`; `event` is null where nothing is known of it.
+// All parts at `at_s`; `event` is null if unknown.
 function showPast(event, at_s) {
   const minute = { at_s, traces: event?.traces ?? gauges.traces.copy(), ...hour.minute(at_s) };
   for (const part of parts) part.show(event?.setpoint ? event : NOTHING, minute);
@@ -73,7 +73,7 @@ function takeSlow(message) {
   gauges.count(message.faults);
 }
 
-// Stand still at `at_s`, of which `event` is known already, or is asked for; or go on.
+// Freeze at `at_s`, whose `event` is known or requested; or go on.
 export function freeze(frozen, at_s, event) {
   if (frozen && !page.frozen) at("loop-note").textContent = `As it was when the page was frozen, ${clock(Date.now() / 1000)}. ${NOT_KEPT}`;
   page.frozen = frozen;
@@ -95,4 +95,4 @@ bindKeys({ page, machine, hour, drawer, freeze });
 listen(page, age, { machine: begin, live: take, slow: takeSlow });
 paint();
 page.parts = { machine, links, budget, gauges, hour };
-window.compd = page; // for tests, and for the curious
+window.compd = page; // for tests and inspection

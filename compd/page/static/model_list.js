@@ -1,4 +1,4 @@
-// The model files that the page offers. Those that run and are elsewhere are shown, and cannot be chosen.
+// The model files offered by the page. Running ones from elsewhere are shown, but cannot be chosen.
 import { dateText, element } from "./format.js";
 
 export class ModelList {

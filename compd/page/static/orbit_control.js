@@ -1,6 +1,6 @@
-// How a picture in three dimensions is looked at: dragged to turn, nearer and further by the wheel.
+// View of a picture in three dimensions: drag to turn, zoom by the wheel.
 export class Turn {
-  // hover: called with the place that is pointed at
+  // hover: called with the position of the pointer
   constructor(canvas, draw, hover = () => {}) {
     Object.assign(this, { draw, turn: 0.5, tilt: 0.25, zoom: 1 });
     let held = null;

@@ -29,7 +29,7 @@ export class Orders {
     this.show();
   }
 
-  // First step: what the order will do.
+  // First step: the consequence of the order.
   async ask(name, subject) {
     this.say("");
     this.impossible = null;
@@ -37,21 +37,21 @@ export class Orders {
     await this.inform(this.question);
   }
 
-  // An order that was not possible may be so now: called whenever the daemon has told something new.
+  // Check again whether the order is possible: called at news from the daemon.
   async askAgain() {
     if (this.impossible) await this.inform(this.question);
   }
 
-  // impossible : why the order of the present question cannot be given, null where it can.
+  // impossible : reason why the present order cannot be given; null if it can.
   async inform(question) {
     const { name, subject } = question;
     const response = await fetch(`orders/${name}?subject=${encodeURIComponent(subject)}`);
     const consequence = await response.json();
-    // an answer that comes after another question was asked, or this one was left, is not shown
+    // ignore an answer after another question, or after leaving this one
     if (question !== this.question || consequence.text === this.impossible) return;
     this.impossible = consequence.possible ? null : consequence.text;
     const title = nameOf(name, subject);
-    // what is shown is what is given: of a shadow that is adopted, the model with this hash
+    // the shown order is the one given: an adopted shadow is the model with this hash
     const give = element("button", { type: "button", id: this.confirm, onclick: () => this.give(name, consequence.subject || subject) }, title);
     give.disabled = !consequence.possible;
     this.showConsequence(element("b", {}, title), element("p", {}, consequence.text), new CommandLine(consequence.command).row, element("div", { class: "row" }, give, element("button", { type: "button", onclick: () => this.leave() }, "Leave it")));
@@ -71,7 +71,7 @@ export class Orders {
 
   // Second step: the order.
   async give(name, subject) {
-    if (!this.armed) return this.say(this.page.role === "operate" ? "Arm the page first." : "This browser may look only.");
+    if (!this.armed) return this.say(this.page.role === "operate" ? "Arm the page first." : "This browser is read-only.");
     this.say("…");
     this.question = null;
     const answer = await post(`orders/${name}`, { id: this.page.id, subject });
@@ -87,7 +87,7 @@ export class Orders {
     if (answer.ok && ["adopt", "no-model"].includes(name)) this.offerToKeep(answer.answer);
   }
 
-  // Of an applied model: whether the daemon starts with it again, and the line of its configuration that keeps it.
+  // For an applied model: whether the daemon starts with it again, and the line of its configuration for that.
   offerToKeep({ applied, kept, kept_text: text }) {
     const line = kept || !applied.file ? "" : text.split("`")[1];
     this.showConsequence(element("p", {}, `The model is ${text}.`), new CommandLine(line, "Copy this line").row);

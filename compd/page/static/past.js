@@ -1,12 +1,12 @@
-// A moment that has been, as a whole: the event that the page's server keeps of it. While keys scrub faster than the
-// server answers, only the newest wish is asked for.
+// A past moment as a whole: the event stored by the page's server. While keys scrub faster than the server answers,
+// only the newest request is sent.
 import { tipText } from "./format.js";
 import { appearance, stateName } from "./states.js";
 
 const at = (id) => document.getElementById(id);
 export const NOT_KEPT = "Timing of the loop, clients and counts of faults are not kept.";
 
-// To a tenth of a second, as often as the last minute is kept.
+// Resolution of a tenth of a second, that of the stored last minute.
 export const clock = (time_s) => {
   const tenths = Math.floor(time_s * 10);
   return `${new Date(tenths * 100).toTimeString().slice(0, 8)}.${tenths % 10}`;
@@ -17,7 +17,7 @@ export class Past {
     Object.assign(this, { take, wanted_s: null, busy: false });
   }
 
-  // Ask for the moment `time_s`; `take(event)` gets it, or null where nothing is known of it.
+  // Request the moment `time_s`; `take(event)` gets it, or null if unknown.
   async ask(time_s) {
     this.wanted_s = time_s;
     if (this.busy) return;
@@ -35,18 +35,18 @@ export class Past {
     this.busy = false;
   }
 
-  // What is not wanted any more is not shown when it comes.
+  // Ignore an answer that is no longer wanted.
   leave() {
     this.wanted_s = null;
   }
 }
 
-// The line under the banner: which moment is shown, and its state, for the banner goes on with the present one.
+// The line under the banner: the shown moment and its state, since the banner stays with the present one.
 export function showMoment(event, at_s) {
   at("frozen-at").textContent = clock(at_s);
   const setpoint = event?.setpoint;
   const sign = setpoint ? appearance(setpoint.state)[1] : "⚡";
-  const state = setpoint ? stateName(setpoint.state) : event ? "NO DAEMON" : "NOTHING IS KNOWN OF IT";
+  const state = setpoint ? stateName(setpoint.state) : event ? "NO DAEMON" : "NO DATA";
   const tip = setpoint?.valid ? `  tip ${tipText(setpoint.tip_M_mm)}` : "";
   at("frozen-state").textContent = `${sign} ${state}${tip}`;
   at("frozen-reason").textContent = setpoint?.reason ?? event?.reason ?? "";

@@ -51,7 +51,7 @@ export class Recordings {
     return [element("tr", {}, element("td", {}, link), ...numbers), element("tr", {}, element("td", { colspan: 3 }, new CommandLine(part.command).row))];
   }
 
-  // As it is typed; a name that is none is refused by the server.
+  // As typed; the server refuses an invalid name.
   showCommands() {
     const name = this.name.value.trim();
     const named = (command) => (/^[\w-]+$/.test(name) ? command.replace("/NAME ", `/${name} `) : command);

@@ -1,4 +1,4 @@
-// What a view of the page works on, with the line in which its problems are said in words.
+// State of a view of the page, with the line for its problems in words.
 export class Session {
   constructor(status) {
     this.status = status;
@@ -8,7 +8,7 @@ export class Session {
     this.status.textContent = text;
   }
 
-  // What goes wrong is said in words; nothing that was shown stays as if it were the answer.
+  // Show an error in words, and remove the old answer.
   async attempt(work) {
     try {
       this.say("");

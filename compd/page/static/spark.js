@@ -1,4 +1,4 @@
-// The last minute of a gauge as a small line, with how far it has gone from lowest to highest.
+// The last minute of a gauge as a small line, with its range.
 import { ink, prepared } from "./format.js";
 
 export const SPAN_S = 60;
@@ -21,7 +21,7 @@ export class Traces {
     return true;
   }
 
-  // What the page's server has kept, before the first of its own.
+  // Stored values of the page's server, before the first own ones.
   recall({ times_s, values }) {
     if (values.length !== this.values.length) return;
     const earlier = times_s.filter((time) => time < (this.times[0] ?? Infinity) - EVERY_S).length;
@@ -39,8 +39,8 @@ export function rangeOf(values) {
   return known.length ? [Math.min(...known), Math.max(...known)] : null;
 }
 
-// The line fills the height, but for what is smaller than `least`, so that noise does not look like a movement. Where
-// there is no value, there is no line.
+// The line fills the height, except for ranges below `least`, so that noise does not look like a movement. It has gaps
+// at missing values.
 export function drawSpark(canvas, times, values, least) {
   const { context, width, height } = prepared(canvas);
   const range = rangeOf(values);

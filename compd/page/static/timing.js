@@ -1,4 +1,4 @@
-// How well the loop keeps time.
+// Timing of the loop.
 import { dateText, element } from "./format.js";
 
 export function showTiming(list, status) {

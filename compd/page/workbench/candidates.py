@@ -104,7 +104,7 @@ class Candidates:
     def card(self, name: str) -> dict[str, Any]:
         """An effect's description, its numbers with plausible ranges, and its fit alone at each choice of constants.
 
-        Raises KeyError where there is no such effect.
+        Raises KeyError if there is no such effect.
         """
         effect, links = self.library[name], self._comparison.aligned.rows.links
         card: dict[str, Any] = nan_to_null(

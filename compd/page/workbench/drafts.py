@@ -24,7 +24,7 @@ class Drafts:
 
     @property
     def effects(self) -> dict[str, Effect]:
-        """By name."""
+        """The drafts by name."""
         return {name: next(iter(candidates.library.values())) for name, candidates in self._candidates.items()}
 
     def add(self, effect: Effect) -> str:

@@ -40,7 +40,7 @@ _QuotingDumper.add_representer(str, _represent_text)
 def entries_of(text: str, path: Path) -> list[Declaration]:
     """The effects declared by a text; none for comments alone.
 
-    path : of the file, for messages. Raises ConfigurationError where it is no YAML.
+    path : of the file, for messages. Raises ConfigurationError if it is no YAML.
     """
     data, _ = parse_yaml(text, path, EFFECTS_FILE)
     entries = data.get(_KEY, data) if isinstance(data, dict) else data
@@ -52,7 +52,7 @@ def entries_of(text: str, path: Path) -> list[Declaration]:
 def with_entry(text: str, declaration: Declaration, path: Path) -> str:
     """The text with this effect: replacing the one with its id, or at the end.
 
-    Raises StateError where the text is written so that an entry cannot be added.
+    Raises StateError if the text is written so that an entry cannot be added.
     """
     entries = entries_of(text, path)
     ids = [entry.get("id") for entry in entries]

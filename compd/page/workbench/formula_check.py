@@ -38,7 +38,7 @@ class FieldProblem(NamedTuple):
 class Checked(NamedTuple):
     """A checked declaration.
 
-    effect : None where it has a mistake.  problems : of its fields; of an effect without mistake, why it is not tried.
+    effect : None if it has a mistake.  problems : of its fields; of an effect without mistake, why it is not tried.
     missing : names in the formula that are neither columns nor parameters.
     """
 

@@ -46,7 +46,7 @@ def _declaration(keys: Mapping[str, Any]) -> dict[str, Any]:
     try:
         json.dumps(declaration, ensure_ascii=False).encode()
     except UnicodeEncodeError as error:
-        what = "a character that is none, which no file can hold"
+        what = "an invalid character, which no file can hold"
         raise StateError(Problem(where="formula", what=what, next_step="type it anew")) from error
     return declaration
 

@@ -19,7 +19,7 @@ def proposed(opened: OpenedRecording, kind: str, effect: str, library: Mapping[s
     """The recording with the model after a proposed step.
 
     kind : "add", "remove" or "fit".  effect : the id that is added or removed.
-    Raises CompdError where the step cannot be made, StateError for another kind.
+    Raises CompdError if the step cannot be made, StateError for another kind.
     """
     aligned, model = opened.aligned, opened.model
     match kind:

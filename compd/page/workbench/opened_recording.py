@@ -41,7 +41,7 @@ class OpenedRecording:
 
     @cached_property
     def comparison(self) -> Comparison:
-        """Of the recording with the model as it is."""
+        """The comparison of the recording with the present model."""
         return compare(self.aligned, self.model.fitted, self.model.covariance)
 
     @cached_property
@@ -99,13 +99,13 @@ class OpenedRecording:
         plain: dict[str, Any] = nan_to_null(summary)
         return plain
 
-    def rows(self, *, every: bool = False) -> bytes:
+    def rows(self, *, all_rows: bool = False) -> bytes:
         """Data of each row for pictures: number, time, position, residual, state, session and quantities.
 
-        every : of all rows, and not only of those that are pictured.
+        all_rows : all of them; else those in pictures.
         """
         aligned, comparison = self.aligned, self.comparison
-        chosen = np.arange(len(aligned.rows)) if every else self.pictured
+        chosen = np.arange(len(aligned.rows)) if all_rows else self.pictured
         recording = aligned.recording
         state = np.where(comparison.used, 0.0, np.where(comparison.outlier, 1.0, 2.0))
         session = np.zeros(len(state)) if recording.session is None else recording.session

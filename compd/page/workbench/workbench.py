@@ -138,9 +138,9 @@ class Workbench:
             "effects": self.sources.paths,
         }
 
-    def rows(self, every: bool) -> bytes:
+    def rows(self, all_rows: bool) -> bytes:
         """See `OpenedRecording.rows`."""
-        return self.opened.rows(every=every)
+        return self.opened.rows(all_rows=all_rows)
 
     def effects(self) -> dict[str, Any]:
         """See `Candidates.summary`; `own` says which effects are not of the library."""
@@ -155,7 +155,7 @@ class Workbench:
     def card(self, name: str) -> dict[str, Any]:
         """See `Candidates.card`; `named` is how a command line names the effect. name : an id, or that of a draft.
 
-        Raises KeyError where there is no such effect.
+        Raises KeyError if there is no such effect.
         """
         candidates, effect = self.drafts.find(name)
         own = name != effect or effect in self.sources.own.effects
@@ -181,7 +181,7 @@ class Workbench:
     def make(self, kind: str, effect: str, revision: int) -> dict[str, Any]:
         """Make the proposed step, and write the model file; return the summary.
 
-        revision : that of which the browser knows. Raises StateError where somebody else was quicker.
+        revision : that of which the browser knows. Raises StateError if somebody else was quicker.
         """
         self._check(revision)
         if self._proposal is None or self._proposal[:2] != (kind, effect):
@@ -204,7 +204,7 @@ class Workbench:
     def exclude(self, rows: Sequence[int], reason: str, revision: int) -> dict[str, Any]:
         """Leave rows out, with the reason in the sidecar; return the summary.
 
-        Raises CompdError where they cannot be left out, StateError where somebody else was quicker.
+        Raises CompdError if they cannot be left out, StateError where somebody else was quicker.
         """
         self._check(revision)
         known = set(self.opened.aligned.recording.row.tolist())

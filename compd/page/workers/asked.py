@@ -16,7 +16,7 @@ class Asked:
         named, so that the server imports none of it. given : its further arguments, plain data.
     seconds : that the answer may take. progress : called with each step that is told, by the worker's thread.
     answer : bytes that are ready to be sent, or the exception.
-    is_cancelled : whether nobody waits any more.
+    is_cancelled : whether the question was abandoned.
     """
 
     question: str

@@ -69,7 +69,7 @@ class Campaign:
         self._visit = 0
 
     def run(self) -> LoggedRows:
-        """All rows of the plan. Raises KinematicsError where a point cannot be reached."""
+        """All rows of the plan. Raises KinematicsError if a point cannot be reached."""
         session = 0
         for item in self._plan.items:
             if item.session != session:

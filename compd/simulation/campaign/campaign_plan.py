@@ -62,7 +62,7 @@ class CampaignPlan:
     """A campaign's items in order of time.
 
     number : of the campaign on the same machine. points_mm : (points, n) scale values. weather : of all sessions.
-    warm_up_s, warm_up : for so long before each session the machine is on, with this heat (one per session); 0: it is
+    warm_up_s, warm_up : time (s) that the machine is on before each session, with this heat (one per session); 0: it is
     switched on as the session begins.
     """
 

@@ -52,7 +52,7 @@ class PlannedCampaign:
         self._visit = 0
 
     def run(self) -> LoggedRows:
-        """All rows. Raises KinematicsError where a place cannot be reached."""
+        """All rows. Raises KinematicsError if a place cannot be reached."""
         for stage in plan_stages(self._rows, self._world.scale_mm, self._world.hold):
             if stage.purpose != "look":
                 self._travel_or_wait(stage)

@@ -74,7 +74,7 @@ class Equilibrium:
         Two passes: first closure and forces with thermal displacements alone, then all displacements that follow from
         them. Forces and joint angles change by parts per million in between, so that no third pass is needed.
 
-        Raises KinematicsError where the links cannot meet.
+        Raises KinematicsError if the links cannot meet.
         """
         strengths, warm, machine, causes = self._strengths, self._warm, self._mechanism, self._causes
         stretch = strengths.support_expansion_ppm_per_K * PPM * warm.since_zero_K("base")

@@ -13,7 +13,7 @@ from compd.simulation.truth.motion import Phase
 
 # The drives are about this much behind their commands, s: the stream comes in bursts, and the motion has none.
 DELAY_S = 0.1
-# Where the stream is late, the motion slows down, and is this much faster afterwards until it has caught up.
+# Factor of speed for catching up after a late stream, which slows the motion down.
 CATCH_UP = 1.1
 # Slower links count as standing: a correction creeps all the time.
 STANDING_MM_PER_S = 0.02

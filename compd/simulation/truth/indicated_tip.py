@@ -35,7 +35,7 @@ class IndicatedTip:
         """(3,) mm, in {M}, or in {P} with the tool on the plate.
 
         readings : scale_1 .., joint_1 .., frame_t1 .. by name, mm. guess : a posture near by.
-        Raises KinematicsError where the links cannot meet.
+        Raises KinematicsError if the links cannot meet.
         """
         mechanism = self._mechanism
         scale_mm = np.array([readings[f"scale_{i + 1}"] for i in range(mechanism.links)])

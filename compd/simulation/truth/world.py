@@ -123,7 +123,7 @@ class World:
         """Advance by `time_s`; in the first `travel_s` of it the links move straight to `scale_mm`, (n,).
 
         For campaigns, which need no state on the way. guess : a posture near the end, for Newton's method.
-        Raises KinematicsError where the links cannot meet.
+        Raises KinematicsError if the links cannot meet.
         """
         self.time_s += time_s
         self._advance_state(scale_mm, guess, time_s, travel_s)
@@ -140,7 +140,7 @@ class World:
     def start_plan(self) -> None:
         """Visit the tour's points once, measure the planned rows, then stand still.
 
-        The walk over the points gives `compd join` the motion by which it aligns two clocks. Raises CompdError where
+        The walk over the points gives `compd join` the motion by which it aligns two clocks. Raises CompdError if
         no rows are planned.
         """
         if not self._rows:

@@ -13,7 +13,7 @@ _IDLE_SOURCE = {"degC": "temperature_room_degC", "hPa": "pressure_hPa", "pct": "
 
 
 class Sensed(Protocol):
-    """What has readings by name: a `World`, or a `LiveWorld`."""
+    """A source of readings by name: a `World`, or a `LiveWorld`."""
 
     @property
     def names(self) -> Sequence[str]: ...

@@ -87,7 +87,7 @@ class Simulation:
     def start(self) -> Configuration:
         """Open every port; returns the daemon's configuration, which is also written to `directory`.
 
-        Raises CompdError where another simulator or a daemon runs in the directory.
+        Raises CompdError if another simulator or a daemon runs in the directory.
         """
         self._own.begin()
         self._running.callback(self._own.end)

@@ -35,7 +35,7 @@ class SimulationDirectory:
     def begin(self) -> None:
         """Take the directory, and remove the remains of a killed simulator.
 
-        Raises CompdError where another simulator or a daemon runs in it, or a file would be replaced that no simulator
+        Raises CompdError if another simulator or a daemon runs in it, or a file would be replaced that no simulator
         wrote.
         """
         self._lock = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)

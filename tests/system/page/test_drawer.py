@@ -74,7 +74,7 @@ def test_a_name_that_is_not_in_the_list_is_refused_and_so_is_a_path(with_models,
         tab.locator("input[aria-label^='Model file']").fill(name)
         tab.locator("#order-shadow").click()
         until(tab, "document.querySelector('#confirm')?.disabled")
-        assert "none of the model files" in tab.locator(".consequence").inner_text()
+        assert "not a model file" in tab.locator(".consequence").inner_text()
         answer = tab.evaluate(
             "(subject) => fetch('orders/shadow', {method: 'POST', body: JSON.stringify({id: compd.id, subject})})"
             ".then((response) => response.status)",
@@ -106,7 +106,7 @@ def test_an_answer_that_comes_after_another_question_is_not_shown(with_models):
         late[0].continue_()
     # the page has had its turn once an answer that was asked for later is read
     tab.evaluate("fetch('orders/shadow?subject=').then((response) => response.json())")
-    assert "none of the model files" not in tab.locator(".consequence").inner_text()
+    assert "not a model file" not in tab.locator(".consequence").inner_text()
     assert tab.locator("#confirm").is_enabled()
 
 

@@ -137,7 +137,7 @@ def test_semicolons_and_decimal_commas_are_seen_and_said(tab, recordings):
     choose(tab, GAUGES, GERMAN_TRACK)
     taken = tab.locator("#taken").inner_text()
     assert "semicolon" in taken
-    assert "as found: comma" in tab.locator("#choice-decimal").inner_text()
+    assert "detected: comma" in tab.locator("#choice-decimal").inner_text()
     say(tab, "decimal", ",", "--decimal ,")
     say(tab, "dates", "dmy", "--dates dmy")
     assert_command_writes_the_same(recordings, "german", write(tab, "german"))
@@ -253,7 +253,7 @@ def test_who_may_look_only_tries_and_cannot_write(open_tab, recordings):
         assert tab.locator("#write").is_disabled()
         assert tab.locator("#file").is_disabled()
         assert tab.locator("#delete").is_disabled()
-        assert "look only" in tab.locator("#writing-note").inner_text()
+        assert "read-only" in tab.locator("#writing-note").inner_text()
         asked = (
             "fetch('join/recording', {method: 'POST', body: JSON.stringify(wizard.choices)}).then(({status}) => status)"
         )

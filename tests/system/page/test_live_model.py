@@ -160,7 +160,7 @@ def test_who_may_look_only_sees_numbers_and_command_lines_and_gives_no_order(chr
         until(tab, "document.querySelector('#confirm-order')")
         assert "compd adopt --none" in tab.locator("#live-model .consequence code").inner_text()
         tab.locator("#confirm-order").click()
-        assert order_answer(tab) == "This browser may look only."
+        assert order_answer(tab) == "This browser is read-only."
 
 
 def test_a_recording_of_another_machine_is_offered_nothing(chromium, live, daemon, directory):

@@ -1,4 +1,4 @@
-"""Pages of other machines, of people who may look only, and of a daemon that goes away."""
+"""Pages of other machines, of people with read-only tokens, and of a daemon that goes away."""
 
 from __future__ import annotations
 

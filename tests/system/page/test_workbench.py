@@ -118,7 +118,7 @@ def test_of_two_browsers_the_second_is_told(open_tab):
     second.locator("#add").click()
     second.wait_for_selector("#confirm")
     second.locator("#confirm").click()
-    until(second, "document.getElementById('problem-line').textContent.includes('somebody else')")
+    until(second, "document.getElementById('problem-line').textContent.includes('changed elsewhere')")
     assert big(second, "summary?.ledger.length") == 0
 
 

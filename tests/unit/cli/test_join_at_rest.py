@@ -94,7 +94,7 @@ def test_points_in_any_order_are_joined_by_their_distances(tmp_path: Path, tip_m
 def test_options_that_do_not_go_together(tmp_path: Path, tip_mm: FloatArray, words: tuple[str, ...]) -> None:
     result = join(listed(tmp_path / "points.txt", tip_mm), "--unit", "mm", *words)
     assert result.exit_code == 2
-    assert "does not go with --by" in result.output
+    assert "contradicts --by" in result.output
     assert not (tmp_path / "joined.csv").exists()
 
 

@@ -135,7 +135,7 @@ def test_points_at_rest_have_names_and_no_time(simulation, tmp_path: Path, capsy
 @pytest.mark.parametrize(
     ("shape", "options", "said"),
     [
-        ("carto", {}, "say of which link: --link 1"),
+        ("carto", {}, "name the link: --link 1"),
         ("carto", {"link": 1, "points": True}, "leave --points out"),
         ("sa", {"link": 1}, "leave --link out"),
         ("csv", {"unit": "furlong"}, "is no unit of a length"),

@@ -89,7 +89,7 @@ FAULTY = {
     "KeepsTheLastLine": ("no reply", "mm as ok, the sensor had"),
     "KeepsTheLastReading": ("no reply", "mm as ok, the sensor had"),
     "HalfALine": ("opened within a line", "mm as ok"),
-    "OldestLine": ("polled seldom: the newest line", "3 lines later: .* nothing was said in this poll"),
+    "OldestLine": ("polled seldom: the newest line", "3 lines later: .* nothing was sent in this poll"),
     "StampOfTheReceipt": ("units and scale", "after the device had sampled"),
     "StampBehindThePulse": ("units and scale", "time stamp 120.000 ms after the device had sampled"),
     "PulsesAgain": ("no request twice", "asks 2 times in one poll, 1 without a fault"),

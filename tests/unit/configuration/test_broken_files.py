@@ -71,7 +71,7 @@ UNREADABLE: dict[str, tuple[bytes, int, str]] = {
     "a number of 5000 digits": (b"a: " + b"9" * 5000 + b"\n", 1, "cannot be read as int"),
     "half a surrogate": (b'a: "\\ud800"\n', 1, "Unicode"),
     "nothing to merge": (b"a: 1\nb: {<<: 5}\n", 2, "nothing that can be merged"),
-    "a key said twice": (b"a: 1\nb: 2\na: 3\n", 3, "said twice, first in line 1"),
+    "a key given twice": (b"a: 1\nb: 2\na: 3\n", 3, "given twice, first in line 1"),
 }
 
 
@@ -247,7 +247,7 @@ WARNINGS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
         [
             ("limits.correction_mm", "200 mm"),
             ("limits.slew_mm_per_s", "stop no jump"),
-            ("sockets.valid_for_s", "a daemon that has died"),
+            ("sockets.valid_for_s", "a dead daemon"),
             ("loop.stale_after_s", "still counts as good"),
             ("loop.hold_s", "5000 s"),
         ],

@@ -84,7 +84,7 @@ CASES: list[tuple[Edit, str, str]] = [
         "link 2 has 0 scales",
         "exactly one",
     ),
-    (lambda t: t.replace("  rate_hz: 200", "  rate_hz: 200\n  rate_hz: 100"), "said twice", "keep one"),
+    (lambda t: t.replace("  rate_hz: 200", "  rate_hz: 200\n  rate_hz: 100"), "given twice", "keep one"),
     (lambda t: t + "\nlooop: {}\n", "looop: unknown key", "did you mean `loop`?"),
     (lambda t: t.replace("state:\n", "stat:\n"), "section `state` is missing", "add `state:`"),
     (lambda t: t + "acquisition: {own_process: [joint]}\n", "acquisition.own_process[1]: no such line", "frame_u"),

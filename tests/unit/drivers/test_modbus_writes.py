@@ -162,7 +162,7 @@ def test_the_rich_map_on_wires_that_go_wrong() -> None:
     [
         ({**INCH, "values": [1, 2]}, "writes one value"),
         ({**START, "values": [2]}, "a coil is 0 or 1"),
-        ({**LATCH, "settle_s": 0}, "nobody answers unit 0"),
+        ({**LATCH, "settle_s": 0}, "unit 0 gives no answer"),
         ({**INCH, "values": [70000]}, "less than or equal to 65535"),
         ({**INCH, "function": 15}, "function"),
     ],

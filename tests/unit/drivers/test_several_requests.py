@@ -62,7 +62,7 @@ def test_what_all_replies_begin_with_is_whose_they_are() -> None:
         ({"in": "%(p1)f"}, "either `in` or `requests`"),
         ({"requests": []}, "either `in` or `requests`"),
         ({"requests": PROBES["requests"][:2]}, r"no %\(p3\)f"),
-        ({"requests": [*PROBES["requests"], {"out": "M4", "in": "%(p1)f"}]}, "p1 stands in several replies"),
+        ({"requests": [*PROBES["requests"], {"out": "M4", "in": "%(p1)f"}]}, "p1 is in several replies"),
         ({"requests": [{"out": "M1", "in": "%f"}]}, "without name|has no"),
     ],
 )

@@ -94,7 +94,7 @@ def test_an_order_is_given_and_logged_by_who_armed_and_nobody_else(guarded, monk
 
 
 @pytest.mark.parametrize(
-    ("token", "outcome"), [("anna's", "done"), ("screen's", "refused (403): this browser may look only")]
+    ("token", "outcome"), [("anna's", "done"), ("screen's", "refused (403): this browser is read-only")]
 )
 def test_files_that_are_brought_and_deleted_and_recordings_are_logged(guarded, token, outcome):
     own = client(guarded, token)

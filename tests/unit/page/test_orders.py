@@ -138,7 +138,7 @@ def test_no_other_name_reaches_the_daemon(link, tmp_path, subject, monkeypatch):
         asyncio.run(orders.do("adopt", subject, BY))
     if subject:
         assert not orders.consequence("shadow", subject).possible
-        with pytest.raises(DaemonError, match="none of the model files"):
+        with pytest.raises(DaemonError, match="not a model file"):
             asyncio.run(orders.do("shadow", subject, BY))
 
 

@@ -71,7 +71,7 @@ def test_um_stays_as_it_was(tmp_path: Path) -> None:
     [
         ({"unit": "furlong"}, ["reference.unit: is unknown", "um, arcsec, deg, mrad, urad, um/m"]),
         ({"unit": 7}, ["reference.unit: is unknown"]),
-        ({"unit": "arcsec", "sigma_um": 1.5}, ["does not go with the unit arcsec", "write `sigma:`"]),
+        ({"unit": "arcsec", "sigma_um": 1.5}, ["contradicts the unit arcsec", "write `sigma:`"]),
         ({"unit": "arcsec", "sigma": -1}, ["is no standard uncertainty", "in arcsec"]),
         ({"unit": "arcsec", "sigma": [1, 1, 1]}, ["sigma has 3 values for 2 reference columns"]),
         ({"unit": "arcsec", "frame": "instrument"}, ["only lengths have a frame to be fitted"]),
@@ -85,7 +85,7 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path, reference: dict[st
 
 def test_sigma_of_a_reference_in_um_is_sigma_um(tmp_path: Path) -> None:
     message = problems_of(tmp_path, pointing("mm"), {"quantity": "tool_position", "frame": "machine", "sigma": 1.5})
-    assert "does not go with the unit um" in message
+    assert "contradicts the unit um" in message
     assert "sigma_um" in message
 
 

@@ -94,7 +94,7 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
     )
     text = problems(wrong)
     for line, what in (
-        ("1 column temperature_link_4_degC", "is nothing that this machine can be told"),
+        ("1 column temperature_link_4_degC", "is no setting of this machine"),
         ("1 column force_w_N", "did you mean force_"),
         ("1 column spindle_rpm", "delete the column"),
         ("2 column tip_x_mm", "is no number"),

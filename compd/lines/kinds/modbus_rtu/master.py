@@ -54,7 +54,7 @@ class RtuMaster(SerialMaster):
     """A `RegisterLine` over a stream of bytes: a serial port, or RTU over TCP. Used by one thread."""
 
     def __init__(self, stream: StreamLine, ask_one_more: bool = True, skip_bytes: int = 0) -> None:
-        """`skip_bytes`: so many bytes before a reply may be damage, where the rest has a CRC that fits."""
+        """`skip_bytes`: most damaged bytes before a reply whose rest has a matching CRC."""
         super().__init__(stream, ask_one_more)
         self._skip_bytes = skip_bytes
         self._function = 0  # of the last request

@@ -37,8 +37,8 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 logging.getLogger("pymodbus").propagate = False
 
 LAST_TRANSACTION = 0xFFFF
-# A connection that stays silent so long, s, beyond the gateway's wait, is closed: a device may have forgotten it. Two
-# units that a slow gateway waits for (1 to 2 s is usual) are no reason.
+# Longest silence (s) of a connection beyond the gateway's wait; it is then closed, since a device may have forgotten
+# it. Above the waits of a slow gateway for two units (usually 1 to 2 s each).
 LONGEST_SILENCE_S = 5.0
 
 
@@ -82,7 +82,7 @@ class ModbusTcp:
 
     @property
     def peer(self) -> str:
-        """Address and port of the device; "" where the connection is closed."""
+        """Address and port of the device; "" if the connection is closed."""
         return "" if self._port is None else self._port.peer
 
     def read_registers(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
@@ -170,7 +170,7 @@ class ModbusTcp:
         self._last_reply_s = self._clock.monotonic()
         self._unanswered, self._busy_until_s = 0, -math.inf
         if self._received:
-            self.close()  # behind the reply to the last request there is nothing that anybody has asked for
+            self.close()  # unsolicited bytes behind the reply to the last request
         if isinstance(reply, ExceptionResponse):
             raise exception_fault(reply.exception_code)
         if reply.function_code != request.function_code:

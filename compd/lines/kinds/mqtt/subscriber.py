@@ -33,9 +33,9 @@ from compd.lines.kinds.mqtt.tls import handshake_failure, tls_context
 from compd.pushed_gauge import Message
 from compd.source_time import Arrival
 
-# How long is waited for the network before paho looks whether the broker is still there, s.
+# Wait (s) for the network before paho checks the broker's presence.
 SLICE_S = 0.1
-# Of one call of `messages`: more waits in the socket meanwhile.
+# Most messages of one call of `messages`; more wait in the socket.
 MOST_MESSAGES = 1000
 LONGEST_PASSWORD = 65535  # bytes, MQTT 3.1.1, 3.1.3.5
 
@@ -43,7 +43,7 @@ LONGEST_PASSWORD = 65535  # bytes, MQTT 3.1.1, 3.1.3.5
 class MqttSubscriber:
     """A `PushedLine` over MQTT. Used by one thread."""
 
-    last_request_s = -math.inf  # nobody asks
+    last_request_s = -math.inf  # there are no requests
     unexpected_bytes = 0
     request_came_back = False
 
@@ -86,7 +86,7 @@ class MqttSubscriber:
 
         One that the broker refuses sends a message with DEVICE_ERROR, and may be asked for again.
 
-        Raises LineFault (LINE_LOST) where the broker does not answer.
+        Raises LineFault (LINE_LOST) if the broker does not answer.
         """
         topics = [topic for topic in dict.fromkeys(addresses) if topic not in self._wanted]
         if not topics:
@@ -142,7 +142,7 @@ class MqttSubscriber:
             self._client.tls_set_context(tls_context(settings.tls))
 
     def _work_until(self, done: Callable[[], bool], what: str) -> None:
-        """Raises LineFault (LINE_LOST) where it is not done within the timeout: the broker `what`."""
+        """Raises LineFault (LINE_LOST) if it is not done within the timeout: the broker `what`."""
         deadline_s = self._clock.monotonic() + self._timeout_s
         while not done():
             if not self._work(deadline_s):

@@ -31,7 +31,7 @@ class MqttPublisher(SimulatedPushedLine):
         broker: tuple[str, int] | None,
         clock: Clock | None = None,
     ) -> None:
-        """`broker`: host and port. Raises CompdError where there is none."""
+        """`broker`: host and port. Raises CompdError if there is none."""
         super().__init__(name, devices, clock)
         if broker is None:
             raise CompdError(

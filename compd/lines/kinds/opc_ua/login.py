@@ -99,7 +99,7 @@ async def _secure(client: Client, security: OpcUaSecurity) -> None:
 def _check_offer(
     endpoints: Sequence[ua.EndpointDescription], policy_uri: str, mode: ua.MessageSecurityMode, server: Certificate
 ) -> None:
-    """Raises ValueError where the server offers no such channel, or has another certificate."""
+    """Raises ValueError if the server offers no such channel, or has another certificate."""
     offered = {(each.SecurityPolicyUri, each.SecurityMode) for each in endpoints}
     if (policy_uri, mode) not in offered:
         names = sorted(f"{uri.partition('#')[2]} {each.name.rstrip('_')}" for uri, each in offered)
@@ -132,7 +132,7 @@ def _private_key(path: str) -> RSAPrivateKey:
 
 
 def _application_uri(own: Certificate) -> str:
-    """The name of the application in its certificate. Raises ValueError where it has none."""
+    """The name of the application in its certificate. Raises ValueError if it has none."""
     try:
         names = own.extensions.get_extension_for_class(SubjectAlternativeName).value
         return names.get_values_for_type(UniformResourceIdentifier)[0]

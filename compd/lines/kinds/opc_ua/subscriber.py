@@ -42,9 +42,9 @@ logging.getLogger("asyncua").addHandler(logging.NullHandler())
 logging.getLogger("asyncua").propagate = False
 
 MS_PER_S = 1e3
-# A server may forget a subscription of which it has heard nothing for so long, s.
+# Lifetime (s) of a subscription without a request, after which the server may drop it.
 LIFETIME_S = 30.0
-# So many keep-alives may be missing in a row, and the timeout be over, before the server is taken for lost.
+# Missed keep-alives in a row, and after the timeout, that show a lost server.
 MISSED_KEEP_ALIVES = 3
 NOT_FILTERED = (
     StatusCodes.BadMonitoredItemFilterUnsupported,
@@ -93,7 +93,7 @@ class OpcUaSubscriber:
 
         One that the server refuses sends a message with DEVICE_ERROR, and may be asked for again.
 
-        Raises LineFault (LINE_LOST) where the server does not answer.
+        Raises LineFault (LINE_LOST) if the server does not answer.
         """
         if nodes := [node for node in dict.fromkeys(addresses) if node not in self._sampling_s]:
             self._run(self._monitor(nodes))

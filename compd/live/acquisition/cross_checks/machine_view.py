@@ -13,7 +13,7 @@ from compd.live.memory import TrustMemory
 
 
 class WiredLength(NamedTuple):
-    """What a channel measures: a length, or any other quantity.
+    """Kind of a channel: a length, or any other quantity.
 
     kind : of the gauge. meaning : for people, as "scale 1". sign : +1 or -1. link : from 1, of a scale or a joint; 0.
     role : S, Ra, Rb or B of a joint comparator; "". length_mm : of the distance that a frame comparator measures; nan.

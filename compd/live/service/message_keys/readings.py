@@ -18,19 +18,15 @@ class MotionKeys(Keys):
     u_mm_per_s: float | None = Field(
         default=None, description="standard uncertainty of the speed; absent while it is not known"
     )
-    horizon_s: float = Field(description="for so long after the reading the motion is taken to go on, s")
+    horizon_s: float = Field(description="time after the reading for which the motion is assumed to go on, s")
     mean_mm_per_s: float | None = Field(default=None, description="mean speed over the last `window_s`")
     window_s: float | None = Field(default=None, description="how long before the reading that window begins, s")
-    due_s: float | None = Field(
-        default=None, description="so long after the reading the next one is there at the latest, s"
-    )
+    due_s: float | None = Field(default=None, description="latest time of the next reading after this one, s")
     scatter_mm: float | None = Field(
         default=None,
         description="standard deviation of one reading at rest, as the last ones show it; absent while it is not known",
     )
-    rest_s: float | None = Field(
-        default=None, description="for so long no reading has shown motion, s, up to some seconds"
-    )
+    rest_s: float | None = Field(default=None, description="time without motion in the readings, s, up to some seconds")
     late_s: float | None = Field(
         default=None, description="by how much later than the reading's time the device may have sampled, s"
     )

@@ -106,7 +106,7 @@ class ChannelStatusKeys(Keys):
     quality: Quality = Field(description="`ok`, or why there is no value")
     measures: str | None = Field(default=None, description="what the wiring says that it measures")
     noise_um: float | None = Field(
-        default=None, description="of a length: standard deviation of one reading, um; absent where nobody states it"
+        default=None, description="of a length: standard deviation of one reading, um; absent if not stated"
     )
     noise_from: str | None = Field(
         default=None, description="who states it: `configuration`, or `driver` with the source in its data sheet"

@@ -2,7 +2,7 @@
 import { ink, prepared } from "../format.js";
 import { Axes } from "./axes.js";
 
-// Of the width, where the offset that is best is shown more closely.
+// Share of the width for the enlarged surroundings of the best offset.
 const NEAR = 0.35;
 
 export class AgreementPicture {
@@ -10,7 +10,7 @@ export class AgreementPicture {
     this.canvas = canvas;
   }
 
-  // Draws it; what it shows, in words.
+  // Draws it; returns a description.
   draw({ offset_s, agreement, window_s, peak, next_best }) {
     const { context, width, height } = prepared(this.canvas);
     const wide = peak ? (1 - NEAR) * width : width;
@@ -28,7 +28,7 @@ export class AgreementPicture {
     return `Best agreement ${peak[1] === null ? "not known" : peak[1].toFixed(4)} at an offset of ${peak[0].toFixed(3)} s${next}. 1: the scales explain all of the instrument's motion.`;
   }
 
-  // Where too little overlaps there is none, and below 0 nothing agrees.
+  // nan for too little overlap; below 0 there is no agreement.
   curve(axes, offset_s, agreement) {
     const { context } = axes;
     context.strokeStyle = ink("--line");

@@ -18,7 +18,7 @@ export class Axes {
     return [this.left + across * (this.right - this.left), this.bottom - up * (this.bottom - this.top)];
   }
 
-  // What the axes are, with numbers of so many digits at their ends.
+  // Labels of the axes, with numbers of this many digits at their ends.
   label(xText, yText, digits) {
     const { context, left, right, top, bottom } = this;
     const text = (align, words, x, y) => {

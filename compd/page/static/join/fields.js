@@ -1,4 +1,4 @@
-// Labelled fields whose values are choices of the wizard; the first option of a list says what was found without one.
+// Labelled fields whose values are choices of the wizard; the first option of a list is the detected default.
 import { element } from "../format.js";
 
 class Field {
@@ -13,7 +13,7 @@ class Field {
     return this.control.value.trim() || null;
   }
 
-  // Hidden where it does not go with the other choices: then it is not chosen either.
+  // Hidden, and not chosen, if it contradicts the other choices.
   offer(offered) {
     this.label.hidden = !offered;
     if (offered || this.wizard.choices[this.key] == null) return;
@@ -30,7 +30,7 @@ export class Choice extends Field {
   // options: of [value, text]
   constructor(wizard, key, label, options = []) {
     super(wizard, key, label, element("select"));
-    this.options(options, "as found");
+    this.options(options, "detected");
   }
 
   options(options, automatic) {
@@ -41,7 +41,7 @@ export class Choice extends Field {
     this.control.value = this.wizard.choices[this.key] ?? "";
   }
 
-  // What stands there without a choice.
+  // The text without a choice.
   automatic(text) {
     this.options(JSON.parse(this.shown).slice(1), text);
   }

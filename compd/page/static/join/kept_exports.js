@@ -1,4 +1,4 @@
-// What is kept of exports beside what is allowed, and deleting one, which is asked for once.
+// Stored exports against their limits, and deletion of one after a confirmation.
 const MB = 2 ** 20;
 
 export class KeptExports {

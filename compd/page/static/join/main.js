@@ -19,4 +19,4 @@ wizard.panels = [
   new Writing(wizard, { name: at("name"), button: at("write"), link: at("open"), note: at("writing-note"), command: at("command") }),
 ];
 wizard.attempt(() => wizard.list());
-window.wizard = wizard; // for tests, and for the curious
+window.wizard = wizard; // for tests and inspection

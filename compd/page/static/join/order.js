@@ -1,8 +1,8 @@
-// Which dwell of the machine each point went to, and how far it is from there once all are laid over each other.
+// Assignment of points to the machine's dwells, and their distances after registration.
 import { ink, prepared } from "../format.js";
 import { Axes } from "./axes.js";
 
-// Of the width, for which point went where; the rest for the distances.
+// Share of the width for the assignment; the rest shows the distances.
 const ORDER = 0.5;
 
 export class OrderPicture {
@@ -10,7 +10,7 @@ export class OrderPicture {
     this.canvas = canvas;
   }
 
-  // Draws it; what it shows, in words. Without a dwell a point stands on the lowest line.
+  // Draws it; returns a description. Points without a dwell are on the lowest line.
   draw({ line, dwell_number, residual_um, dwells }) {
     const { context, width, height } = prepared(this.canvas);
     const lines = [line[0], line.at(-1)];

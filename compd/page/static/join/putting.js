@@ -1,4 +1,4 @@
-// How rows are put together, what came of trying it, and a picture of that.
+// The way of joining rows, the result of its trial, and a picture of that.
 import { micro } from "../format.js";
 import { Check, Choice, Quantity } from "./fields.js";
 import { AgreementPicture } from "./agreement.js";
@@ -42,7 +42,7 @@ export class Putting {
     const { by, plan, frame, sigma_urad, link, ball, offset_s, moving } = this.fields;
     const chosen = choices.by || table.by;
     const length = table.axes.includes("length");
-    by.automatic(table.by ? `as found: ${BY[table.by]}` : "choose …");
+    by.automatic(table.by ? `detected: ${BY[table.by]}` : "choose …");
     frame.automatic("the instrument's own, fitted");
     frame.offer(!length);
     plan.offer(chosen === "name");

@@ -1,4 +1,4 @@
-// How the export is read: its first rows, above each column what it is taken for, and what else a person may say of it.
+// Reading of the export: its first rows, the role of each column, and further options.
 import { element } from "../format.js";
 import { Check, Choice, Quantity } from "./fields.js";
 
@@ -32,7 +32,7 @@ export class Reading {
     this.guess.disabled = !choices.columns;
     if (table === this.shown) return;
     this.shown = table;
-    this.note.textContent = !table ? "choose an export" : table.points ? `${table.points} rows are read; the first ${table.rows.length} of the file are shown` : "not read yet: say what is asked";
+    this.note.textContent = !table ? "choose an export" : table.points ? `${table.points} rows are read; the first ${table.rows.length} of the file are shown` : "not read yet: answer the questions";
     this.problems.replaceChildren(...(table?.problems ?? []).map((problem) => element("p", { class: "problem" }, problem)));
     this.showTaken(table);
     this.showTable(table);
@@ -40,13 +40,13 @@ export class Reading {
     const { shape, unit, angle_unit, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
     const { assumed } = table;
     const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
-    shape.automatic(`as found: ${SHAPES.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
-    unit.automatic(lengthUnit && !choices.unit ? `as found: ${lengthUnit[1]}` : "as the file says");
+    shape.automatic(`detected: ${SHAPES.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
+    unit.automatic(lengthUnit && !choices.unit ? `detected: ${lengthUnit[1]}` : "as the file says");
     angle_unit.offer(table.roles.some((role) => /^r[xyz]$/.test(role)));
     angle_unit.automatic("as the file says");
-    decimal.automatic(assumed["decimal mark"] && !choices.decimal ? `as found: ${assumed["decimal mark"]}` : "as found");
+    decimal.automatic(assumed["decimal mark"] && !choices.decimal ? `detected: ${assumed["decimal mark"]}` : "detected");
     const order = /dates ([a-z]+-[a-z]+-[a-z]+)/.exec(assumed.time ?? "");
-    dates.automatic(order && !choices.dates ? `as found: ${order[1].replaceAll("-", " ")}` : "as found");
+    dates.automatic(order && !choices.dates ? `detected: ${order[1].replaceAll("-", " ")}` : "detected");
     rate_hz.offer(!table.roles.includes("time"));
     clock_set_back.offer(table.roles.some((role) => bare(role) === "time"));
     group.offer(table.groups.length > 1 || choices.group != null);
@@ -73,7 +73,7 @@ export class Reading {
     if (focused) document.getElementById(focused)?.focus();
   }
 
-  // What is said of each column, or else guessed.
+  // The chosen or guessed role of each column.
   columns(table) {
     return this.wizard.choices.columns?.length === table.roles.length ? this.wizard.choices.columns : table.roles;
   }
@@ -85,7 +85,7 @@ export class Reading {
     return select;
   }
 
-  // A role that another column has is exchanged: there is one of each.
+  // A role of another column is exchanged, since each is unique.
   change(k, role) {
     const columns = [...this.columns(this.wizard.table)];
     const other = role === "-" ? -1 : columns.findIndex((own, i) => i !== k && bare(own) === bare(role));

@@ -1,4 +1,4 @@
-// The recording of the gauges, and the export of the instrument: chosen from a list, or brought from this computer.
+// The recording of the gauges, and the export of the instrument: chosen from a list, or uploaded from this computer.
 import { element } from "../format.js";
 
 export class Sources {
@@ -22,7 +22,7 @@ export class Sources {
       this.recording.replaceChildren(...options(sources.gauges, "there is none without a reference"));
       this.exported.replaceChildren(...options(sources.exports, "there is none yet"));
       this.file.disabled = !sources.may_write;
-      this.note.textContent = `Recordings without a reference in ${sources.directory}, exports in ${sources.directory}/exports. ${sources.may_write ? "What you bring is copied there." : "This browser may look only: it brings and writes nothing."}`;
+      this.note.textContent = `Recordings without a reference in ${sources.directory}, exports in ${sources.directory}/exports. ${sources.may_write ? "Uploads are copied there." : "This browser is read-only: no uploads, no writing."}`;
     }
     this.recording.value = choices.recording ?? "";
     this.exported.value = choices.export ?? "";

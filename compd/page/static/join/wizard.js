@@ -1,9 +1,9 @@
-// What is chosen in the join wizard, what the server reads of it, and what was tried.
+// State of the join wizard: choices, the server's reading, and the trial.
 import { element } from "../format.js";
 import { post } from "../post.js";
 import { Session } from "../session.js";
 
-// Why a question is given up: what is chosen now is another.
+// Reason of an abandoned request: the choices have changed.
 const REPLACED = new Error("replaced");
 
 export class Wizard extends Session {
@@ -14,19 +14,19 @@ export class Wizard extends Session {
     status.after(this.cancelButton);
   }
 
-  // The server ends what nobody waits for.
+  // Abort the request; the server ends its computation.
   giveUp(reason) {
     for (const asking of this.running) asking.abort(reason);
   }
 
-  // An order to the server with all that is chosen. Throws its reason.
+  // An order to the server with all choices. Throws its reason.
   async ask(path, signal) {
     const answer = await post(`join/${path}`, this.choices, signal);
     if (!answer.ok) throw new Error(answer.reason ?? "the page's server does not answer");
     return answer;
   }
 
-  // As `ask`, with a button that cancels it; nothing is answered where other choices have taken its place.
+  // As `ask`, with a button that cancels it; no answer if the choices have changed meanwhile.
   async askPatiently(path) {
     const asking = new AbortController();
     this.running.add(asking);
@@ -48,7 +48,7 @@ export class Wizard extends Session {
     this.show();
   }
 
-  // Other choices: the export is read anew, and what was tried with the old ones is gone.
+  // Other choices: read the export again, and discard the old trial.
   async change(choices) {
     Object.assign(this.choices, choices);
     if (Object.keys(choices).some((key) => key !== "name")) this.trial = null;
@@ -57,7 +57,7 @@ export class Wizard extends Session {
     this.show();
     if (!this.choices.export) return;
     const answer = await this.attempt(() => this.askPatiently("table"));
-    if (asked !== this.asked) return; // somebody has gone on choosing
+    if (asked !== this.asked) return; // the choices have changed meanwhile
     Object.assign(this, answer ? { table: answer, command: answer.command } : { command: "" });
     this.show();
   }
@@ -73,22 +73,22 @@ export class Wizard extends Session {
 
   // An export from this computer, kept beside the recordings.
   async bring(file) {
-    if (file.size > this.sources.most_bytes) throw new Error(`${file.name} is too large: ${(file.size / 2 ** 20).toFixed(0)} MB; ${this.sources.most_bytes / 2 ** 20} MB may be brought.`);
+    if (file.size > this.sources.most_bytes) throw new Error(`${file.name} is too large: ${(file.size / 2 ** 20).toFixed(0)} MB; ${this.sources.most_bytes / 2 ** 20} MB are allowed.`);
     const response = await fetch(`join/exports?${new URLSearchParams({ name: file.name })}`, { method: "POST", headers: { "Content-Type": "application/octet-stream" }, body: file });
     const answer = await response.json().catch(() => ({}));
-    if (!response.ok) throw new Error(answer.reason ?? `${file.name} could not be brought`);
+    if (!response.ok) throw new Error(answer.reason ?? `${file.name} could not be uploaded`);
     await this.list();
     await this.choose(answer.name);
   }
 
-  // What is kept of exports, beside what is allowed.
+  // Stored exports against their limits.
   async usage() {
     const response = await fetch("join/exports");
     if (!response.ok) throw new Error("what is kept of exports cannot be told");
     return response.json();
   }
 
-  // An export that is not needed any more; there is no way back.
+  // Delete an export for good.
   async remove(name) {
     const response = await fetch(`join/exports/${encodeURIComponent(name)}`, { method: "DELETE" });
     const answer = await response.json().catch(() => ({}));
@@ -98,7 +98,7 @@ export class Wizard extends Session {
     await this.list();
   }
 
-  // Another export begins with nothing said about its columns.
+  // Another export starts without roles of its columns.
   choose(name) {
     this.table = null;
     return this.change({ export: name, columns: null, group: null, sheet: null });

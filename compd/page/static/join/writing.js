@@ -1,4 +1,4 @@
-// The new recording: its name, what it amounts to as a command line, and where to open it.
+// The new recording: its name, the equivalent command line, and the link to open it.
 import { CommandLine } from "../command_line.js";
 
 export class Writing {
@@ -13,7 +13,7 @@ export class Writing {
   show({ command, trial, choices, sources }) {
     this.command.write(command);
     this.button.disabled = !sources?.may_write || !choices.name || !trial || Boolean(trial.reason);
-    this.note.textContent = !sources || sources.may_write ? (trial && !trial.reason ? "Give a name, and write it." : "Try it first.") : "This browser may look only; the command line does the same.";
+    this.note.textContent = !sources || sources.may_write ? (trial && !trial.reason ? "Give a name, and write it." : "Try it first.") : "This browser is read-only; the command line does the same.";
     if (this.written !== JSON.stringify(choices)) this.link.hidden = true;
     else this.note.textContent = this.message;
   }

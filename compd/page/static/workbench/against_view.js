@@ -5,7 +5,7 @@ import { Dots } from "./dots.js";
 const MARGIN = { left: 56, right: 12, top: 12, bottom: 34 };
 
 export class AgainstView {
-  // quantity: of the rows, as the server names it; name: for people
+  // quantity: of the rows, by the server's name; name: for display
   constructor(quantity, name) {
     Object.assign(this, { quantity, name, dots: new Dots() });
   }

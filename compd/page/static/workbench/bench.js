@@ -1,4 +1,4 @@
-// What is open in the workbench: its numbers, its rows, what is tried on it, and what is asked of the server for it.
+// The open recording of the workbench: numbers, rows, the trial, and requests to the server.
 import { post } from "../post.js";
 import { Session } from "../session.js";
 import { fetchArrays } from "./arrays.js";
@@ -28,7 +28,7 @@ export class Bench extends Session {
     return answer;
   }
 
-  // A change of the model or of the rows, which the server refuses where somebody else was quicker.
+  // A change of the model or of the rows; the server refuses it after another browser's change.
   async change(path, keys) {
     await this.show(await this.post(path, { ...keys, revision: this.summary.revision }));
   }
@@ -42,7 +42,7 @@ export class Bench extends Session {
     await this.show(answer);
   }
 
-  // Another state of what is open: every panel begins anew.
+  // Another state of the open recording: every panel starts again.
   async show(summary) {
     Object.assign(this, { summary: null, trial: null, tried_rms: null });
     this.rows = await this.arrays("rows");
@@ -52,7 +52,7 @@ export class Bench extends Session {
     await Promise.all(this.panels.map((panel) => panel.begin(this)));
   }
 
-  // With these numbers of the effect that is tried; null for none.
+  // Try the effect with these numbers; null for none.
   tried(theta) {
     const left = theta && this.trial ? this.trial.residual(theta) : null;
     this.tried_rms = left && this.trial.rms(theta);

@@ -1,4 +1,4 @@
-// One effect: what it is, a slider for each of its numbers, its fit, what it may be mistaken for, and the step that adds it.
+// One effect: its description, a slider for each number, its fit, similar effects, and the step that adds it.
 import { CommandLine } from "../command_line.js";
 import { element, micro } from "../format.js";
 import { ConstantSlider } from "./constant_slider.js";
@@ -10,7 +10,7 @@ import { Trial } from "./trial.js";
 const words = (effect) => effect.replaceAll("_", " ");
 
 export class Card {
-  // plan: called with the effects that a measurement is to tell apart
+  // plan: called with the effects that a measurement is to distinguish
   constructor(place, plan = null) {
     Object.assign(this, { place, plan, theta: [], card: null, variant: 0 });
   }
@@ -31,7 +31,7 @@ export class Card {
       this.show(bench.summary.commands.add.replace("EFFECT", () => card.named));
       if (!card.variants.length) return;
       await this.turnTo(0);
-      // the other choices of its constants, so that they follow the hand, too
+      // the other choices of its constants, so that they follow the slider, too
       for (let k = 1; k < card.variants.length && this.card === card; k++) await this.trial(k);
     });
   }
@@ -80,13 +80,13 @@ export class Card {
     );
   }
 
-  // Effects that do much the same, on these rows or in general, and what would tell them apart.
+  // Similar effects, on these rows or in general, and the measurement that distinguishes them.
   rivals() {
     const { effect, alike, mistaken_for, separated_by } = this.card;
     const here = alike.map(({ effect: other, cosine }) => element("li", {}, `${words(other)}, cosine ${cosine.toFixed(3)}`));
     const plan = this.plan && alike.length ? [element("button", { type: "button", onclick: () => this.plan([effect, ...alike.map((other) => other.effect)]) }, "Plan what tells them apart …")] : [];
     return [
-      ...(here.length ? [element("p", {}, "On these rows much the same is done by:"), element("ul", {}, ...here), ...plan] : []),
+      ...(here.length ? [element("p", {}, "Similar effects on these rows:"), element("ul", {}, ...here), ...plan] : []),
       ...(mistaken_for.length ? [element("p", { class: "note" }, `May be mistaken for ${mistaken_for.map(words).join(", ")}; told apart by ${separated_by}.`)] : []),
     ];
   }
@@ -97,7 +97,7 @@ export class Card {
     this.bench.tried(this.theta);
   }
 
-  // To what fits best, all numbers together.
+  // Move all numbers to the best fit.
   fit() {
     if (!this.card?.variants.length) return;
     this.theta = [...this.card.variants[this.variant].theta];

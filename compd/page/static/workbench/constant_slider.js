@@ -6,7 +6,7 @@ export class ConstantSlider {
   // card: of the effect; variant: the choice that is shown; moved: called with another
   constructor(card, variant, moved) {
     const name = card.constants[0].name;
-    // in the order of the first constant, so that the hand goes one way
+    // in the order of the first constant, so that the slider is monotonic
     this.order = card.variants.map((_, k) => k).sort((a, b) => card.variants[a].constants[name] - card.variants[b].constants[name]);
     const text = (k) => card.constants.map((constant) => `${constant.name} ${digits(card.variants[k].constants[constant.name] ?? NaN)} ${constant.unit === "1" ? "" : constant.unit}`.trim()).join(", ");
     const value = element("output", {}, text(variant));

@@ -4,12 +4,12 @@ import { copyButton } from "../copy.js";
 import { element } from "../format.js";
 import { evidence, summaryLines } from "./evidence.js";
 
-// While one runs, and otherwise: another browser may begin one.
+// Intervals of requests while one runs, and otherwise, since another browser may begin one.
 const LOOK_EVERY_MS = 400;
 const LOOK_AT_REST_MS = 3000;
 
 export class Diagnosis {
-  // act: named(result) marks what it has found, null for nothing; the others are those of `evidence`.
+  // act: named(result) marks the findings, null for none; the others are those of `evidence`.
   constructor(place, act) {
     Object.assign(this, { act, bench: null, key: "", shown: "", turn: 0, running: false });
     this.button = element("button", { type: "button", id: "diagnose", onclick: () => this.startOrCancel() }, "Diagnose (d)");
@@ -48,7 +48,7 @@ export class Diagnosis {
     });
   }
 
-  // The newest, again and again; a later call takes over from an earlier one.
+  // Poll for the newest; a later call takes over from an earlier one.
   async look() {
     const turn = ++this.turn;
     clearTimeout(this.looking);
@@ -57,7 +57,7 @@ export class Diagnosis {
       if (turn !== this.turn) return;
       this.show(job);
     } catch {
-      // the page's server is away, or has begun anew: what needs it says so
+      // the page's server is away, or has restarted: other parts report it
       if (turn !== this.turn) return;
     }
     this.looking = setTimeout(() => this.look(), this.running ? LOOK_EVERY_MS : LOOK_AT_REST_MS);
@@ -87,7 +87,7 @@ export class Diagnosis {
     this.whole.open = state === "failed";
   }
 
-  // Which of the stages have been, with their times; how long the others take nobody knows.
+  // The finished stages with their times; those of the others are unknown.
   showStages({ stages, steps, seconds, state }) {
     const ends = steps.map((_, k) => steps[k + 1]?.at_s ?? seconds);
     const last = steps.at(-1)?.text;

@@ -30,7 +30,7 @@ export class Dots {
     context.restore();
   }
 
-  // The same memory again where the picture is as large as before: a slider asks for it at every move.
+  // Reuse the memory for a picture of the same size: a slider requests it at every move.
   emptyImage(width, height) {
     if (this.image?.width === width && this.image.height === height) this.image.data.fill(0);
     else {

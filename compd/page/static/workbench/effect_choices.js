@@ -2,7 +2,7 @@
 import { element } from "../format.js";
 
 export class EffectChoices {
-  // label: of each select; least: how many there always are; changed: called when another is chosen
+  // label: of each select; least: fewest selects; changed: called at another choice
   constructor(label, least, changed) {
     Object.assign(this, { label, least, changed, effects: [], chosen: [] });
     this.problem = element("div", { class: "problem", role: "status" });

@@ -2,7 +2,7 @@
 import { element, micro } from "../format.js";
 
 export class Effects {
-  // choose: called with an effect; ranked: with what the server says of all
+  // choose: called with an effect; ranked: called with the server's ranking
   constructor(place, filter, note, { choose, ranked }) {
     Object.assign(this, { place, filter, note, choose, ranked, effects: [], draft: null, chosen: "", remarks: {} });
     filter.addEventListener("input", () => this.draw());
@@ -11,7 +11,7 @@ export class Effects {
   async begin(bench) {
     Object.assign(this, { effects: [], draft: null, chosen: "" });
     this.draw();
-    this.note.textContent = "what each effect would do …";
+    this.note.textContent = "computing each effect …";
     this.unit = bench.summary.unit;
     const ranking = await bench.get("effects");
     this.effects = ranking.effects;
@@ -19,7 +19,7 @@ export class Effects {
     this.draw();
   }
 
-  // What a diagnosis has named is marked; null for none.
+  // Mark the findings of a diagnosis; null for none.
   name(result) {
     const steps = result?.steps ?? [];
     const rivals = steps.flatMap(({ effect, rivals }) => rivals.map((rival) => [rival, `as good as ${effect.replaceAll("_", " ")}`]));
@@ -29,7 +29,7 @@ export class Effects {
     this.draw();
   }
 
-  // An effect that is being written stands among the others; null for none.
+  // Show the effect being written among the others; null for none.
   write(draft) {
     this.draft = draft && { ...draft, remark: "being written" };
     this.draw();
@@ -78,7 +78,7 @@ export class Effects {
     );
   }
 
-  // What an effect leaves, tried alone.
+  // The error left by an effect, tried alone.
   left(status, why, rms) {
     if (status === "not_testable") return why;
     if (status === "no_gain") return "no gain";

@@ -1,4 +1,4 @@
-// What a diagnosis has found, below its verdict: each effect with its numbers, what else was found, what to measure.
+// The findings of a diagnosis below its verdict: each effect with its numbers, other findings, what to measure.
 import { CommandLine } from "../command_line.js";
 import { copyButton } from "../copy.js";
 import { element, micro } from "../format.js";
@@ -7,7 +7,7 @@ const plain = (name) => name.replaceAll("_", " ");
 // Units within a text.
 const units = (text) => String(text).replace(/(^|[\s/(])u(m|rad)\b/g, "$1µ$2").replaceAll("+-", "±").replaceAll("->", "→").replaceAll("degC", "°C");
 
-// act: what the buttons do, {choose(effect), add(effect), plan(effects), formula(formula)}; without one there is no button.
+// act: actions of the buttons, {choose(effect), add(effect), plan(effects), formula(formula)}; none, no button.
 export function evidence(diagnosis, act) {
   const { effects, follows, formulas, constant, gross, tried, without_gain, untested, next } = diagnosis;
   const all = [
@@ -66,7 +66,7 @@ function folded(title, parts, open = false) {
   return element("details", { open }, element("summary", {}, title), ...parts);
 }
 
-// The verdict's word, then lines with labels, as many as a person reads at once.
+// The verdict's word, then a few lines with labels.
 export function summaryLines(verdict, lines) {
   const [heading, ...others] = lines;
   const entries = [];

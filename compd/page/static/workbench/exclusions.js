@@ -44,7 +44,7 @@ export class Exclusions {
     this.command.write(this.button.disabled ? "" : this.bench.summary.commands.exclude.replace("ROWS", rowsText(this.rows)).replace("REASON", () => quoted));
   }
 
-  // What is known of one row.
+  // Description of one row.
   numbers(row) {
     const { rows } = this.bench;
     const at = rows.row.indexOf(row);

@@ -1,4 +1,4 @@
-// An effect of one's own: a formula that is checked at every key, tried as soon as it is right, and kept in a file.
+// An effect of one's own: a formula checked at every key, tried once valid, and saved in a file.
 import { CommandLine } from "../command_line.js";
 import { element } from "../format.js";
 import { ParameterRow } from "./parameter_row.js";
@@ -66,7 +66,7 @@ export class Formula {
     this.commands[1].write(known ? add.replace("EFFECT", () => named) : "");
   }
 
-  // texts: the formula by axis. check: whether it is checked at once
+  // texts: the formula by axis. check: whether to check it at once
   choosePort(port, texts = this.texts(), check = true) {
     const chosen = this.offer.ports.find((each) => each.port === port) ?? this.offer.ports[0];
     this.port.input.value = chosen.port;
@@ -130,7 +130,7 @@ export class Formula {
     this.fill(this.offer.saved.find((each) => each.id === id) ?? { id: FIRST_ID, port: "link", formula: "", parameters: {} });
   }
 
-  // A declaration from elsewhere, such as one that a diagnosis proposes; it is tried at once.
+  // A declaration from elsewhere, such as the proposal of a diagnosis; it is tried at once.
   edit(declaration) {
     this.loaded = "";
     this.fill(declaration);
@@ -156,7 +156,7 @@ export class Formula {
     this.timer = setTimeout(() => this.bench.attempt(() => this.check()), QUIET_MS);
   }
 
-  // trying: whether the effect goes into the card as soon as it is right
+  // trying: whether the effect goes into the card once valid
   async check(trying = true) {
     this.asked += 1;
     const { asked } = this;
@@ -166,7 +166,7 @@ export class Formula {
       return;
     }
     const answer = await this.bench.post("formula", { declaration: this.declaration });
-    if (asked !== this.asked) return; // an older answer than what stands there
+    if (asked !== this.asked) return; // an outdated answer
     if (this.takeNames(answer.missing)) return this.check(trying);
     this.show(answer.problems);
     this.right = answer.right;
@@ -179,7 +179,7 @@ export class Formula {
     if (this.card.card?.asked === name) this.card.fit();
   }
 
-  // A row for each name that is no column; those that nobody filled in go with their names.
+  // A row for each name that is no column; unfilled rows vanish with their names.
   takeNames(missing) {
     const words = Object.values(this.texts()).join(" ").match(/[A-Za-z]\w*/g) ?? [];
     for (const row of this.rows) {
@@ -233,20 +233,20 @@ export class Formula {
     }));
   }
 
-  // What will happen, and the button that does it.
+  // The consequence, and the button for it.
   ask(text, label, act) {
     const leave = () => this.confirm.replaceChildren();
     this.confirm.replaceChildren(element("div", { class: "consequence" }, element("p", {}, text), element("div", { class: "row" }, element("button", { type: "button", id: "confirm-own", onclick: () => (leave(), act()) }, label), element("button", { type: "button", onclick: leave }, "Leave it"))));
   }
 }
 
-// The formula with the character from which on it is wrong.
+// The formula with its first wrong character marked.
 function marked(text, character) {
   const at = Math.min(character - 1, text.length);
   return element("code", {}, text.slice(0, at), element("mark", {}, text[at] ?? " "), text.slice(at + 1));
 }
 
-// A word as a shell takes it.
+// A word quoted for a shell.
 function quoted(word) {
   return /^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\"'\"'")}'`;
 }

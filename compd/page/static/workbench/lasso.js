@@ -4,7 +4,7 @@ import { ink } from "../format.js";
 const LEAST_STEP_PX = 3;
 
 export class Lasso {
-  // wanted: whether a press begins a lasso (event -> bool); around: called with what is inside, a function of x and y
+  // wanted: whether a press begins a lasso (event -> bool); around: called with a function of x and y, true inside
   constructor(canvas, { wanted, draw, around }) {
     this.line = [];
     canvas.addEventListener("pointerdown", (event) => {
@@ -54,7 +54,7 @@ function inside(line) {
   };
 }
 
-// A press without a line chooses what is beneath it.
+// A press without a line chooses the mark beneath it.
 function near([x0, y0]) {
   return (x, y) => Math.hypot(x - x0, y - y0) < 6;
 }

@@ -1,4 +1,4 @@
-// The machine that runs: this model as its shadow, then adopted; and beside the recording's error what that does there.
+// The running machine: this model as its shadow, then adopted; its effect there beside the recording's error.
 import { Age } from "../age.js";
 import { describe } from "../banner.js";
 import { scaleFor } from "../bar.js";
@@ -63,7 +63,7 @@ export class LiveModel {
     if (!own) return;
     const file = summary.ledger.length > 0;
     this.run.disabled = this.adopt.disabled = !file;
-    write(this.why, file ? (page.role === "operate" ? "" : "This browser may look only.") : "Add an effect first: there is no model file yet.");
+    write(this.why, file ? (page.role === "operate" ? "" : "This browser is read-only.") : "Add an effect first: there is no model file yet.");
     this.showBars(page.slow, summary);
   }
 

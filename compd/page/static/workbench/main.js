@@ -49,11 +49,11 @@ bench.attempt(async () => {
   at("models").replaceChildren(...models.map(({ name }) => element("option", { value: name })));
   at("libraries").append(...libraries.map((name) => element("label", {}, element("input", { type: "checkbox", value: name, onchange: () => bench.summary && open() }), name)));
   if (!parts.length) bench.say("There are no recordings in the page's directory of recordings.");
-  // what another page asks to be opened
+  // the recording requested by another page
   const asked = new URLSearchParams(location.search);
   if (asked.has("model")) at("model").value = asked.get("model");
   if (!asked.has("recording")) return;
   at("recording").value = asked.get("recording");
   await open();
 });
-window.bench = Object.assign(bench, { selection, picture }); // for tests, and for the curious
+window.bench = Object.assign(bench, { selection, picture }); // for tests and inspection

@@ -1,9 +1,9 @@
 // A slider for one number of an effect, with the plausible band and the tick of the fit.
 import { element, micro } from "../format.js";
 
-// A slider goes so much further than the plausible range.
+// Length of a slider relative to the plausible range.
 const BEYOND = 1.15;
-// A slider has at least so many steps, each a round number.
+// Fewest steps of a slider, each a round number.
 const STEPS = 400;
 
 export class NumberSlider {
@@ -47,7 +47,7 @@ export class NumberSlider {
     this.moved(Number(this.input.value));
   }
 
-  // As people read it: a compliance is fitted, and a stiffness shown.
+  // Text for display: a compliance is fitted, and a stiffness shown.
   text(theta) {
     const { reciprocal, unit } = this.number;
     if (!reciprocal) return `${digits(theta)} ${micro(unit)}`;

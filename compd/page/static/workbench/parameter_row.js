@@ -1,8 +1,8 @@
-// One parameter of a formula: name, unit, plausible range, where that comes from.
+// One parameter of a formula: name, unit, plausible range and its source.
 import { element } from "../format.js";
 import { Field, textField } from "./problems.js";
 
-// A number as it was typed; what is none is sent as it is, and the server says so.
+// A number as typed; other text is sent unchanged, and the server reports it.
 function typed(text) {
   if (!text) return null;
   const number = Number(text);
@@ -30,7 +30,7 @@ export class ParameterRow {
     return this.fields.name.value;
   }
 
-  // Whether a person has written nothing into it but its name.
+  // Whether all fields but the name are empty.
   get blank() {
     return ["unit", "low", "high", "source"].every((part) => !this.fields[part].value);
   }

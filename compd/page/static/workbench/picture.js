@@ -1,4 +1,4 @@
-// The residual of every row that is drawn, before and with what is tried, on the same axes and scale.
+// The residual of every drawn row, before and with the trial, on the same axes and scale.
 import { element, ink, prepared } from "../format.js";
 import { Turn } from "../orbit_control.js";
 import { AgainstView } from "./against_view.js";
@@ -10,7 +10,7 @@ const BEFORE = "#8c959f88";
 const CHOSEN = "#e69f00";
 
 export class Picture {
-  // selection: of rows, shared with all that shows rows
+  // selection: of rows, shared by all views of rows
   constructor({ canvas, tabs, against, note }, selection) {
     Object.assign(this, { canvas, tabs, against, note, selection, rows: null, left: null, kind: "3D", views: {}, without: false });
     const draw = () => this.draw();
@@ -62,7 +62,7 @@ export class Picture {
     this.draw();
   }
 
-  // Only what was before, while something is tried; and back.
+  // Show only the state before the trial; and back.
   compare() {
     this.without = !this.without;
     this.draw();
@@ -101,7 +101,7 @@ export class Picture {
     this.note.textContent = view.note;
   }
 
-  // Rows with a mark that is contained; of a recording that is thinned for the picture, of all its rows.
+  // Rows whose mark is inside; all rows of a recording, even if thinned for the picture.
   pick(contains) {
     this.bench.attempt(async () => {
       const thinned = this.rows.row.length < this.bench.summary.rows;

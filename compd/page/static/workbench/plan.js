@@ -8,7 +8,7 @@ import { textField } from "./problems.js";
 const FILES = { plan: "Plan (CSV)", sa: "Targets for SpatialAnalyzer", csv: "Targets (CSV)", gcode: "G-code" };
 const NAMES = { plan: "next.csv", sa: "targets.txt", csv: "targets.csv", gcode: "next.ngc" };
 
-// A limit as it is shown; one that is not changed is left as in the recording, with all its digits.
+// A limit as displayed; an unchanged one keeps the recording's value with all digits.
 const shown = (value) => (value === null ? "" : String(Number(value.toFixed(3))));
 
 function typed(text) {
@@ -68,7 +68,7 @@ export class Plan {
     return this.offerLimits(true);
   }
 
-  // What a diagnosis has found: its first effect that has rivals, with these; the others beside it.
+  // The findings of a diagnosis: its first effect with rivals, and these; the others beside it.
   suggestFor({ steps }) {
     const open = steps.find(({ rivals }) => rivals.length);
     if (open) this.suggest([open.effect, ...open.rivals], steps.filter((step) => step !== open).map(({ effect }) => effect));
@@ -81,14 +81,14 @@ export class Plan {
     this.bench.attempt(() => this.offerLimits());
   }
 
-  // What another panel asks to be planned.
+  // A plan requested by another panel.
   planFor(effects) {
     this.suggest(effects);
     this.place.scrollIntoView({ block: "start" });
     this.button.focus();
   }
 
-  // Those of a machine of an external model depend on the rivals.
+  // The limits of an external model depend on the rivals.
   async offerLimits(anew = false) {
     const { bench } = this;
     if (!anew && !this.external) return;
@@ -172,7 +172,7 @@ export class Plan {
     this.command.write(`${this.measurement.command}${shape === "plan" ? "" : ` --as ${shape}${motion}`} --out ${NAMES[shape]}`);
   }
 
-  // The file, or under the feed why there is none.
+  // The file, or the reason for its absence below the feed.
   download(shape) {
     this.shape = shape;
     this.showCommand();

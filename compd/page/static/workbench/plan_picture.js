@@ -1,4 +1,4 @@
-// The rows of a plan in space: numbered in their order, coloured by what is set, with the difference of the rivals.
+// The rows of a plan in space: numbered, coloured by a setting, with the difference of the rivals.
 import { element, ink, prepared } from "../format.js";
 import { Turn } from "../orbit_control.js";
 
@@ -49,7 +49,7 @@ export class PlanPicture {
     const k = columns.indexOf(this.by.value);
     const values = k < 0 || this.by.value === NO_COLOUR ? null : rows.map((row) => row[k]);
     const [low, high] = values ? [Math.min(...values), Math.max(...values)] : [0, 1];
-    // several rows may be at one place: their numbers stand beside one another
+    // several rows may share a place: their numbers are side by side
     const taken = new Map();
     at.forEach((point, row) => {
       const share = values ? (values[row] - low) / (high - low || 1) : 0.5;

@@ -1,4 +1,4 @@
-// What is wrong, in words under the field that it concerns.
+// Problems in words below their fields.
 import { element } from "../format.js";
 
 let count = 0;
@@ -17,7 +17,7 @@ export class Field {
     return this.input.value.trim();
   }
 
-  // parts: texts or elements, each a line; none where all is well
+  // parts: texts or elements, one a line; none for a valid field
   show(...parts) {
     this.input.toggleAttribute("aria-invalid", parts.length > 0);
     this.problem.replaceChildren(...parts.map((part) => element("div", {}, part)));

@@ -1,4 +1,4 @@
-// What a step would do to the model, the table old -> new, before it is written.
+// Preview of a step of the model: the table old -> new, before it is written.
 import { element, micro } from "../format.js";
 
 const number = (value, digits = 4) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(digits))).replace("-", "−"));
@@ -12,7 +12,7 @@ export class Proposal {
     this.place.replaceChildren();
   }
 
-  // Ask what the step would do, show it, and make it where a person says so.
+  // Show the preview of a step, and make it on confirmation.
   show(bench, step, verb) {
     bench.attempt(async () => {
       this.place.replaceChildren(element("p", { class: "note" }, `fitting on ${bench.summary.used} rows …`));

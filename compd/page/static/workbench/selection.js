@@ -1,4 +1,4 @@
-// Rows that are chosen, by their number in the file: the same ones in every picture.
+// The selected rows, by their number in the file, shared by all pictures.
 export class Selection {
   constructor() {
     Object.assign(this, { rows: new Set(), listeners: [] });
@@ -14,7 +14,7 @@ export class Selection {
     this.listeners.forEach((change) => change());
   }
 
-  // As well as those that are chosen already.
+  // Add to the selected rows.
   add(rows) {
     this.set([...this.rows, ...rows]);
   }

@@ -1,4 +1,4 @@
-// What an effect does by itself: its arrows with every number at the end of its plausible range.
+// Signature of an effect alone: arrows with every number at the end of its plausible range.
 import { element, ink, micro, prepared } from "../format.js";
 import { SpaceView, mapped } from "./space_view.js";
 

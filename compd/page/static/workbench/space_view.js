@@ -1,4 +1,4 @@
-// Rows where they were measured, each with its residual as an arrow: in three dimensions, or as a map.
+// Rows at their measured places with residuals as arrows: in three dimensions, or as a map.
 import { ink, micro } from "../format.js";
 
 // The longest arrow is this share of the picture's radius.

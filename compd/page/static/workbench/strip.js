@@ -1,11 +1,11 @@
-// The large numbers on top: the error now and with what is tried, on all rows and on rows left out, and the noise.
+// The large numbers on top: the error now and with the trial, on all rows and on rows left out, and the noise.
 import { element, micro } from "../format.js";
 
-// What the residual follows is said of so many quantities.
+// Most quantities listed as followed by the residual.
 const MOST_TRENDS = 3;
 
 export class Strip {
-  // verdict: where the comparison is said in words
+  // verdict: element for the comparison in words
   constructor(place, verdict) {
     this.verdict = verdict;
     this.bar = element("div", { class: "falling", role: "img" });
@@ -22,7 +22,7 @@ export class Strip {
     this.try();
   }
 
-  // left_out_rms: of the model on rows that it was not fitted on
+  // left_out_rms: error of the model on rows outside its fit
   measured({ left_out_rms }) {
     this.left_out_rms = left_out_rms;
     this.try();
@@ -44,7 +44,7 @@ export class Strip {
       made.style.width = `${Math.min(100, (100 * value) / (rms || 1))}%`;
       return made;
     };
-    this.bar.setAttribute("aria-label", `The error as a bar: ${rms.toFixed(2)} ${unit} now${tried_rms === null ? "" : `, ${tried_rms.toFixed(2)} with what is tried`}, noise ${floor?.toFixed(2) ?? "not known"}`);
+    this.bar.setAttribute("aria-label", `The error as a bar: ${rms.toFixed(2)} ${unit} now${tried_rms === null ? "" : `, ${tried_rms.toFixed(2)} with the trial`}, noise ${floor?.toFixed(2) ?? "not known"}`);
     this.bar.replaceChildren(part("left", tried_rms ?? rms), part("noise", floor ?? 0));
   }
 }

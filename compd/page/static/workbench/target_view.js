@@ -1,4 +1,4 @@
-// The residual in x and y as shots at a target; the rings stay as they are while something is tried.
+// The residual in x and y as shots at a target; the rings stay fixed during a trial.
 import { ink, micro } from "../format.js";
 import { Dots } from "./dots.js";
 

@@ -1,6 +1,6 @@
-// An effect that is tried: the residual beside it follows its numbers at once, as effects are linear in them.
+// A trial of an effect: the residual follows its numbers at once, as effects are linear in them.
 export class Trial {
-  // sums and columns as the server packs them; rows: of the recording as it is drawn
+  // sums and columns from the server; rows: the drawn ones of the recording
   constructor(packed, rows) {
     Object.assign(this, packed);
     this.count = packed.shapes.gram[0];
@@ -8,7 +8,7 @@ export class Trial {
     this.left = new Float32Array(rows.residual);
   }
 
-  // The error per coordinate of all rows, not only of those that are drawn: n rms² = r'r - 2 θ'J'r + θ'J'Jθ.
+  // The error per coordinate of all rows, including those not drawn: n rms² = r'r - 2 θ'J'r + θ'J'Jθ.
   rms(theta) {
     let left = this.square;
     theta.forEach((value, i) => {
@@ -18,7 +18,7 @@ export class Trial {
     return Math.sqrt(Math.max(left, 0) / this.values);
   }
 
-  // What is left of each row that is drawn.
+  // The residual of each drawn row.
   residual(theta) {
     const { columns, count, left } = this;
     const measured = this.rows.residual;
@@ -30,7 +30,7 @@ export class Trial {
     return left;
   }
 
-  // By how much the effect itself moves each row that is drawn.
+  // The displacement of each drawn row by the effect itself.
   moved(theta) {
     const { columns, count } = this;
     return this.rows.residual.map((_, place) => theta.reduce((sum, value, k) => sum + columns[place * count + k] * value, 0));

@@ -240,8 +240,8 @@ QUESTIONS: dict[str, tuple[list[bytes], str, str]] = {
     "a counter": ([b"17 +1.230\r", b"18 -2.300\r", b"19 +0.500\r"], "counters, a clock, a status", "--names=-,c2"),
     "a sign behind a unit": ([b"12.300 mm -\r", b"12.400 mm -\r", b"00.500 mm -\r"], "is it the sign?", "--ignore=-"),
     "a comma and other lengths": ([b"+1,5\r", b"+12,25\r", b"-0,125\r"], "a decimal comma?", "--decimal-mark ,"),
-    "another unit": ([b"+1.5 mV\r", b"+2.5 mV\r", b"-1.0 mV\r"], "the replies say another unit", "mV=FACTOR"),
-    "metres": ([b"+1.5 m\r", b"+2.5 m\r", b"-1.0 m\r"], "the replies say another unit", "m=FACTOR"),
+    "another unit": ([b"+1.5 mV\r", b"+2.5 mV\r", b"-1.0 mV\r"], "the replies name another unit", "mV=FACTOR"),
+    "metres": ([b"+1.5 m\r", b"+2.5 m\r", b"-1.0 m\r"], "the replies name another unit", "m=FACTOR"),
     "a date": ([b"2026-11-23 1.23\r", b"2026-11-24 1.24\r", b"2026-11-25 9.87\r"], "a clock", "--names=-,-,c3"),
     "a checksum": ([b"+012.300q\r", b"-002.300Z\r", b"+000.001!\r"], "none of sum8, negative_sum8", "--skip-end 1"),
 }  # fmt: skip
@@ -269,7 +269,7 @@ def test_unit_and_range_are_asked_unless_they_are_known() -> None:
 def test_a_unit_in_the_replies_is_not_overruled() -> None:
     inches = [b"+1.270 mm +0.0500 in\r", b"+2.540 mm +0.1000 in\r", b"-1.270 mm -0.0500 in\r"]
     text = questions(inches)
-    assert "--unit of 2: the replies say another unit" in text
+    assert "--unit of 2: the replies name another unit" in text
     assert "allowed: inch" in text
     options, _ = learn(inches, units=("mm", "inch"))
     assert [channel["unit"] for channel in options["channels"]] == ["mm", "inch"]

@@ -56,7 +56,7 @@ def test_what_leaves_nothing_to_compare_is_taken_back(workbench, path):
 def test_strange_rows_and_old_states_are_refused(workbench):
     with pytest.raises(RecordingError, match="row 5000"):
         workbench.exclude([5000], "fog", workbench.revision)
-    with pytest.raises(StateError, match="somebody else"):
+    with pytest.raises(StateError, match="changed elsewhere"):
         workbench.exclude([10], "fog", workbench.revision - 1)
 
 
@@ -80,7 +80,7 @@ def test_what_a_command_has_changed_is_seen_at_the_next_opening(workbench, path,
 def test_a_long_recording_is_thinned_for_pictures_and_numbers_are_of_all_rows(tmp_path):
     path = record(tmp_path, gauges(12_000, 1), [hidden("link_expansion", 2.0)])
     workbench = Workbench(path, tmp_path / "tripod.model.yaml", None)
-    header, every = (json.loads(workbench.opened.rows(every=every).partition(b"\n")[0]) for every in (False, True))
+    header, every = (json.loads(workbench.opened.rows(all_rows=every).partition(b"\n")[0]) for every in (False, True))
     assert header["arrays"][0]["shape"] == [MOST_PICTURED]
     assert every["arrays"][0]["shape"] == [12_000]
     assert workbench.candidates.ranked()[0]["effect"] == "link_expansion"

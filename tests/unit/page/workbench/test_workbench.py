@@ -85,7 +85,7 @@ def test_a_step_is_told_first_then_made_as_the_command_makes_it(workbench, path,
 def test_of_two_browsers_the_second_is_told_that_it_shows_what_was(workbench):
     revision = workbench.revision
     workbench.make("add", "link_expansion", revision)
-    with pytest.raises(StateError, match="somebody else"):
+    with pytest.raises(StateError, match="changed elsewhere"):
         workbench.make("add", "scale_gain", revision)
 
 
