@@ -10,8 +10,8 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem
-from compd.instruments.export import LENGTH_AXES, POSITION_AXES
-from compd.instruments.writers.samples import Samples
+from compd.instruments.axes import LENGTH_AXES, POSITION_AXES
+from compd.instruments.samples import Samples
 
 # A dwell that was seen less often gives no point: an instrument takes the mean of some readings.
 LEAST_LOOKS = 3

@@ -25,7 +25,8 @@ from compd.commissioning.open_gauge import PortArguments
 from compd.configuration import load
 from compd.errors import CompdError
 from compd.fleet.recordings import find_recordings
-from compd.instruments.export import SHAPES, ReadOptions
+from compd.instruments.export import ReadOptions
+from compd.instruments.formats import instrument_formats
 from compd.instruments.preview import preview_export
 from compd.instruments.read import read_export
 from compd.lines.mqtt_tls import tls_context
@@ -188,7 +189,7 @@ READERS: dict[str, Reader] = {
     "machine zero": Reader(ZERO_NAME, lambda path: load_zero(path.parent, "", ("scale_1.position",))),
     "last readings": Reader(LAST_NAME, _last_readings),
     "export": Reader("export.txt", _export(None)),
-    **{f"export as {shape}": Reader("export.txt", _export(shape)) for shape in SHAPES},
+    **{f"export as {shape}": Reader("export.txt", _export(shape)) for shape in instrument_formats()},
     "export before it is joined": Reader("export.txt", lambda path: preview_export(path, ReadOptions())),
     "preset": Reader("mine.yaml", lambda path: PresetDirectory(path.parent).driver("mine")),
     "gauges": Reader("gauges.yaml", lambda path: gauge_of_file(path, None, PortArguments("", None, None, 1.0))),
