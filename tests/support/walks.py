@@ -120,6 +120,7 @@ class Copy:
         for insertion in walk.insertions:
             path = self.directory / insertion.path
             before = path.read_text(encoding="utf-8") if path.exists() else None
+            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(inserted(insertion, before), encoding="utf-8")
         written = {name: _without_blank_lines(self.directory / name) for name in walk.files if name.endswith(".py")}
         if written:
