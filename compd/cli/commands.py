@@ -13,6 +13,7 @@ from importlib import import_module
 import typer
 
 from compd.cli import live, measurements, simulated, start
+from compd.cli.plain_help import PlainCommand, PlainGroup
 from compd.release import __version__
 
 # Panels and commands in the order of `compd --help`.
@@ -26,8 +27,8 @@ PANELS = {
 
 def make_app(wanted: str = "") -> typer.Typer:
     """The command line. Where `wanted` is the name of a command it has this one alone, and is made sooner."""
-    app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
-    app.callback()(_options)
+    app = typer.Typer(cls=PlainGroup, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+    app.callback(cls=PlainGroup)(_options)
     modules = [
         (title, package.__name__, module.name)
         for title, package in PANELS.items()
@@ -37,9 +38,11 @@ def make_app(wanted: str = "") -> typer.Typer:
     for title, package, name in alone or modules:
         command = getattr(import_module(f"{package}.{name}"), name)
         if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name, rich_help_panel=title)
+            for inside in command.registered_commands:
+                inside.cls = PlainCommand
+            app.add_typer(command, name=name, cls=PlainGroup, rich_help_panel=title)
         else:
-            app.command(rich_help_panel=title)(command)
+            app.command(cls=PlainCommand, rich_help_panel=title)(command)
     return app
 
 

@@ -9,18 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from compd.instruments.formats import instrument_formats
+
 if TYPE_CHECKING:
     from compd.instruments import ReadOptions
 
+    class Shape(StrEnum):
+        """Formats of exports."""
 
-class Shape(StrEnum):
-    """Shapes of exports."""
-
-    SA = "sa"
-    CSV = "csv"
-    BLANKS = "blanks"
-    CARTO = "carto"
-    XLSX = "xlsx"
+else:
+    Shape = StrEnum("Shape", {name: name for name in instrument_formats()})
 
 
 class DateOrder(StrEnum):
@@ -33,7 +31,12 @@ class DateOrder(StrEnum):
 
 ShapeOption = Annotated[
     Shape | None,
-    typer.Option("--as", help="The export's shape, if it is not detected: SpatialAnalyzer, a delimiter, blanks ..."),
+    typer.Option(
+        "--as",
+        help="The export's format, for a file that is mistaken for another: "
+        + ", ".join(f"{declared.name} ({declared.title})" for declared in instrument_formats().values())
+        + ".",
+    ),
 ]
 ColumnsOption = Annotated[
     str | None,

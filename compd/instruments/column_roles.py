@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compd.arrays import rms
+from compd.instruments.axes import ATTITUDE_AXES, LENGTH_AXES, POSITION_AXES
 from compd.instruments.cells import is_number_column, numbers
-from compd.instruments.export import ATTITUDE_AXES, LENGTH_AXES, POSITION_AXES, ReadOptions
+from compd.instruments.export import ReadOptions
 from compd.instruments.export_problems import ExportProblems
 from compd.instruments.header_names import is_not_measured, split_unit, understand
 from compd.instruments.raw_table import RawTable

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.instruments.axes import ATTITUDE_AXES
 from compd.instruments.cells import numbers
 from compd.instruments.column_roles import AXES, Roles, column_text, find_roles
-from compd.instruments.export import ATTITUDE_AXES, InstrumentExport, ReadOptions
+from compd.instruments.export import InstrumentExport, ReadOptions
 from compd.instruments.export_problems import ExportProblems, lines_text
 from compd.instruments.marker_rows import marker_rows
 from compd.instruments.raw_table import RawTable

@@ -9,12 +9,6 @@ from pathlib import Path
 from compd.arrays import FloatArray, IntArray
 from compd.instruments.read_limits import GENEROUS, ReadLimits
 
-POSITION_AXES = ("x", "y", "z")
-ATTITUDE_AXES = ("rx", "ry", "rz")
-LENGTH_AXES = ("length",)
-# `--as`: SpatialAnalyzer ASCII, text with a delimiter, text with columns between blanks, Renishaw CARTO, Excel.
-SHAPES = ("sa", "csv", "blanks", "carto", "xlsx")
-
 
 @dataclass(frozen=True)
 class ReadOptions:
@@ -22,7 +16,7 @@ class ReadOptions:
 
     Attributes
     ----------
-    shape : one of SHAPES (`--as`).
+    shape : name of the format (`--as`).
     columns : roles of the columns in their order (`--columns`): time, x, y, z, rx, ry, rz, length, name, group, or `-`
         for one that is not used.
     names : role -> a column's name in the header (`--time`, `--x`, ...).
@@ -53,7 +47,7 @@ class InstrumentExport:
 
     Attributes
     ----------
-    path : the file. shape : one of SHAPES.
+    path : the file. shape : name of its format.
     line : (N,) line of the file, or row of the sheet, from 1; the number of the sample in a binary file.
     axes : of `values`: a subset of x, y, z, all of them with rx, ry, rz, or "length" alone.
     values : (N, d) mm; attitude: rotation vector, rad.

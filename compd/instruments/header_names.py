@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from compd.instruments.export import ATTITUDE_AXES, POSITION_AXES
+from compd.instruments.axes import ATTITUDE_AXES, POSITION_AXES
 from compd.units import unit_named
 
 _PARTS = re.compile(r"[^0-9a-z]+")

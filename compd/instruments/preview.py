@@ -12,7 +12,9 @@ from compd.instruments.column_roles import find_roles
 from compd.instruments.columns import group_labels, to_export
 from compd.instruments.export import InstrumentExport, ReadOptions
 from compd.instruments.export_problems import ExportProblems
-from compd.instruments.read import read_table
+from compd.instruments.formats import instrument_formats
+from compd.instruments.instrument_format import BinaryFormat, InstrumentFormat
+from compd.instruments.read import binary_format_of, read_table
 from compd.instruments.read_limits import ReadLimits
 from compd.instruments.text_file import decode_text, read_content
 
@@ -30,7 +32,7 @@ class ExportPreview:
     Attributes
     ----------
     export : the whole of it; None where `problems` say why it cannot be read.
-    shape : one of SHAPES; "" where it is not known.
+    shape : name of its format; "" where it is not known.
     line : of each row that is shown. rows : their cells, one text in each where no columns could be told.
     header : (C,) names of the columns; empty where they have none. roles : (C,) what each is taken for, "-" for
         nothing; empty where no columns could be told.
@@ -55,7 +57,7 @@ def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
         table = read_table(path, options)
     except RecordingError as error:
         line, rows = _lines_at_top(path, options.limits)
-        sheets = _sheets(path, options.limits)
+        sheets = _sheets(path, _recognised(path), options.limits)
         return ExportPreview(None, line=line, rows=rows, sheets=sheets, problems=error.problems)
     if isinstance(table, InstrumentExport):
         return _of_samples(table)
@@ -76,7 +78,7 @@ def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
         roles=[role_of.get(k, "-") for k in range(len(columns))],
         assumed=table.assumed if export is None else export.taken,
         groups=list(dict.fromkeys(group_labels(table, roles) or ()))[:_MOST_GROUPS],
-        sheets=_sheets(path, options.limits) if table.shape == "xlsx" else (),
+        sheets=_sheets(path, instrument_formats()[table.shape], options.limits),
         problems=problems,
     )
 
@@ -106,12 +108,20 @@ def _lines_at_top(path: Path, limits: ReadLimits) -> tuple[list[int], list[list[
     return list(range(1, len(lines) + 1)), _cut([line] for line in lines)
 
 
-def _sheets(path: Path, limits: ReadLimits) -> tuple[str, ...]:
-    """Of a workbook; empty for any other file."""
-    from compd.instruments.workbook import sheet_names
-
+def _recognised(path: Path) -> BinaryFormat | None:
+    """The format of bytes that a file has; None for any other file."""
     try:
-        return sheet_names(path, limits)
+        return binary_format_of(path, read_content(path))
+    except RecordingError:
+        return None
+
+
+def _sheets(path: Path, declared: InstrumentFormat | None, limits: ReadLimits) -> tuple[str, ...]:
+    """Names of the sheets in a file; empty for a format without sheets."""
+    if not isinstance(declared, BinaryFormat) or declared.sheet_names is None:
+        return ()
+    try:
+        return declared.sheet_names(path, limits)
     except RecordingError:
         return ()
 

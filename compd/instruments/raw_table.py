@@ -15,7 +15,7 @@ class RawTable:
 
     Attributes
     ----------
-    path : the file. shape : one of SHAPES.
+    path : the file. shape : name of its format.
     columns : (C) columns of (N,) cells each, stripped, "" where empty. A number has "." as its decimal mark already.
     line : (N,) line of the file, or row of the sheet, from 1.
     header : (C,) names of the columns; None if the file has none. header_line : its line; 0 without one.

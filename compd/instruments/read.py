@@ -1,21 +1,23 @@
-"""Reading what an instrument wrote, whatever the shape: found by the first bytes, or as a person says."""
+"""Reading what an instrument wrote, in any of the formats: recognised by the content, or as a person says."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from compd.errors import RecordingError
 from compd.files import without_values
 from compd.instruments.columns import to_export
-from compd.instruments.delimited import read_delimited
-from compd.instruments.export import SHAPES, InstrumentExport, ReadOptions
+from compd.instruments.export import InstrumentExport, ReadOptions
 from compd.instruments.export_problems import ExportProblems
+from compd.instruments.formats import instrument_formats
+from compd.instruments.instrument_format import BinaryFormat, TextFormat
 from compd.instruments.raw_table import RawTable
 from compd.instruments.recognition import is_of_numbers, is_table, no_table
-from compd.instruments.spatial_analyzer import is_spatial_analyzer, read_spatial_analyzer
-from compd.instruments.text_file import decode_text, read_content
+from compd.instruments.text_file import TextFile, decode_text, read_content
 
-_WORKBOOK, _OLD_WORKBOOK, _CARTO = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"HEADER::"
+# Lines at the top of a text among which the mark of a format stands.
+_LOOKED_AT = 50
 
 
 def read_export(path: Path, options: ReadOptions | None = None) -> InstrumentExport:
@@ -39,44 +41,47 @@ def read_export(path: Path, options: ReadOptions | None = None) -> InstrumentExp
 
 
 def read_table(path: Path, options: ReadOptions) -> RawTable | InstrumentExport:
-    """As `read_export`, before it is known which column is what; a CARTO file has no columns, and is read whole."""
-    if options.shape is not None and options.shape not in SHAPES:
+    """As `read_export`, before it is known which column is what; a file without columns of text is read whole."""
+    formats = instrument_formats()
+    if options.shape is not None and options.shape not in formats:
         problems = ExportProblems(path)
-        problems.add(0, "--as names no shape", options.shape, ", ".join(SHAPES))
+        problems.add(0, "--as names no shape", options.shape, ", ".join(formats))
         raise RecordingError(problems.problems)
     content = read_content(path)
-    shape = options.shape or _shape_of_bytes(path, content)
-    if shape == "carto":
-        from compd.instruments.carto import read_carto
-
-        return read_carto(path, options)
-    if shape == "xlsx":
-        from compd.instruments.workbook import read_workbook
-
-        return read_workbook(path, options)
-    return _read_text(path, content, options)
-
-
-def _shape_of_bytes(path: Path, content: bytes) -> str | None:
-    """The shape of a file that is no text; None for text."""
-    if content.startswith(_WORKBOOK):
-        return "xlsx"
-    if content.startswith(_CARTO):
-        return "carto"
-    if content.startswith(_OLD_WORKBOOK):
-        problems = ExportProblems(path)
-        problems.add(0, "is an Excel workbook of before 2007", next_step="save it as .xlsx, or as text")
-        raise RecordingError(problems.problems)
-    return None
-
-
-def _read_text(path: Path, content: bytes, options: ReadOptions) -> RawTable:
+    chosen = binary_format_of(path, content) if options.shape is None else formats[options.shape]
+    if isinstance(chosen, BinaryFormat):
+        return chosen.read(path, options)
     text = decode_text(path, content, options.limits)
     try:
-        if options.shape == "sa" or (options.shape is None and is_spatial_analyzer(text)):
-            return read_spatial_analyzer(text, options)
-        return read_delimited(text, options)
+        text_format = chosen if isinstance(chosen, TextFormat) else _text_format_of(text)
+        return text_format.read(text, options)
     except RecordingError as error:
         if is_table(text.lines):
             raise
         raise RecordingError(without_values(error.problems)) from None
+
+
+def binary_format_of(path: Path, content: bytes) -> BinaryFormat | None:
+    """The format by the first bytes; None for text. Raises RecordingError for an outdated file."""
+    for known in instrument_formats().values():
+        if not isinstance(known, BinaryFormat):
+            continue
+        if content.startswith(known.magic):
+            return known
+        for magic, outdated in known.outdated.items():
+            if content.startswith(magic):
+                problems = ExportProblems(path)
+                problems.add(0, outdated.what, next_step=outdated.next_step)
+                raise RecordingError(problems.problems)
+    return None
+
+
+def _text_format_of(text: TextFile) -> TextFormat:
+    """The format whose mark stands at the top; else the first without a mark: `read_delimited` tells these apart."""
+    known = [declared for declared in instrument_formats().values() if isinstance(declared, TextFormat)]
+    top = text.lines[:_LOOKED_AT]
+    for declared in filter(lambda declared: declared.mark, known):
+        mark = re.compile(declared.mark, re.IGNORECASE)
+        if any(map(mark.search, top)):
+            return declared
+    return next(declared for declared in known if not declared.mark)

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from compd.arrays import FloatArray
-from compd.instruments.export import ATTITUDE_AXES, InstrumentExport
+from compd.instruments.axes import ATTITUDE_AXES
+from compd.instruments.export import InstrumentExport
 from compd.instruments.export_problems import ExportProblems, lines_text
 from compd.instruments.time_stamps import set_back_at
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 GLOSSARY = Path(__file__).parent.parent / "glossary.md"
 _CODE_SPAN = re.compile(r"(``.+?``|`[^`]+`)", re.DOTALL)
+# The beginning of an item of a list.
+_ITEM = re.compile(r"(?:[-*]|\d+\.) ")
 _SPECIAL = re.compile(r"([\\*<\[\]$])")
 
 
@@ -72,7 +74,7 @@ def target(*parts: str) -> str:
 
 
 def prose(text: str) -> str:
-    """A docstring: paragraphs as they are, what is indented as a block of code."""
+    """A docstring: paragraphs and lists as they are, what is indented as a block of code."""
     blocks: list[str] = []
     for indented, lines in _runs(text.strip("\n").split("\n")):
         while lines and not lines[-1].strip():
@@ -102,10 +104,16 @@ def _cell(text: str) -> str:
 
 
 def _runs(lines: Sequence[str]) -> list[tuple[bool, list[str]]]:
-    """The lines in runs that are indented or not; a blank line belongs to the run that it stands in."""
+    """The lines in runs that are indented or not; a blank line belongs to the run that it stands in.
+
+    A line that continues an item of a list is not indented.
+    """
     runs: list[tuple[bool, list[str]]] = []
+    in_item = False
     for line in lines:
         indented = bool(re.match(r" {2,}\S", line)) if line.strip() else (runs[-1][0] if runs else False)
+        in_item = bool(_ITEM.match(line)) or (in_item and indented and bool(line.strip()))
+        indented = indented and not in_item
         if not runs or runs[-1][0] != indented:
             runs.append((indented, []))
         runs[-1][1].append(line)

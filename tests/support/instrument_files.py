@@ -22,8 +22,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.instruments import FORMATS, Samples
-from compd.instruments.writers.samples import LENGTH, POSITION
+from compd.instruments.formats import instrument_formats, written_forms
+from compd.instruments.samples import LENGTH, POSITION, Samples
 from compd.units import UM_PER_MM
 
 # The recording's clock is ahead of the instrument's by this.
@@ -36,7 +36,7 @@ SAMPLE_NOISE_UM = 0.02
 DWELL_S, LEAST_DWELL_S = 1.5, 0.3
 # Between rows further apart nobody measured: the night between two sessions.
 NIGHT_S = 600.0
-EXTENSIONS = {"sa": ".txt", "blanks": ".dat", "carto": ".rtx", "xlsx": ".xlsx"}
+ENDINGS = {form.name: declared.ending for declared in instrument_formats().values() for form in declared.written}
 
 
 @dataclass(frozen=True)
@@ -137,9 +137,9 @@ def split_campaign(
 
 
 def write_export(directory: Path, shape: str, samples: Samples, unit: str = "mm", stem: str = "export") -> Path:
-    """Write the samples in a shape of `FORMATS`; returns the file."""
-    path = directory / f"{stem}-{shape}{EXTENSIONS.get(shape, '.csv')}"
-    path.write_bytes(FORMATS[shape].write(replace(samples, unit=unit)))
+    """Write the samples in a form of `written_forms()`; returns the file."""
+    path = directory / f"{stem}-{shape}{ENDINGS[shape]}"
+    path.write_bytes(written_forms()[shape].write(replace(samples, unit=unit)))
     return path
 
 

@@ -43,7 +43,7 @@ def join(
     gauges: Annotated[
         Path, typer.Argument(help="The recording of the gauges, NAME.csv or NAME.parquet with NAME.yaml.")
     ],
-    export: Annotated[Path, typer.Argument(help="The instrument's export: text, SpatialAnalyzer, CARTO or Excel.")],
+    export: Annotated[Path, typer.Argument(help="The instrument's export, in a format that --as names.")],
     out: Annotated[
         Path, typer.Argument(help="The recording to write: NAME.csv or NAME.parquet, and NAME.yaml beside it.")
     ],

@@ -10,26 +10,24 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from compd.cli.options import OverwriteOption
+from compd.instruments.axes import LENGTH_AXES, POSITION_AXES
+from compd.instruments.formats import written_forms
 from compd.units import UM_PER_MM
 
 if TYPE_CHECKING:
-    from compd.simulation import Looks
+    from compd.instruments.instrument_format import WrittenForm
+    from compd.simulation.wires.looks import Looks
 
+    class ExportFormat(StrEnum):
+        """In which form the export is written."""
+
+else:
+    ExportFormat = StrEnum("ExportFormat", {name: name for name in written_forms()})
+
+_CSV = ExportFormat("csv")
 _ANSWER_TIMEOUT_S = 15.0
 # Rest (s) after which every gauge has been read again.
 _REST_S = 0.5
-
-
-class ExportFormat(StrEnum):
-    """Shape of the export."""
-
-    csv = "csv"
-    iso = "iso"
-    german = "german"
-    sa = "sa"
-    blanks = "blanks"
-    carto = "carto"
-    xlsx = "xlsx"
 
 
 def tracker(
@@ -43,10 +41,11 @@ def tracker(
         ExportFormat,
         typer.Option(
             "--as",
-            help="Shape of the export: csv with seconds, iso with date stamps, german (semicolons, decimal comma), sa "
-            "(SpatialAnalyzer), blanks (numbers alone), carto (.rtx; with --link), xlsx.",
+            help="Form of the export: "
+            + "; ".join(f"{form.name}: {form.summary}" for form in written_forms().values())
+            + ".",
         ),
-    ] = ExportFormat.csv,
+    ] = _CSV,
     link: Annotated[
         int | None, typer.Option(min=1, max=6, help="An interferometer along this link, in place of the tracker.")
     ] = None,
@@ -63,12 +62,12 @@ def tracker(
     from datetime import datetime
 
     from compd.errors import CompdError, Problem
-    from compd.files import check_replaceable, write_files
-    from compd.instruments import FORMATS
-    from compd.simulation import Looks
+    from compd.files.atomic_files import write_files
+    from compd.files.output_file import check_replaceable
+    from compd.simulation.wires.looks import Looks
 
-    written = FORMATS[shape.value]
-    _check_options(shape, link, points, unit)
+    written = written_forms()[shape.value]
+    _check_options(written, link, points, unit)
     if not out.parent.is_dir():
         raise CompdError(
             Problem(where=str(out), what="its directory does not exist", value=str(out.parent), next_step="make it")
@@ -87,14 +86,14 @@ def tracker(
         )
     write_files({out: written.write(samples)})
     typer.echo(f"{len(looks)} looks in {looks.seconds:.0f} s" + (f", {len(samples.values)} points" if points else ""))
-    if hint := _for_join(shape, link, points, unit, rate_hz):
+    if hint := _for_join(written, link, points, unit, rate_hz):
         typer.echo(f"the file does not say it, so give `compd join`: {hint}")
     if compared:
         typer.echo(compared)
 
 
-def _check_options(shape: ExportFormat, link: int | None, points: bool, unit: str) -> None:
-    """Raise CompdError for a shape that cannot hold the data, or for an unknown unit."""
+def _check_options(written: WrittenForm, link: int | None, points: bool, unit: str) -> None:
+    """Raise CompdError for a form that cannot hold what is to be written, or for no unit."""
     from compd.errors import CompdError, Problem
     from compd.units import UNIT_KINDS
 
@@ -103,12 +102,15 @@ def _check_options(shape: ExportFormat, link: int | None, points: bool, unit: st
         problems.append(
             Problem(where="--unit", what="is no unit of a length", value=unit, allowed=", ".join(UNIT_KINDS[0]))
         )
-    if shape is ExportFormat.carto and link is None:
-        problems.append(Problem(where="--as carto", what="is one length", next_step="name the link: --link 1"))
-    if shape is ExportFormat.carto and points:
-        problems.append(Problem(where="--as carto", what="is a track", next_step="leave --points out"))
-    if shape is ExportFormat.sa and link is not None:
-        problems.append(Problem(where="--as sa", what="is x, y, z", next_step="leave --link out, or choose --as carto"))
+    where = f"--as {written.name}"
+    if link is None and POSITION_AXES not in written.axes:
+        problems.append(Problem(where=where, what="is one length", next_step="say of which link: --link 1"))
+    if points and not written.holds_points:
+        problems.append(Problem(where=where, what="is a track", next_step="leave --points out"))
+    if link is not None and LENGTH_AXES not in written.axes:
+        others = " or ".join(form.name for form in written_forms().values() if LENGTH_AXES in form.axes)
+        step = f"leave --link out, or choose --as {others}"
+        problems.append(Problem(where=where, what="is x, y, z", next_step=step))
     if problems:
         raise CompdError(problems)
 
@@ -157,14 +159,11 @@ def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate
     )
 
 
-def _for_join(shape: ExportFormat, link: int | None, points: bool, unit: str, rate_hz: float) -> str:
-    """Options that `compd join` needs, since the file lacks the information."""
-    from compd.instruments import FORMATS
-
-    written = FORMATS[shape.value]
+def _for_join(written: WrittenForm, link: int | None, points: bool, unit: str, rate_hz: float) -> str:
+    """Options without which `compd join` asks, because the file says nothing of it."""
     given = [
         f"--unit {unit}" if not written.says_unit else "",
-        f"--rate-hz {rate_hz:g}" if shape is ExportFormat.blanks and not points else "",
+        f"--rate-hz {rate_hz:g}" if not written.says_rate and not points else "",
         f"--link {link}" if link is not None else "",
     ]
     return " ".join(filter(None, given))

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from compd.instruments.writers.samples import POSITION, Samples
-from compd.instruments.writers.spatial_analyzer import write_spatial_analyzer
+from compd.instruments.formats.spatial_analyzer.writer import write_spatial_analyzer
+from compd.instruments.samples import POSITION, Samples
 from compd.instruments.writers.target import TargetPoint
 
 # By these a file is known as a list of compd, which may be written over.

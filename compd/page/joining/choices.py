@@ -11,8 +11,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from compd.errors import CompdError, Problem
-from compd.instruments import SHAPES, ReadLimits, ReadOptions
-from compd.joining import JOIN_BY, Instrument, JoinOptions
+from compd.instruments.export import ReadOptions
+from compd.instruments.formats import instrument_formats
+from compd.instruments.read_limits import ReadLimits
+from compd.joining.by_time import Instrument
+from compd.joining.join import JOIN_BY, JoinOptions
 
 Value = TypeVar("Value", str, float, int)
 
@@ -93,7 +96,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
         problems.append(Problem(where="columns", what="is not understood", allowed="a role for each column"))
         columns = []
     read = ReadOptions(
-        shape=text("shape", SHAPES),
+        shape=text("shape", tuple(instrument_formats())),
         columns=tuple(columns),
         unit=text("unit"),
         angle_unit=text("angle_unit"),

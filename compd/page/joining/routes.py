@@ -11,6 +11,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from compd.errors import CompdError
+from compd.instruments.formats import instrument_formats
 from compd.page.joining.export_routes import export_routes
 from compd.page.joining.exports import MOST_BYTES, Exports
 from compd.page.joining.named_files import gauges_and_plans
@@ -62,7 +63,7 @@ class JoinRoutes:
         return FileResponse(self._page)
 
     async def _sources(self, request: Request) -> Response:
-        """Recordings of gauges alone, plans, exports, and whether this browser may write."""
+        """Recordings of gauges alone, plans, exports, the formats that are read, and whether this browser may write."""
         gauges, plans = await asyncio.to_thread(gauges_and_plans, self._directory)
         return answer(
             {
@@ -70,6 +71,7 @@ class JoinRoutes:
                 "gauges": gauges,
                 "plans": plans,
                 "exports": self._exports.listed(),
+                "formats": [[declared.name, declared.title] for declared in instrument_formats().values()],
                 "may_write": may_change(request),
                 "most_bytes": MOST_BYTES,
             }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import sys
 
@@ -9,6 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from compd.cli.commands import make_app
+from compd.cli.main import app
+from docs.generate.commands import CommandEntry, entries
 
 
 def test_a_command_that_is_named_is_loaded_alone():
@@ -31,3 +34,27 @@ def test_what_is_no_command_is_told_from_all_of_them(mistyped):
     result = CliRunner().invoke(make_app(mistyped), ["zeroo"])
     assert result.exit_code == 2
     assert "zero" in result.output
+
+
+def words(text: str) -> str:
+    """Without blanks and the lines of a box, which stand where a terminal breaks a text."""
+    return "".join(text.replace("│", " ").split())
+
+
+@pytest.mark.parametrize("entry", entries(), ids=lambda entry: entry.name)
+def test_the_help_of_a_command_prints_every_text_as_it_stands_in_the_code(entry: CommandEntry, monkeypatch):
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 1000)
+    printed = words(CliRunner().invoke(app, [*entry.words, "--help"]).output)
+    assert words(inspect.cleandoc(entry.command.help)) in printed
+    for parameter in entry.command.params:
+        assert words(parameter.help or "") in printed, parameter.name
+    for command in getattr(entry.command, "commands", {}).values():
+        assert words(command.help.partition("\n\n")[0]) in printed, command.name
+
+
+def test_the_list_of_commands_prints_every_first_line(monkeypatch):
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 1000)
+    printed = words(CliRunner().invoke(app, ["--help"]).output)
+    for entry in entries():
+        if len(entry.words) == 1:
+            assert words(inspect.cleandoc(entry.command.help).partition("\n\n")[0]) in printed, entry.name

@@ -21,14 +21,13 @@ from compd.cli.problems import print_problems
 from compd.clock import MonotonicClock
 from compd.configuration import load
 from compd.errors import CompdError
-from compd.fleet import find_recordings
-from compd.gauge_description import read_capture
-from compd.gauge_tools import gauge_of_file
-from compd.instruments import SHAPES, ReadOptions, preview_export, read_export
-from compd.lines import PortArguments
-from compd.lines.kinds.mqtt.tls import tls_context
-from compd.lines.kinds.opc_ua.login import _certificate, _private_key
-from compd.live.loop import load_zero
+from compd.fleet.recordings import find_recordings
+from compd.instruments.export import ReadOptions
+from compd.instruments.formats import instrument_formats
+from compd.instruments.preview import preview_export
+from compd.instruments.read import read_export
+from compd.lines.mqtt_tls import tls_context
+from compd.lines.opc_ua_login import _certificate, _private_key
 from compd.live.loop.machine_zero import FILE_NAME as ZERO_NAME
 from compd.live.memory import TrustMemory
 from compd.live.record import RecordedCycles
@@ -184,7 +183,7 @@ READERS: dict[str, Reader] = {
     "machine zero": Reader(ZERO_NAME, lambda path: load_zero(path.parent, "", ("scale_1.position",))),
     "last readings": Reader(LAST_NAME, _last_readings),
     "export": Reader("export.txt", _export(None)),
-    **{f"export as {shape}": Reader("export.txt", _export(shape)) for shape in SHAPES},
+    **{f"export as {shape}": Reader("export.txt", _export(shape)) for shape in instrument_formats()},
     "export before it is joined": Reader("export.txt", lambda path: preview_export(path, ReadOptions())),
     "preset": Reader("mine.yaml", lambda path: PresetDirectory(path.parent).driver("mine")),
     "gauges": Reader("gauges.yaml", lambda path: gauge_of_file(path, None, PortArguments("", None, None, 1.0))),

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from compd.errors import RecordingError
-from compd.instruments.carto import read_carto
 from compd.instruments.export import ReadOptions
+from compd.instruments.formats.carto.reader import read_carto
 
 HEADER = (
     "HEADER::",

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.instruments.carto import read_carto
 from compd.instruments.export import ReadOptions
-from compd.instruments.writers.registry import FORMATS
-from compd.recording import read_recording
-from compd.simulation import simulate_campaign
+from compd.instruments.formats import written_forms
+from compd.instruments.formats.carto.reader import read_carto
+from compd.instruments.samples import POSITION
+from compd.recording.reader import read_recording
+from compd.simulation.campaign.simulate_campaign import simulate_campaign
 from tests.support.instrument_files import OFFSET_S, SplitCampaign, split_campaign, write_export
 from tests.support.simulated import TRIPOD
 
@@ -61,8 +62,8 @@ def test_points_are_the_rows_at_rest_in_their_order(split: SplitCampaign) -> Non
 
 
 def test_every_shape_is_written(split: SplitCampaign, tmp_path: Path) -> None:
-    for shape in FORMATS:
-        if shape != "carto":
+    for shape, form in written_forms().items():
+        if POSITION in form.axes:
             assert write_export(tmp_path, shape, split.track(sessions=[1])).stat().st_size > 10_000
 
 

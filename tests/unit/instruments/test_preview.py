@@ -11,7 +11,7 @@ import pytest
 from compd.instruments.export import ReadOptions
 from compd.instruments.preview import SHOWN_ROWS, preview_export
 from compd.instruments.read import read_export
-from compd.instruments.writers.samples import Samples
+from compd.instruments.samples import Samples
 from tests.support.instrument_files import write_export
 
 START = datetime(2026, 11, 22, 9, 15, 30)

@@ -13,12 +13,12 @@ import pytest
 from openpyxl import Workbook
 
 from compd.errors import RecordingError
-from compd.instruments import workbook_parts
 from compd.instruments.export import ReadOptions
+from compd.instruments.formats.workbook import parts
+from compd.instruments.formats.workbook.cells import cell_name
+from compd.instruments.formats.workbook.reader import read_workbook
 from compd.instruments.raw_table import RawTable
 from compd.instruments.read_limits import ReadLimits
-from compd.instruments.workbook import read_workbook
-from compd.instruments.workbook_cells import cell_name
 
 LIST = (("name", "X [mm]", "Y [mm]"), ("P1", 1.1, -2), ("P2", 1e-7, 0.1 + 0.2), ("P3", 123456.789, 4))
 
@@ -276,7 +276,7 @@ def test_hidden_rows_are_told(tmp_path: Path, attributes: str, hidden: bool) -> 
 def test_a_hidden_row_is_told_wherever_the_sheet_is_cut(
     tmp_path: Path, chunk: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workbook_parts, "_CHUNK", chunk)
+    monkeypatch.setattr(parts, "_CHUNK", chunk)
     rows = [("name", "X [mm]"), *((f"P{k}", k + 0.5) for k in range(200))]
     hidden = set(range(2, 200, 7))
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from compd.errors import CompdError
-from compd.instruments.carto import read_carto
 from compd.instruments.export import ReadOptions
-from compd.instruments.workbook import read_workbook
-from compd.instruments.writers.registry import FORMATS
-from compd.instruments.writers.samples import LENGTH, POSE, POSITION, Samples
-from compd.instruments.writers.spatial_analyzer import write_spatial_analyzer
+from compd.instruments.formats import written_forms
+from compd.instruments.formats.carto.reader import read_carto
+from compd.instruments.formats.spatial_analyzer.writer import write_spatial_analyzer
+from compd.instruments.formats.workbook.reader import read_workbook
+from compd.instruments.samples import LENGTH, POSE, POSITION, Samples
 
 START = datetime(2026, 2, 10, 12, 58, 22, 250000)
 VALUES = np.array([[1.5, -2.25, 1200.000125], [0.0, 0.000001, -3.0], [10.0, 20.0, 30.0]])
@@ -28,7 +28,7 @@ LINK = Samples(LENGTH, VALUES[:, :1], TIMES, start=START)
 
 
 def text_of(shape: str, samples: Samples) -> str:
-    return FORMATS[shape].write(samples).decode()
+    return written_forms()[shape].write(samples).decode()
 
 
 def test_spatial_analyzer_of_a_track() -> None:
@@ -73,7 +73,7 @@ def test_metres_keep_a_nanometre_and_attitude_is_in_rad() -> None:
 
 
 def test_german_text_has_semicolons_commas_and_a_mark() -> None:
-    raw = FORMATS["german"].write(TRACK)
+    raw = written_forms()["german"].write(TRACK)
     assert raw.startswith(b"\xef\xbb\xbfZeit;")
     assert raw.decode("utf-8-sig").split("\r\n")[:2] == [
         "Zeit;x [mm];y [mm];z [mm]",
@@ -89,7 +89,7 @@ def test_blanks_have_numbers_alone() -> None:
 
 
 def test_carto_byte_by_byte() -> None:
-    raw = FORMATS["carto"].write(LINK)
+    raw = written_forms()["carto"].write(LINK)
     text, _, data = raw.partition(b"Data:\r\n")
     keys = dict(line.split(": ", 1) for line in text.decode("ascii").split("\r\n") if ": " in line)
     assert text.startswith(b"HEADER::\r\n")
@@ -100,7 +100,7 @@ def test_carto_byte_by_byte() -> None:
 
 def test_a_workbook_cell_by_cell(tmp_path: Path) -> None:
     path = tmp_path / "list.xlsx"
-    path.write_bytes(FORMATS["xlsx"].write(POINTS))
+    path.write_bytes(written_forms()["xlsx"].write(POINTS))
     with zipfile.ZipFile(path) as archive:
         sheet = ElementTree.fromstring(archive.read("xl/worksheets/sheet1.xml"))
     space = {"x": "http://schemas.openxmlformats.org/spreadsheetml/2006/main"}
@@ -115,7 +115,7 @@ def test_a_workbook_cell_by_cell(tmp_path: Path) -> None:
 @pytest.mark.parametrize("samples", [TRACK, POINTS, LINK])
 def test_a_workbook_comes_back_by_its_reader(tmp_path: Path, samples: Samples) -> None:
     path = tmp_path / "list.xlsx"
-    path.write_bytes(FORMATS["xlsx"].write(samples))
+    path.write_bytes(written_forms()["xlsx"].write(samples))
     table = read_workbook(path, ReadOptions())
     assert table.header == tuple(samples.header("time_s" if samples.time_s is not None else ""))
     assert table.header_line == 3
@@ -125,7 +125,7 @@ def test_a_workbook_comes_back_by_its_reader(tmp_path: Path, samples: Samples) -
 @pytest.mark.parametrize("unit", ["mm", "um", "inch"])
 def test_carto_comes_back_by_its_reader(tmp_path: Path, unit: str) -> None:
     path = tmp_path / "link.rtx"
-    path.write_bytes(FORMATS["carto"].write(Samples(LENGTH, VALUES[:, :1], TIMES, unit=unit)))
+    path.write_bytes(written_forms()["carto"].write(Samples(LENGTH, VALUES[:, :1], TIMES, unit=unit)))
     export = read_carto(path, ReadOptions(unit=unit))
     np.testing.assert_allclose(export.values, VALUES[:, :1], rtol=1e-14)
     np.testing.assert_allclose(export.time_s, TIMES)
@@ -144,5 +144,5 @@ def test_carto_comes_back_by_its_reader(tmp_path: Path, unit: str) -> None:
 )
 def test_what_a_shape_cannot_hold_is_refused(shape: str, samples: Samples, said: str) -> None:
     with pytest.raises(CompdError) as caught:
-        FORMATS[shape].write(samples)
+        written_forms()[shape].write(samples)
     assert said in str(caught.value)

@@ -5,7 +5,6 @@ import { Check, Choice, Quantity } from "./fields.js";
 const ROLES = [["time", "time"], ["time[s]", "time, s"], ["time[ms]", "time, ms"], ["time[min]", "time, min"], ["time[h]", "time, h"], ["time[day]", "time, days"], ["date", "date"], ["x", "x"], ["y", "y"], ["z", "z"], ["rx", "rx"], ["ry", "ry"], ["rz", "rz"], ["length", "length"], ["name", "name"], ["group", "group"], ["collection", "collection"], ["-", "unused"]];
 const LENGTHS = ["mm", "um", "m", "cm", "inch", "ft"];
 const ANGLES = ["rad", "mrad", "deg", "arcsec"];
-const SHAPES = [["csv", "text with a delimiter"], ["blanks", "text between blanks"], ["sa", "SpatialAnalyzer"], ["carto", "CARTO"], ["xlsx", "Excel"]];
 const each = (values) => values.map((value) => [value, value]);
 const bare = (role) => role.replace(/\[.*/, "");
 
@@ -13,7 +12,7 @@ export class Reading {
   constructor(wizard, { fields, problems, table, taken, note }) {
     Object.assign(this, { wizard, problems, table, taken, note });
     this.fields = {
-      shape: new Choice(wizard, "shape", "Shape", SHAPES),
+      shape: new Choice(wizard, "shape", "Shape"),
       unit: new Choice(wizard, "unit", "Unit of lengths", each(LENGTHS)),
       angle_unit: new Choice(wizard, "angle_unit", "Unit of angles", each(ANGLES)),
       decimal: new Choice(wizard, "decimal", "Decimal sign", [[".", "point"], [",", "comma"]]),
@@ -27,7 +26,11 @@ export class Reading {
     fields.replaceChildren(...Object.values(this.fields).map((field) => field.label), this.guess);
   }
 
-  show({ table, choices }) {
+  show({ sources, table, choices }) {
+    if (sources && !this.formats) {
+      this.formats = sources.formats;
+      this.fields.shape.options(this.formats, "as found");
+    }
     for (const field of Object.values(this.fields)) if (choices[field.key] == null && field.control !== document.activeElement) field.clear();
     this.guess.disabled = !choices.columns;
     if (table === this.shown) return;
@@ -40,8 +43,8 @@ export class Reading {
     const { shape, unit, angle_unit, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
     const { assumed } = table;
     const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
-    shape.automatic(`detected: ${SHAPES.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
-    unit.automatic(lengthUnit && !choices.unit ? `detected: ${lengthUnit[1]}` : "as the file says");
+    shape.automatic(`as found: ${this.formats.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
+    unit.automatic(lengthUnit && !choices.unit ? `as found: ${lengthUnit[1]}` : "as the file says");
     angle_unit.offer(table.roles.some((role) => /^r[xyz]$/.test(role)));
     angle_unit.automatic("as the file says");
     decimal.automatic(assumed["decimal mark"] && !choices.decimal ? `detected: ${assumed["decimal mark"]}` : "detected");

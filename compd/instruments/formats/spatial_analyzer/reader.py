@@ -17,22 +17,15 @@ from compd.instruments.cells import is_number_column
 from compd.instruments.delimited import read_delimited
 from compd.instruments.export import ReadOptions
 from compd.instruments.export_problems import ExportProblems
+from compd.instruments.formats.spatial_analyzer import AXES
 from compd.instruments.raw_table import RawTable
 from compd.instruments.text_file import TextFile
 from compd.instruments.time_stamps import is_stamp
 from compd.units import unit_named
 
 _FRAME = re.compile(r"coordinate\s+frame\s*:?\s*'?([^']*?)'?\s*$", re.IGNORECASE)
-_AXES = re.compile(r"axes\s*=\s*(\w+)\s*:?\s*([^(]*?)\s*(?:\(\s*([^)]*?)\s*\))?\s*$", re.IGNORECASE)
+_AXES = re.compile(AXES, re.IGNORECASE)
 _NAMES_BEFORE = {1: ("name",), 2: ("group", "name"), 3: ("collection", "group", "name")}
-# The comments stand at the top.
-_LOOKED_AT = 50
-
-
-def is_spatial_analyzer(text: TextFile) -> bool:
-    """Whether the comments at the top are those of SpatialAnalyzer."""
-    comments = [line for line in text.lines[:_LOOKED_AT] if line.lstrip().startswith("//")]
-    return any("spatialanalyzer" in line.lower() or _AXES.search(line) for line in comments)
 
 
 def read_spatial_analyzer(text: TextFile, options: ReadOptions) -> RawTable:

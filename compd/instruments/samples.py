@@ -1,4 +1,4 @@
-"""What an instrument has measured, before it is written in one of the shapes."""
+"""What an instrument has measured, before it is written in one of the formats."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem
-from compd.instruments.export import ATTITUDE_AXES, LENGTH_AXES, POSITION_AXES
+from compd.instruments.axes import ATTITUDE_AXES, LENGTH_AXES, POSE_AXES, POSITION_AXES
 from compd.units import unit_factor
 
-LENGTH, POSITION, POSE = LENGTH_AXES, POSITION_AXES, (*POSITION_AXES, *ATTITUDE_AXES)
+LENGTH, POSITION, POSE = LENGTH_AXES, POSITION_AXES, POSE_AXES
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import io
 
-from compd.instruments.writers.samples import LENGTH, POSE, POSITION, Samples
+from compd.instruments.samples import Samples
 
 
 def write_workbook(samples: Samples) -> bytes:
     """The bytes of an .xlsx file with one sheet, `Measured`; time in s on the instrument's clock."""
     from openpyxl import Workbook
 
-    samples.need("an Excel list", LENGTH, POSITION, POSE)
     workbook = Workbook(write_only=True)
     sheet = workbook.create_sheet("Measured")
     sheet.append(["Measured points" if samples.time_s is None else "Measured track"])

@@ -13,10 +13,8 @@ import numpy as np
 
 from compd.errors import Problem, RecordingError
 from compd.instruments.export import ReadOptions
-from compd.instruments.raw_table import RawTable
-from compd.instruments.read_limits import ReadLimits
-from compd.instruments.workbook_cells import VALUES, Row, SheetReader, cell_name
-from compd.instruments.workbook_parts import (
+from compd.instruments.formats.workbook.cells import VALUES, Row, SheetReader, cell_name
+from compd.instruments.formats.workbook.parts import (
     BROKEN,
     SheetPart,
     check_workbook_file,
@@ -24,7 +22,9 @@ from compd.instruments.workbook_parts import (
     unreadable,
     why_broken,
 )
-from compd.instruments.workbook_table import SheetTable, find_table
+from compd.instruments.formats.workbook.table import SheetTable, find_table
+from compd.instruments.raw_table import RawTable
+from compd.instruments.read_limits import ReadLimits
 
 if TYPE_CHECKING:
     from openpyxl import Workbook

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.instruments.writers.samples import POSITION, Samples
+from compd.instruments.samples import Samples
 
 _HEADER = (
     "// SpatialAnalyzer SA ( {version} )",
@@ -20,7 +20,6 @@ def write_spatial_analyzer(
 
     The stamps are month/day/year and cut to whole seconds, as the program cuts them.
     """
-    samples.need("SpatialAnalyzer ASCII", POSITION)
     unit = _UNITS.get(samples.unit, samples.unit)
     lines = [line.format(version=version, frame=frame, unit=unit) for line in _HEADER]
     names = samples.names if samples.names is not None else [str(number) for number in range(len(samples.values))]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from compd.instruments.writers.samples import LENGTH, Samples
+from compd.instruments.samples import Samples
 
 
 def write_carto(samples: Samples) -> bytes:
     """One length at a constant rate, in `samples.unit`, of which the file says nothing.
 
-    The samples must be at equal distances in time. Raises CompdError for points, and for anything but a length.
+    The samples are lengths at equal distances in time.
     """
-    samples.need("CARTO .rtx", LENGTH, time=True)
     count, rate_hz = len(samples.values), samples.rate_hz
     date = "" if samples.start is None else f"{samples.start:%d/%m/%Y %H:%M:%S}"
     header = [

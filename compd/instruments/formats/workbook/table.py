@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from compd.errors import Problem, RecordingError
-from compd.instruments.workbook_cells import TEXT, VALUES, Row
+from compd.instruments.formats.workbook.cells import TEXT, VALUES, Row
 from compd.units import KNOWN_UNITS
 
 AGAIN = "the header again"

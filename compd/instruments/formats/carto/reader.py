@@ -21,11 +21,12 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.files import read_small_file
-from compd.instruments.export import LENGTH_AXES, InstrumentExport, ReadOptions
+from compd.files.atomic_files import read_small_file
+from compd.instruments.axes import LENGTH_AXES
+from compd.instruments.export import InstrumentExport, ReadOptions
+from compd.instruments.formats.carto import MAGIC
 from compd.units import UNIT_KINDS, unit_factor
 
-MAGIC = b"HEADER::"
 RATE_KEY, COUNT_KEY, DATE_KEY = "Actual sample rate", "Sample no", "Date"
 NOT_TRIED = "Renishaw CARTO .rtx, read by a description of the format: no file of an instrument was tried"
 _DATA = re.compile(rb"^Data:[ \t]*\r?\n", re.MULTILINE)

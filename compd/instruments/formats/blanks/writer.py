@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from compd.instruments.writers.samples import LENGTH, POSE, POSITION, Samples
+from compd.instruments.samples import Samples
 
 
 def write_blanks(samples: Samples) -> bytes:
     """Numbers in columns of fixed width, a name before them where points have one; nothing says unit, rate or axes."""
-    samples.need("columns between blanks", LENGTH, POSITION, POSE)
     names = [""] * len(samples.values) if samples.names is None else [f"{name:<10s} " for name in samples.names]
     rows = samples.written_values.tolist()
     lines = [name + " ".join(f"{value:14.6f}" for value in row) for name, row in zip(names, rows, strict=True)]

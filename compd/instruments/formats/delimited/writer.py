@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.instruments.writers.samples import LENGTH, POSE, POSITION, Samples
+from compd.instruments.samples import Samples
 
 # To the microsecond and to a nanometre, a nanoradian.
 _TIME_DECIMALS = 6
@@ -33,7 +33,6 @@ def write_german(samples: Samples) -> bytes:
 
 
 def _text(samples: Samples, time_name: str, times: list[str] | None, delimiter: str, end: str) -> bytes:
-    samples.need("delimited text", LENGTH, POSITION, POSE)
     header = samples.header(time_name if times is not None else "")
     units = [name.rpartition("_")[2] for name in header[-len(samples.axes) :]]
     decimals = [_DECIMALS.get(unit, _VALUE_DECIMALS) for unit in units]

@@ -1,0 +1,45 @@
+"""Commands whose help texts are plain text: brackets in them are printed, where typer takes them for markup."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any, TypeVar
+
+from typer.core import TyperCommand, TyperGroup
+
+Printed = TypeVar("Printed")
+
+
+class PlainCommand(TyperCommand):
+    """A command."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the help."""
+        super(PlainCommand, _with_parameters_escaped(self)).format_help(ctx, formatter)
+
+
+class PlainGroup(TyperGroup):
+    """A group of commands; its help shows the first paragraph of each."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the help."""
+        printed = _with_parameters_escaped(self)
+        printed.commands = {name: _escaped(command) for name, command in self.commands.items()}
+        super(PlainGroup, printed).format_help(ctx, formatter)
+
+
+def _with_parameters_escaped(command: Printed) -> Printed:
+    printed: Any = _escaped(command)
+    printed.params = [_escaped(parameter) for parameter in printed.params]
+    return printed  # type: ignore[no-any-return]
+
+
+def _escaped(described: Printed) -> Printed:
+    """A copy of a command or parameter with a help text in which every bracket is literal."""
+    from rich.markup import escape
+
+    printed: Any = copy(described)
+    for name in ("help", "short_help"):
+        if text := getattr(printed, name, None):
+            setattr(printed, name, escape(text))
+    return printed  # type: ignore[no-any-return]
