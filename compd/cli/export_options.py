@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.instruments.formats import instrument_formats
+from compd.instruments import instrument_formats
 
 if TYPE_CHECKING:
     from compd.instruments import ReadOptions

@@ -12,8 +12,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
-from compd.instruments.axes import LENGTH_AXES, POSITION_AXES
-from compd.instruments.export import InstrumentExport
+from compd.instruments import LENGTH_AXES, POSITION_AXES, InstrumentExport
 from compd.joining.assignment import Assignment, NoAssignment, repeat_distance_mm
 from compd.joining.by_distance import assign_by_distance
 from compd.joining.by_name import assign_by_name, check_names

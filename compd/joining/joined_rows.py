@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.instruments.axes import ATTITUDE_AXES, LENGTH_AXES
-from compd.instruments.export import InstrumentExport
+from compd.columns import ATTITUDE_COLUMNS, POSITION_COLUMNS, link_reference_column
+from compd.instruments import ATTITUDE_AXES, LENGTH_AXES, InstrumentExport
 from compd.joining.assignment import REPEAT_MM
 from compd.joining.by_time import Instrument
 from compd.joining.dwells import Dwell, dwell_columns

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.instruments.formats import instrument_formats, written_forms
+from compd.instruments import instrument_formats, written_forms
 from docs.generate.markdown import code, escape, heading, join, sentence, table
 
 INTRODUCTION = """\

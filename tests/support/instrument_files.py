@@ -22,8 +22,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.instruments.formats import instrument_formats, written_forms
-from compd.instruments.samples import LENGTH, POSITION, Samples
+from compd.instruments import Samples, instrument_formats, written_forms
+from compd.instruments.samples import LENGTH, POSITION
 from compd.units import UM_PER_MM
 
 # The recording's clock is ahead of the instrument's by this.

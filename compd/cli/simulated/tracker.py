@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from compd.cli.options import OverwriteOption
-from compd.instruments.axes import LENGTH_AXES, POSITION_AXES
-from compd.instruments.formats import written_forms
+from compd.instruments import LENGTH_AXES, POSITION_AXES, written_forms
 from compd.units import UM_PER_MM
 
 if TYPE_CHECKING:
-    from compd.instruments.instrument_format import WrittenForm
-    from compd.simulation.wires.looks import Looks
+    from compd.instruments import WrittenForm
+    from compd.simulation import Looks
 
     class ExportFormat(StrEnum):
         """In which form the export is written."""
@@ -62,9 +61,8 @@ def tracker(
     from datetime import datetime
 
     from compd.errors import CompdError, Problem
-    from compd.files.atomic_files import write_files
-    from compd.files.output_file import check_replaceable
-    from compd.simulation.wires.looks import Looks
+    from compd.files import check_replaceable, write_files
+    from compd.simulation import Looks
 
     written = written_forms()[shape.value]
     _check_options(written, link, points, unit)

@@ -11,11 +11,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from compd.errors import CompdError, Problem
-from compd.instruments.export import ReadOptions
-from compd.instruments.formats import instrument_formats
-from compd.instruments.read_limits import ReadLimits
-from compd.joining.by_time import Instrument
-from compd.joining.join import JOIN_BY, JoinOptions
+from compd.instruments import ReadLimits, ReadOptions, instrument_formats
+from compd.joining import JOIN_BY, Instrument, JoinOptions
 
 Value = TypeVar("Value", str, float, int)
 

@@ -11,7 +11,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from compd.errors import CompdError
-from compd.instruments.formats import instrument_formats
+from compd.instruments import instrument_formats
 from compd.page.joining.export_routes import export_routes
 from compd.page.joining.exports import MOST_BYTES, Exports
 from compd.page.joining.named_files import gauges_and_plans

@@ -10,8 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import CompdError, Problem
-from compd.instruments.axes import LENGTH_AXES, POSITION_AXES
-from compd.instruments.samples import Samples
+from compd.instruments import LENGTH_AXES, POSITION_AXES, Samples
 
 # Fewest samples of a dwell that gives a point: an instrument takes the mean of some readings.
 LEAST_LOOKS = 3

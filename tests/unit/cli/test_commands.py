@@ -9,8 +9,8 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
+from compd.cli.app import app
 from compd.cli.commands import make_app
-from compd.cli.main import app
 from docs.generate.commands import CommandEntry, entries
 
 

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import pytest
 import structlog
+from compd.lines.mqtt_tls import tls_context
+from compd.lines.opc_ua_login import _certificate, _private_key
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -21,13 +23,12 @@ from compd.cli.problems import print_problems
 from compd.clock import MonotonicClock
 from compd.configuration import load
 from compd.errors import CompdError
-from compd.fleet.recordings import find_recordings
-from compd.instruments.export import ReadOptions
-from compd.instruments.formats import instrument_formats
-from compd.instruments.preview import preview_export
-from compd.instruments.read import read_export
-from compd.lines.mqtt_tls import tls_context
-from compd.lines.opc_ua_login import _certificate, _private_key
+from compd.fleet import find_recordings
+from compd.gauge_description import read_capture
+from compd.gauge_tools import gauge_of_file
+from compd.instruments import ReadOptions, instrument_formats, preview_export, read_export
+from compd.lines import PortArguments
+from compd.live.loop import load_zero
 from compd.live.loop.machine_zero import FILE_NAME as ZERO_NAME
 from compd.live.memory import TrustMemory
 from compd.live.record import RecordedCycles

@@ -14,8 +14,8 @@ from starlette.applications import Starlette
 from starlette.testclient import TestClient
 from typer.testing import CliRunner
 
+from compd.cli.app import app
 from compd.cli.export_options import Shape
-from compd.cli.main import app
 from compd.cli.simulated.tracker import ExportFormat
 from compd.errors import CompdError
 from compd.instruments import formats
@@ -23,7 +23,8 @@ from compd.instruments.export import ReadOptions
 from compd.instruments.formats import instrument_formats, written_forms
 from compd.instruments.instrument_format import InstrumentFormat, TextFormat, WrittenForm
 from compd.instruments.read import read_export
-from compd.page.guard import Guard, Token, hashed
+from compd.page import Token, hashed
+from compd.page.guard import Guard
 from compd.page.joining.choices import read_choices
 from compd.page.joining.routes import JoinRoutes
 from compd.page.recordings import Recordings

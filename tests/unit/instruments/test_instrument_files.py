@@ -11,8 +11,8 @@ from compd.instruments.export import ReadOptions
 from compd.instruments.formats import written_forms
 from compd.instruments.formats.carto.reader import read_carto
 from compd.instruments.samples import POSITION
-from compd.recording.reader import read_recording
-from compd.simulation.campaign.simulate_campaign import simulate_campaign
+from compd.recording import read_recording
+from compd.simulation import simulate_campaign
 from tests.support.instrument_files import OFFSET_S, SplitCampaign, split_campaign, write_export
 from tests.support.simulated import TRIPOD
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
-from compd.files.atomic_files import read_small_file
+from compd.files import read_small_file
 from compd.instruments.axes import LENGTH_AXES
 from compd.instruments.export import InstrumentExport, ReadOptions
 from compd.instruments.formats.carto import MAGIC
