@@ -51,7 +51,7 @@ class LineSettings(Section):
 class PolledLineSettings(LineSettings):
     """Keys of a line whose gauges are polled."""
 
-    timeout_s: Positive = Field(description="how long to wait for the first byte of a reply")
+    timeout_s: Positive = Field(description="wait for the first byte of a reply")
     back_off_s: BackOff = Field(default=(0.5, 10.0), description=BACK_OFF)
     poll_every_s: NotNegative = Field(
         default=0.0, description="time from one round to the next; 0 = as fast as the line goes"
@@ -64,14 +64,14 @@ class PolledLineSettings(LineSettings):
 class PushedLineSettings(LineSettings):
     """Keys of a line on which the devices speak by themselves."""
 
-    # Nobody can be asked to latch where nobody is asked.
+    # Devices that push their values cannot be told to latch.
     round_trigger: ClassVar[None] = None
     # The key of the line, or else of the gauge, that says how often a new value comes.
     period_key: ClassVar[str] = "period_s"
 
     timeout_s: Positive = Field(description="how long the other end may take to accept a connection, or to answer")
     back_off_s: BackOff = Field(default=(0.5, 10.0), description=BACK_OFF)
-    user: Text | None = Field(default=None, description="who logs in; nobody does if left out")
+    user: Text | None = Field(default=None, description="name for the login; omitted for none")
     password_file: AbsolutePath | None = Field(default=None, description="file with the password of `user`, one line")
 
     @model_validator(mode="after")
@@ -87,5 +87,5 @@ class PushedLineSettings(LineSettings):
 
 
 def powered(line: SettingsT, gauges: Iterable[Gauge[Any]]) -> SettingsT:
-    """The line with DTR and RTS as its gauges need them, where its own keys leave them open."""
+    """The line with DTR and RTS as its gauges need them, unless set by its own keys."""
     return line.powered({name: high for gauge in gauges for name, high in gauge.line_needs.items()})

@@ -15,7 +15,7 @@ _URL_HAS_NONE = "a device server has these lines only behind rfc2217://host:port
 
 
 class Rs485(Section):
-    """RTS as the direction of a two-wire RS-485 line, for adapters that do not switch it themselves."""
+    """RTS as the direction of a two-wire RS-485 line, for adapters without automatic switching."""
 
     rts_when_sending: bool = Field(default=True, description="RTS is HIGH while a request is sent, else LOW; or not")
     delay_before_s: NotNegative = Field(default=0.0, description="from the switch of RTS to the request")

@@ -16,6 +16,6 @@ class ModbusRtuLine(ModbusSerialSettings):
     kind: Literal["modbus_rtu"] = Field(description="Modbus RTU registers")
     skip_bytes: Annotated[int, Field(ge=0, le=MOST_SKIPPED_BYTES)] = Field(
         default=0,
-        description="so many bytes before a reply are damage of a transceiver that changes its direction: they are "
+        description="most bytes before a reply from a transceiver that changes its direction: they are "
         "skipped where the checksum of the rest fits; left out: such a reply counts as damaged",
     )
