@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from compd.configuration import FRAME_DISTANCES
+from compd.operation_settings import FRAME_DISTANCES
 from compd.tables import ProblemList, Table
 from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Geometry, ToolOnPlateSettings, ToolOnPlatformSettings, Wiring
+from compd.configuration import Geometry, ToolOnPlateSettings, ToolOnPlatformSettings
 from compd.model import MachineModel, machine_constants, machine_model
 from compd.model.effects import MachineDetails
 from compd.model.kinematics import Arrangement, Contact, ToolOnPlate, ToolOnPlatform
+from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix, to_outer
 
 # Equation (1): the two ball shanks of a revolute joint are averaged, gB = (Ra + Rb) / 2.

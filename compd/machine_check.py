@@ -17,8 +17,6 @@ from compd.configuration import (
     Configuration,
     Examined,
     Geometry,
-    SocketSettings,
-    StateSettings,
     effect_file_problems,
     examine,
     in_order,
@@ -30,6 +28,7 @@ from compd.errors import ConfigurationError, KinematicsError, Problem
 from compd.machine_builder import build_model
 from compd.machine_slips import axes_along_links, slips
 from compd.model import MachineModel
+from compd.operation_settings import SocketSettings, StateSettings
 
 SectionT = TypeVar("SectionT", bound=Section)
 

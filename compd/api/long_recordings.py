@@ -24,7 +24,7 @@ from compd.comparison import (
     open_stream,
 )
 from compd.configuration import Machine
-from compd.diagnosis import refit_model
+from compd.model_changes import refit_model
 from compd.model_file import ModelFile
 
 # Called with the number of finished rows, block after block.

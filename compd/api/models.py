@@ -8,10 +8,10 @@ from typing import Any
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
 from compd.configuration import Machine, load_machine, shipped_names
-from compd.diagnosis import Refinement, add_to_model, unrefined
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effects import Effect
 from compd.model.library import find_effect, gather_effects, load_library, named_effect
+from compd.model_changes import Refinement, add_to_model, unrefined
 from compd.model_file import ModelFile, read_model_file, read_stored
 from compd.recording import EXTERNAL
 

@@ -18,13 +18,14 @@ from compd.arrays import FloatArray
 from compd.commissioning.jump_trials import FeignedJump, feigned_jumps, measured_lengths
 from compd.commissioning.line_budget import LineBudget, line_budgets
 from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
-from compd.configuration import FRAME_DISTANCES, Configuration
+from compd.configuration import Configuration
 from compd.errors import KinematicsError
 from compd.live.acquisition import LEAST_MOTION, LEAST_WAY_MM, UNIT_LIMITS, WAY_SHARE
 from compd.live.loop import RESTED
 from compd.machine_builder import build_model
 from compd.model import MachineModel
 from compd.model.kinematics import ToolOnPlate
+from compd.operation_settings import FRAME_DISTANCES
 from compd.stated_noise import SCATTER_RATIO, tolerance_mm
 from compd.units import UM_PER_MM
 

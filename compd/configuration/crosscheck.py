@@ -8,11 +8,11 @@ from typing import Any
 
 from compd.configuration.line_checks import line_problems
 from compd.configuration.line_slips import line_slips
-from compd.configuration.operation import FRAME_DISTANCES
 from compd.configuration.sections import Sections
 from compd.documents import Location
 from compd.errors import Problem
 from compd.gauge import Gauge, GaugeOptions
+from compd.operation_settings import FRAME_DISTANCES
 
 # Packages whose drivers are covered by compd's own tests.
 _OWN_PACKAGES = ("compd", "compd_drivers")

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from compd.configuration.operation import TargetSettings, VoteSettings
+from compd.operation_settings import TargetSettings, VoteSettings
 
 # Keys about the trust in a gauge, not its value.
 NOT_IN_ZERO = (

@@ -15,15 +15,6 @@ from compd.configuration import crosscheck
 from compd.configuration.effect_files import EffectFile, EffectFiles
 from compd.configuration.geometry import LINKS, Geometry, contradictions
 from compd.configuration.hashes import NOT_IN_ZERO, hash_of
-from compd.configuration.operation import (
-    AcquisitionSettings,
-    LimitSettings,
-    LoopSettings,
-    SocketSettings,
-    StateSettings,
-    VoteSettings,
-    Wiring,
-)
 from compd.configuration.plausible import implausible
 from compd.configuration.sections import Sections
 from compd.documents import (
@@ -41,6 +32,15 @@ from compd.errors import ConfigurationError, PluginError, Problem
 from compd.gauge import Gauge, GaugeOptions
 from compd.line_settings import LineSettings
 from compd.lines import LINES_BY_NAME
+from compd.operation_settings import (
+    AcquisitionSettings,
+    LimitSettings,
+    LoopSettings,
+    SocketSettings,
+    StateSettings,
+    VoteSettings,
+    Wiring,
+)
 from compd.plugins import GAUGES
 from compd.plugins import load as load_plugin
 from compd.result_tables import Columns, data_frame, html_table

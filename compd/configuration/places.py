@@ -7,9 +7,9 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from compd.configuration.operation import SocketSettings, StateSettings
 from compd.documents import Document
 from compd.errors import Problem
+from compd.operation_settings import SocketSettings, StateSettings
 
 # Below these the service manager creates the daemon's own directory: RuntimeDirectory=, StateDirectory=.
 _OF_SERVICE_MANAGER = tuple(map(Path, ("/run", "/var/lib")))

@@ -1,17 +1,12 @@
 from .candidate_result import candidate_results as candidate_results
 from .candidates.candidates import Candidate as Candidate
+from .candidates.candidates import library_pool as library_pool
 from .criteria import Criteria as Criteria
 from .findings import CandidateResult as CandidateResult
 from .findings import DiagnosisStep as DiagnosisStep
 from .findings import EmpiricalFinding as EmpiricalFinding
 from .holdout import Holdout as Holdout
 from .holdout import evaluate_holdout as evaluate_holdout
-from .model_changes import Refinement as Refinement
-from .model_changes import add_to_model as add_to_model
-from .model_changes import refit_model as refit_model
-from .model_changes import remove_effect as remove_effect
-from .model_changes import undo_step as undo_step
-from .model_changes import unrefined as unrefined
 from .recording_diagnosis import MOST_ROWS as MOST_ROWS
 from .recording_diagnosis import candidate_pool as candidate_pool
 from .recording_diagnosis import diagnose as diagnose
@@ -23,6 +18,7 @@ from .search.rivals import collinearity as collinearity
 from .search.subset_losses import SubsetLosses as SubsetLosses
 from .stages import ONLY_WHERE_NEEDED as ONLY_WHERE_NEEDED
 from .stages import STAGES as STAGES
+from .unmodelled import with_disturbances as with_disturbances
 from .verdict import Diagnosis as Diagnosis
 from .words.error_fall import ErrorFall as ErrorFall
 from .words.error_fall import error_fall as error_fall

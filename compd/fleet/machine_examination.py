@@ -12,7 +12,6 @@ from pathlib import Path
 from compd.api import LongRecording, compare, diagnose, open_long
 from compd.comparison import AlignedRecording, Comparison, compare_blocks, is_long, open_recording
 from compd.configuration import LINKS, Configuration, load
-from compd.diagnosis import refit_model
 from compd.errors import CompdError, Problem
 from compd.files import file_stamp
 from compd.fleet.fleet_recording import FleetRecording, content_hash
@@ -25,6 +24,7 @@ from compd.fleet.recording_result import (
     FleetEstimate,
     RecordingResult,
 )
+from compd.model_changes import refit_model
 from compd.model_file import ModelFile, read_model_file, read_stored
 from compd.recording import EXTERNAL
 from compd.release import __version__

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from compd.configuration import FRAME_DISTANCES, Configuration
+from compd.configuration import Configuration
 from compd.live.acquisition import (
     Judge,
     MotionLimits,
@@ -19,6 +19,7 @@ from compd.live.acquisition import (
 from compd.live.loop import MachineWires, Wire
 from compd.live.memory import TrustMemory
 from compd.model import MachineModel
+from compd.operation_settings import FRAME_DISTANCES
 from compd.stated_noise import SAME_VALUE_SIGMAS, tolerance_mm
 from compd.units import UM_PER_MM, unit_of
 

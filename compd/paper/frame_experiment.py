@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import FRAME_DISTANCES, Configuration
+from compd.configuration import Configuration
 from compd.machine_builder import build_model
 from compd.model import MachineModel
 from compd.model.kinematics import (
@@ -24,6 +24,7 @@ from compd.model.kinematics import (
     instantaneous_frame,
     solve_frame,
 )
+from compd.operation_settings import FRAME_DISTANCES
 from compd.paper.gauge_log import GaugeLog
 from compd.rotation import compose, rotation_matrix, to_outer
 from compd.simulation import Strengths, World

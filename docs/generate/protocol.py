@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 
-from compd.configuration import TargetSettings, TcpSocket
 from compd.live.loop.packet_layout import PACKET_FIELDS, PACKET_SIZE
 from compd.live.service import PROTOCOL
 from compd.live.service.client_session import MAX_BEHIND_BYTES, MAX_READINGS_BEHIND_BYTES
@@ -17,6 +16,7 @@ from compd.live.service.messages import LARGEST_NUMBER, MAX_LINE_BYTES, ErrorCod
 from compd.live.service.order import OrderKeys
 from compd.live.service.request import Asker, Request
 from compd.live.service.requests import REQUESTS
+from compd.operation_settings import TargetSettings, TcpSocket
 from compd.setpoint_states import Mode
 from docs.generate.live_examples import Exchange, exchanges, shown
 from docs.generate.markdown import code, escape, fence, heading, join, link, prose, table, target, term

@@ -32,12 +32,12 @@ from typing import Any
 
 import numpy as np
 
-from compd.configuration import LoopSettings
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.loop import CycleInputs, CycleState, Setpoint, step
 from compd.live.loop.setpoint import SetpointValues
 from compd.live.memory import Readings, Snapshot
 from compd.live.system import realtime
+from compd.operation_settings import LoopSettings
 from compd.setpoint_states import Mode, State
 from tests.benchmarks.bench_loop import PRIORITY, BusyDrivers, load_beside
 from tests.benchmarks.figures import quiet, show

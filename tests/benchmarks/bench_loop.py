@@ -27,12 +27,13 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.client import connect
-from compd.configuration import Configuration, SocketSettings, StateSettings, load
+from compd.configuration import Configuration, load
 from compd.gauge import good
 from compd.live import daemon as daemon_module
 from compd.live.loop import MachineZero
 from compd.live.loop.timing import BIN_US
 from compd.live.memory import Latest
+from compd.operation_settings import SocketSettings, StateSettings
 from tests.benchmarks.figures import quiet, show
 from tests.support.live_machine import CONFIG, RAW_AT_ZERO_MM
 from tests.support.running_daemon import supervised

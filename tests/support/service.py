@@ -11,13 +11,13 @@ import numpy as np
 
 from compd.clock import MonotonicClock
 from compd.compensation import CorrectionShares
-from compd.configuration import SocketSettings
 from compd.errors import Problem, StateError
 from compd.live.loop import Commands, SentSetpoint, Setpoint
 from compd.live.loop.setpoint import SetpointValues
 from compd.live.memory import PollRequests, SharedRing
 from compd.live.service import Listeners, Publisher, RequestContext, Requests, TargetKeys, TcpAccess
 from compd.live.service.messages import line
+from compd.operation_settings import SocketSettings
 from compd.setpoint_states import Mode, State
 
 PERIOD_S = 0.005

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from compd.configuration import Geometry, Wiring
+from compd.configuration import Geometry
 from compd.documents import read_document
+from compd.operation_settings import Wiring
 from tests.support.paths import CONFIG
 
 TRIPOD = CONFIG / "tripod-cmm.yaml"

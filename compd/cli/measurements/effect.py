@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from compd.arrays import FloatArray
     from compd.comparison import AlignedRecording, FitResult
     from compd.configuration import Configuration
-    from compd.diagnosis import Refinement
     from compd.errors import Problem
     from compd.model.effects import Effect
+    from compd.model_changes import Refinement
     from compd.model_file import Declaration, ModelFile
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` creates a missing one.")]
@@ -105,7 +105,7 @@ def remove(
     dry_run: DryRunOption = False,
 ) -> None:
     """Take an effect out of a model and fit the others again."""
-    from compd.diagnosis import remove_effect
+    from compd.model_changes import remove_effect
 
     aligned, refine = _open(recording, machine)
     before = _read_model(model, aligned)
@@ -117,7 +117,7 @@ def fit(
     recording: RecordingOption, model: ModelOption, machine: MachineOption = None, dry_run: DryRunOption = False
 ) -> None:
     """Fit all effects of a model again, on another recording."""
-    from compd.diagnosis import refit_model
+    from compd.model_changes import refit_model
 
     aligned, refine = _open(recording, machine)
     before = _read_model(model, aligned)
@@ -127,7 +127,7 @@ def fit(
 @effect.command()
 def undo(model: ModelOption) -> None:
     """Undo the last step; repeat it for the previous ones. The ledger keeps them."""
-    from compd.diagnosis import undo_step
+    from compd.model_changes import undo_step
     from compd.model_file import read_stored, write_stored
 
     after = undo_step(read_stored(model), str(model))
@@ -143,7 +143,7 @@ def _declared_id(declared: Declaration) -> str:
 def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinement]:
     """The recording; for one too long for the memory a sample, and the function that fits to all its rows."""
     from compd.comparison import is_long, open_recording
-    from compd.diagnosis import unrefined
+    from compd.model_changes import unrefined
 
     if not is_long(path):
         return open_recording(path, machine), unrefined

@@ -74,8 +74,8 @@ def check(
 
 def print_zero(configuration: Configuration) -> None:
     """Print the lengths at machine zero for a tape measure."""
-    from compd.configuration import FRAME_DISTANCES
     from compd.machine_builder import build_model
+    from compd.operation_settings import FRAME_DISTANCES
 
     zero = build_model(configuration.geometry, configuration.wiring).zero
     links = ", ".join(f"{number} {mm:.1f}" for number, mm in enumerate(zero.link_length_mm, start=1))

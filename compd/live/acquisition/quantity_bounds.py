@@ -10,8 +10,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from compd.configuration import QuantityWire
 from compd.live.acquisition.quantity_trust import QuantityLimits
+from compd.operation_settings import QuantityWire
 from compd.recording import limit_of
 from compd.stated_noise import SAME_VALUE_SIGMAS
 from compd.units import unit_of

@@ -11,7 +11,6 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.compensation import WarmStart
-from compd.configuration import LimitSettings, LoopSettings
 from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.machine_zero import MachineZero
@@ -21,6 +20,7 @@ from compd.live.loop.tip_uncertainty import scatter_limits_mm
 from compd.live.loop.wiring import MachineWires
 from compd.live.memory import Snapshot
 from compd.model import EffectMemory, GaugeNoise, MachineModel
+from compd.operation_settings import LimitSettings, LoopSettings
 
 # The uncertainty of the tip changes over seconds, as the machine warms up or crosses its workspace.
 _UNCERTAINTY_EVERY_S = 1.0

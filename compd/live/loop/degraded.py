@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import LoopSettings
 from compd.live.loop.reasons import Lost
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators
+from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
 
 GROUPS = ("joints", "frame", "effects")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import LimitSettings
+from compd.operation_settings import LimitSettings
 from compd.setpoint_states import State
 
 # A step may exceed the slew limit by this much, which is rounding, without being reported as slewing.

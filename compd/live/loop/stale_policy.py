@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import LoopSettings
 from compd.live.loop.reasons import Lost
 from compd.live.loop.wiring import Beyond
+from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
 
 # How long the correction is held, at most, while the daemon ends.

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import structlog
 
 from compd.clock import Clock
-from compd.configuration import LoopSettings
 from compd.errors import CompdError, Problem, StateError
 from compd.live.loop import (
     AdoptedModels,
@@ -37,6 +36,7 @@ from compd.live.loop import (
 )
 from compd.live.memory import Control, Latest, SharedRing
 from compd.live.system import limit_wake_latency, lock_memory, sharpen_timers, use_fifo
+from compd.operation_settings import LoopSettings
 
 # Cycles that a loop computes before the first that counts.
 _TRIAL_CYCLES = 20

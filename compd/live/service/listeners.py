@@ -7,8 +7,8 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 
-from compd.configuration import SocketSettings
 from compd.errors import DaemonError, Problem
+from compd.operation_settings import SocketSettings
 
 _UNIX_SOCKET_MODE = 0o660  # the daemon's user and group
 _BACKLOG = 16

@@ -9,13 +9,13 @@ from typing import Any, Literal
 import structlog
 
 from compd.clock import Clock, MonotonicClock
-from compd.configuration import TargetSettings
 from compd.live.loop import Commands, Target
 from compd.live.service.client_session import ClientSession
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 from compd.live.service.model_switch import ModelWish
 from compd.live.service.readings_message import ReadingsMessage
 from compd.live.service.tcp_access import TcpAccess
+from compd.operation_settings import TargetSettings
 
 # Sends a line to the client that asked, from any thread: the answer to a request that takes time.
 SendLater = Callable[[bytes], None]

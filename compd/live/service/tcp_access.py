@@ -8,9 +8,9 @@ import os
 import stat
 from pathlib import Path
 
-from compd.configuration import TcpSocket
 from compd.errors import DaemonError, Problem
 from compd.files import read_small_file
+from compd.operation_settings import TcpSocket
 
 # 16 characters of base64 are 96 bits: not to be guessed at one try in a second.
 _SHORTEST_TOKEN = 16

@@ -5,9 +5,9 @@ from __future__ import annotations
 import socket
 from typing import Any
 
-from compd.configuration import UdpTarget
 from compd.errors import DaemonError, Problem
 from compd.live.loop import SentSetpoint
+from compd.operation_settings import UdpTarget
 
 
 class UdpSender:

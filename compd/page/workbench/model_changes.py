@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from compd.api import add_effect
-from compd.diagnosis import refit_model, remove_effect, undo_step
 from compd.errors import Problem, StateError
 from compd.model.effects import Effect
+from compd.model_changes import refit_model, remove_effect, undo_step
 from compd.model_file import EffectNumber, ModelFile, read_stored, write_stored
 from compd.page.workbench.opened_recording import OpenedRecording, model_of
 from compd.text import nan_to_null

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Geometry, Wiring
+from compd.configuration import Geometry
+from compd.operation_settings import Wiring
 from compd.simulation.campaign.campaign_plan import (
     PASS_MM,
     PASS_ROW_EVERY_S,

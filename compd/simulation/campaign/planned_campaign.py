@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Geometry, Wiring
+from compd.configuration import Geometry
+from compd.operation_settings import Wiring
 from compd.simulation.campaign.campaign import LONGEST_WAIT_S
 from compd.simulation.campaign.campaign_plan import PASS_ROW_EVERY_S, REPEAT_AFTER_S
 from compd.simulation.campaign.row_log import LoggedRows, RowLog

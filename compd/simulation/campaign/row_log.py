@@ -16,7 +16,7 @@ from compd.columns import (
     link_reference_column,
     scale_columns,
 )
-from compd.configuration import Wiring
+from compd.operation_settings import Wiring
 from compd.simulation.truth.fixed_places import FixedPlaces
 from compd.simulation.truth.indicated_tip import IndicatedTip
 from compd.simulation.truth.instruments import ReferenceInstrument

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from compd.configuration import Geometry, Wiring
+from compd.configuration import Geometry
+from compd.operation_settings import Wiring
 from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import CampaignPlan, draw_campaign_plan
 from compd.simulation.causes.catalogue import CAUSES, build_cause, possible_causes, shuffle_causes

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Wiring
+from compd.operation_settings import Wiring
 from compd.simulation.truth.closure import CLOSED_MM, Posture, homogeneous
 from compd.simulation.truth.frame import DISTANCE_ENDS, DISTANCES, distances_mm
 from compd.simulation.truth.mechanism import Mechanism

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Geometry, Wiring
+from compd.configuration import Geometry
+from compd.operation_settings import Wiring
 from compd.simulation.truth.frame import DISTANCES
 from compd.simulation.truth.joints import Balls
 from compd.simulation.truth.strengths import Strengths

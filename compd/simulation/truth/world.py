@@ -8,8 +8,9 @@ from typing import Literal
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Geometry, Wiring
+from compd.configuration import Geometry
 from compd.errors import CompdError, KinematicsError, Problem
+from compd.operation_settings import Wiring
 from compd.simulation.truth.cause import Cause, Interval
 from compd.simulation.truth.closure import Posture
 from compd.simulation.truth.equilibrium import Equilibrium, EquilibriumState

@@ -13,8 +13,9 @@ from typer.testing import CliRunner
 from compd.cli.app import app
 from compd.cli.live.poll import gauge_status
 from compd.client import connect
-from compd.configuration import SocketSettings, StateSettings, load
+from compd.configuration import load
 from compd.documents import read_document
+from compd.operation_settings import SocketSettings, StateSettings
 from tests.support.paths import CONFIG
 from tests.support.running_daemon import supervised
 from tests.support.serial_gateway import SerialGateway, serial_gateway

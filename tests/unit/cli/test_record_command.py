@@ -15,11 +15,12 @@ from dataclasses import replace
 import pytest
 
 from compd.client import connect
-from compd.configuration import SocketSettings, StateSettings, load
+from compd.configuration import load
 from compd.errors import DaemonError
 from compd.gauge import good
 from compd.live import daemon as daemon_module
 from compd.live.record import RecordedCycles, replay_cycles
+from compd.operation_settings import SocketSettings, StateSettings
 from compd.recording import OpenPart, convert_recording, read_recording
 from tests.support.live_machine import CONFIG
 from tests.support.running_daemon import supervised

@@ -11,8 +11,8 @@ import yaml
 
 import compd
 from compd.comparison import AlignedRecording
-from compd.diagnosis.model_changes import add_to_model, remove_effect
 from compd.model.library import load_library
+from compd.model_changes import add_to_model, remove_effect
 from compd.model_file import ModelFile
 from tests.support.measured import aligned, gauges, hidden, record
 

@@ -17,12 +17,13 @@ import structlog
 
 from compd.client import connect
 from compd.clock import MonotonicClock
-from compd.configuration import Configuration, SocketSettings, StateSettings, load
+from compd.configuration import Configuration, load
 from compd.errors import DaemonError
 from compd.gauge import Quality, bad, good
 from compd.live import daemon as daemon_module
 from compd.live.daemon import Daemon
 from compd.live.system.systemd import Notifier
+from compd.operation_settings import SocketSettings, StateSettings
 from tests.support.paths import CONFIG
 from tests.support.running_daemon import supervised
 

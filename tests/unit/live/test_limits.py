@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compd.configuration import LimitSettings
 from compd.live.loop.limits import limit_correction
+from compd.operation_settings import LimitSettings
 from compd.setpoint_states import State
 
 LARGEST_MM = 0.2

@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import pytest
 
-from compd.configuration import LoopSettings
 from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
 from compd.live.loop.loop import Loop
 from compd.live.loop.timing import Histogram, LoopTiming
 from compd.live.system.realtime import sleep_until
+from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
 from tests.support.live_machine import machine
 

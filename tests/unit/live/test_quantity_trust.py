@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from compd.configuration import QuantityWire, VoteSettings
 from compd.gauge import Quality, good
 from compd.live.acquisition.cross_checks.machine_view import MachineView
 from compd.live.acquisition.cross_checks.standing_temperature import StandingTemperature
 from compd.live.acquisition.quantity_bounds import quantity_limits
 from compd.live.acquisition.quantity_trust import QuantityTrust
 from compd.live.memory.trust_memory import Doubt, TrustMemory
+from compd.operation_settings import QuantityWire, VoteSettings
 from compd.setpoint_states import State
 from compd.units import unit_of
 from tests.support.thermometers import warm_machine

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from compd.configuration import LoopSettings
 from compd.live.processes.loop_process import wake_latency_us
 from compd.live.system.realtime import limit_wake_latency
+from compd.operation_settings import LoopSettings
 
 LOOP = {"stale_after_s": 0.5, "on_stale": "hold", "hold_s": 1}
 

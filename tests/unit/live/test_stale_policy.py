@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from compd.configuration import LoopSettings
 from compd.gauge import Quality
 from compd.live.loop.reasons import WAITS_FOR_PERSON, Lost
 from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
+from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
 from tests.support.live_machine import PERIOD_S, machine
 

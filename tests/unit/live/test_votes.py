@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from compd.configuration import FrameVote, VoteSettings
 from compd.gauge import good
 from compd.live.acquisition.cross_checks.cross_checks import LOOK_EVERY_S, Votes
 from compd.live.acquisition.cross_checks.machine_view import WiredLength
@@ -16,6 +15,7 @@ from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
+from compd.operation_settings import FrameVote, VoteSettings
 from compd.stated_noise import tolerance_mm
 
 NOISE_UM, STEP_MM, POLL_S = 0.05, 0.00001, 0.01

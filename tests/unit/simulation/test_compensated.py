@@ -7,8 +7,9 @@ import pytest
 
 from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
-from compd.configuration import Geometry, Wiring
+from compd.configuration import Geometry
 from compd.machine_builder import build_model
+from compd.operation_settings import Wiring
 from compd.simulation.truth.frame import DISTANCES
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
 from compd.simulation.truth.world import World

@@ -10,8 +10,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from compd.arrays import FloatArray
-from compd.configuration import Geometry, Wiring
+from compd.configuration import Geometry
 from compd.errors import CompdError
+from compd.operation_settings import Wiring
 from compd.simulation.truth.closure import homogeneous
 from compd.simulation.truth.frame import DISTANCES, distances_mm
 from compd.simulation.truth.mechanism import Mechanism

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import structlog
 
-from compd.configuration import VoteSettings
 from compd.live.acquisition.cross_checks.following_error import FollowingError
 from compd.live.acquisition.cross_checks.frame_temperature import FrameTemperature
 from compd.live.acquisition.cross_checks.joint_pair import JointPair
@@ -22,6 +21,7 @@ from compd.live.acquisition.cross_checks.standing_scale import StandingScale
 from compd.live.acquisition.cross_checks.standing_temperature import StandingTemperature
 from compd.live.acquisition.cross_checks.tip_speed import TipSpeed
 from compd.live.memory import Doubt, Latest, TrustMemory
+from compd.operation_settings import VoteSettings
 
 # Interval (s) of looks.
 LOOK_EVERY_S = 0.1

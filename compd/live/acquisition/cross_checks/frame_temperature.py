@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from compd.configuration import FrameVote
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView
+from compd.operation_settings import FrameVote
 from compd.units import UM_PER_MM
 
 

@@ -8,9 +8,9 @@ from contextlib import closing
 
 import pytest
 
-from compd.configuration import SocketSettings
 from compd.errors import DaemonError
 from compd.live.service.listeners import Listeners
+from compd.operation_settings import SocketSettings
 from tests.support.service import TARGET_KEYS, VERSION, Service
 
 

@@ -9,10 +9,10 @@ import pytest
 import structlog
 
 from compd.client import connect
-from compd.configuration import TcpSocket
 from compd.errors import DaemonError
 from compd.live.service import connection_limits as seats
 from compd.live.service.tcp_access import TcpAccess
+from compd.operation_settings import TcpSocket
 from tests.support.service import VERSION, Service
 
 TOKEN = "hvNhV6l3Zk3lY0cJ4lV5Wg"

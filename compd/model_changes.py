@@ -11,9 +11,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording, Comparison, FitResult, compare, fit, initial_effect, search_constants
-from compd.diagnosis.candidates.candidates import library_pool
-from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.unmodelled import with_disturbances
+from compd.diagnosis import Criteria, library_pool, with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effects import Effect, FittedEffect, Observations, counted_from, recounted
 from compd.model.library import load_library
