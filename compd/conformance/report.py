@@ -11,19 +11,100 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from compd.conformance.case_result import CaseResult, Subject
-from compd.conformance.cases import FIRST_CASES, run_cases
+from compd.conformance import waiting_cases, wire_cases
+from compd.conformance.case_result import GOOD, Case, CaseResult, Subject, result_of, violations_of
+from compd.conformance.damage_cases import DAMAGE_CASES
 from compd.conformance.harness import ConformanceSession, ConformanceWire
-from compd.conformance.peer import Peer, SensorValues
-from compd.conformance.talker_cases import CHARACTER_S, opened_within_a_line, seldom_read
+from compd.conformance.peer import GOLDEN, Peer, SensorValues
+from compd.conformance.reply_cases import REPLY_CASES
+from compd.conformance.value_cases import VALUE_CASES
 from compd.conformance.virtual import VirtualWire
+from compd.conformance.waiting_cases import waits, waits_after_faults
 from compd.conformance.wire import CHARACTER_BITS, RealWire
-from compd.conformance.wire_cases import slowest_line
+from compd.conformance.wire_cases import CASES_ON_RTU, WIRE_CASES, slowest_line
 from compd.errors import PluginError, Problem
 from compd.gauge import Gauge, Quality
 from compd.lines import PolledDefinition, kinds_that_carry, polled_kind
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.pushed_gauge import PushedGauge
+
+PLACES = 40  # positions in a line and the pause behind it at which the line is opened
+CHARACTER_S = 10 / 9600  # makes a line about as long as the pause behind it
+PERIODS_APART = (3, 10, 100)  # periods from one poll to the next
+RESTS_BEFORE_A_PLACE = 3  # periods after which lines have the sensors' present values
+
+
+def opened_within_a_line(session: ConformanceSession, wire: VirtualWire) -> CaseResult:
+    """The line is opened at any position of the device's output."""
+    violations = []
+    session.recover()
+    for place in range(PLACES):
+        period_s = wire.pause_s + wire.peer.longest * wire.character_s
+        session.reopen()
+        session.sensors.advance()
+        wire.rest((RESTS_BEFORE_A_PLACE + place * GOLDEN % 1.0) * period_s)
+        violations += violations_of(session.poll(new_values=False), GOOD)
+    return result_of("opened within a line", GOOD, f"ok, at {PLACES} places", violations)
+
+
+def seldom_read(session: ConformanceSession, wire: VirtualWire) -> CaseResult:
+    """Polled seldom: waiting lines are old."""
+    violations = []
+    session.recover()
+    for periods in PERIODS_APART:
+        wire.rest((periods + 0.5) * wire.pause_s)
+        texts = violations_of(session.poll(), GOOD)
+        violations += [f"{periods} lines later: {text}" for text in texts]
+    return result_of("polled seldom: the newest line", GOOD, "ok", violations)
+
+
+CASES: tuple[Case, ...] = (*VALUE_CASES, *WIRE_CASES, *DAMAGE_CASES, *REPLY_CASES)
+# Cases of polled devices: late answers and repeated requests.
+CASES_OF_ANSWERS: tuple[Case, ...] = (*waiting_cases.CASES_OF_ANSWERS, *wire_cases.CASES_OF_ANSWERS)
+# Cases whose failure ends the test: each further poll would be slow or wrong.
+FIRST_CASES = ("waits", "units and scale", "waits after faults")
+
+
+def run_cases(session: ConformanceSession, subject: Subject) -> Iterator[CaseResult]:
+    """Every case in turn, until one of the first fails."""
+    for first in (waits, _units_and_scale, waits_after_faults):
+        result = first(session, subject)
+        yield result
+        if result.verdict == "FAIL":
+            return
+    cases = [*(() if subject.unsolicited else CASES_OF_ANSWERS), *CASES]
+    cases += CASES_ON_RTU if subject.registers and not subject.over_tcp else ()
+    for case in cases:
+        yield run_case(case, session, subject)
+
+
+def _units_and_scale(session: ConformanceSession, subject: Subject) -> CaseResult:
+    case, required = "units and scale", "every channel within one digit of the device"
+    for _ in range(subject.tries):
+        fault = session.calibrate()
+        if fault is None:
+            break
+        session.settle()
+    if fault is not None:
+        return CaseResult(case, required, fault, "FAIL")
+    digits = ", ".join(f"{c.name} {session.replies.digit[c.name]:.2g} {c.unit}" for c in session.gauge.channels)
+    return CaseResult(case, required, f"one digit is {digits}", "pass")
+
+
+def run_case(case: Case, session: ConformanceSession, subject: Subject) -> CaseResult:
+    """Repeat a case that fails in real time: a busy computer is late by chance, a faulty driver fails always."""
+    late: list[str] = []
+    for _ in range(subject.tries):
+        result = case(session, subject)
+        if result.verdict != "FAIL":
+            break
+        late.append(result.observed)
+        session.settle()
+        session.recover()
+    if late and result.verdict != "FAIL":
+        return replace(result, observed=f"{result.observed}; at try {len(late) + 1}, after: {late[0]}")
+    return result
+
 
 SLOWEST_BAUD = 1200  # slowest rate of all devices in the shipped table
 SLOW_TIMEOUT_S = 0.3

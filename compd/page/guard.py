@@ -12,22 +12,81 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import html
 import re
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect, HTTPConnection, Request
-from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from compd.clock import Clock, MonotonicClock
+from compd.live.service import WRONG_TOKEN_REST_S
 from compd.page.limited_protocol import LimitedProtocol
-from compd.page.token_form import FORM_FILES, FORM_PATH, posted_token, token_form
-from compd.page.wrong_tokens import WrongTokens
+
+# Most waiting addresses. Beyond it all addresses wait, since they belong to one attacker.
+_MOST_ADDRESSES = 256
+
+
+class WrongTokens:
+    """Addresses that have just shown a wrong token; used by the event loop's thread alone."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._until_s: dict[str, float] = {}
+
+    def may_try(self, address: str) -> bool:
+        """Whether a token from this address is checked."""
+        now_s = self._clock.monotonic()
+        self._until_s = {waiting: until_s for waiting, until_s in self._until_s.items() if until_s > now_s}
+        return address not in self._until_s and len(self._until_s) < _MOST_ADDRESSES
+
+    def note(self, address: str) -> None:
+        """Note a wrong token from this address."""
+        self._until_s[address] = self._clock.monotonic() + WRONG_TOKEN_REST_S
+
+
+# Path of the form's target.
+FORM_PATH = "/token"
+# Static files of the form, served without a token.
+FORM_FILES = ("/static/page.css", "/static/token.css", "/static/icon.svg")
+# Most bytes of the form; a token has 32 characters.
+LONGEST_FORM_BYTES = 512
+_PAGE = Path(__file__).parent / "static" / "token.html"
+_PROBLEM = "<!-- problem -->"
+
+
+def token_form(problem: str = "", status: int = 403) -> Response:
+    """The form. problem : reason why the previous token was refused."""
+    said = f'<p id="problem" role="alert">{html.escape(problem)}</p>' if problem else ""
+    return HTMLResponse(_PAGE.read_text(encoding="utf-8").replace(_PROBLEM, said), status)
+
+
+async def posted_token(request: Request) -> str | None:
+    """The token in the form; None for any other body, which is not read further.
+
+    Raises ClientDisconnect where the browser goes meanwhile.
+    """
+    length = request.headers.get("content-length", "0")
+    if not length.isdecimal() or int(length[:10]) > LONGEST_FORM_BYTES:
+        return None
+    body = b""
+    async for piece in request.stream():
+        body += piece
+        if len(body) > LONGEST_FORM_BYTES:
+            return None
+    try:
+        fields = parse_qs(body.decode("ascii"), max_num_fields=4)
+    except ValueError:
+        return None
+    return fields.get("token", [""])[0].strip()
+
 
 Role = Literal["view", "operate"]
 

@@ -6,17 +6,140 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compd.errors import RecordingError
-from compd.instruments import InstrumentExport
-from compd.joining import match_export, summary_lines
+from compd.arrays import FloatArray
+from compd.errors import CompdError, RecordingError
+from compd.files import file_stamp
+from compd.instruments import ExportPreview, InstrumentExport, ReadOptions, preview_export, track_of
+from compd.joining import (
+    ClockOffset,
+    JoinOptions,
+    JoinResult,
+    RestJoin,
+    agreement_curve,
+    choose_by,
+    match_export,
+    summary_lines,
+)
 from compd.page.joining.choices import Choices, read_choices
-from compd.page.joining.export_table import ExportReader, table_contents
 from compd.page.joining.exports import Exports
 from compd.page.joining.named_files import missing, named
-from compd.page.joining.trial import tried
 from compd.page.recording_machine import machine_of
 from compd.page.recordings import NAME
-from compd.recording import write_recording
+from compd.recording import read_recording, write_recording
+from compd.units import UM_PER_MM
+
+
+def tried(gauges: Path, export: InstrumentExport, options: JoinOptions) -> dict[str, Any]:
+    """The result of `match_export` for a browser; no file is written.
+
+    `reason` : why they cannot be put together, "" if they can. `lines` : what the command prints. `by` : what puts
+    the rows together, "" if that is not clear. `time` : curve and offset. `rest` : each point with its dwell.
+    """
+    answer: dict[str, Any] = {"reason": "", "lines": [], "by": "", "time": None, "rest": None}
+    joined: JoinResult | RestJoin | None = None
+    try:
+        answer["by"] = choose_by(options.by, export)
+        joined = match_export(gauges, export, options)
+        answer["lines"] = summary_lines(joined)
+    except CompdError as error:
+        answer["reason"] = str(error)
+    if isinstance(joined, RestJoin):
+        answer["rest"] = _rest(joined)
+    elif answer["by"] == "time":
+        # the picture shows best why no offset is found
+        answer["time"] = _time(gauges, export, joined.offset if joined else None)
+    return answer
+
+
+def _time(gauges: Path, export: InstrumentExport, offset: ClockOffset | None) -> dict[str, Any] | None:
+    """The agreement over all offsets; None if there is none."""
+    try:
+        recording, track = read_recording(gauges, needs_reference=False), track_of(export)
+        if recording.scale_mm is None:
+            return None
+        curve = agreement_curve(recording.time_s, recording.scale_mm, track)
+    except RecordingError:
+        return None
+    answer: dict[str, Any] = {
+        "offset_s": _numbers(curve.offset_s),
+        "agreement": _numbers(curve.agreement),
+        "window_s": curve.window_s,
+    }
+    if offset is not None:
+        answer["peak"] = [offset.offset_s, offset.agreement]
+        answer["next_best"] = None if offset.runner_up is None else list(offset.runner_up)
+    return answer
+
+
+def _rest(joined: RestJoin) -> dict[str, Any]:
+    return {
+        "line": joined.line.tolist(),
+        "dwell_number": joined.dwell_number.tolist(),
+        "residual_um": _numbers(joined.residual_mm * UM_PER_MM),
+        "dwells": len(joined.dwells),
+    }
+
+
+def _numbers(values: FloatArray) -> list[float]:
+    return [float(value) for value in values]
+
+
+# Parsed files in memory: two persons may look at two, and change the roles of their columns.
+_KEPT = 4
+
+
+class _Read(NamedTuple):
+    """A file at a time of change, with reading options."""
+
+    path: Path
+    stamp: tuple[int, int] | None
+    options: ReadOptions
+    preview: ExportPreview
+
+
+class ExportReader:
+    """Reads exports; caches those requested last."""
+
+    def __init__(self) -> None:
+        self._kept: list[_Read] = []
+
+    def read(self, path: Path, options: ReadOptions) -> ExportPreview:
+        """See `preview_export`."""
+        stamp = file_stamp(path)
+        for known in self._kept:
+            if (known.path, known.stamp, known.options) == (path, stamp, options):
+                return known.preview
+        preview = preview_export(path, options)
+        self._kept = [_Read(path, stamp, options, preview), *self._kept][:_KEPT]
+        return preview
+
+
+def table_contents(preview: ExportPreview) -> dict[str, Any]:
+    """The preview of an export. `by`: the default way of matching rows; "" if it is ambiguous."""
+    export = preview.export
+    by, not_clear = "", ""
+    try:
+        by = "" if export is None else choose_by(None, export)
+    except RecordingError as error:
+        not_clear = str(error)
+    return {
+        "shape": preview.shape,
+        "line": list(preview.line),
+        "rows": [list(row) for row in preview.rows],
+        "header": list(preview.header),
+        "roles": list(preview.roles),
+        "assumed": dict(preview.assumed),
+        "groups": list(preview.groups),
+        "sheets": list(preview.sheets),
+        "problems": [str(problem) for problem in preview.problems],
+        "points": 0 if export is None else len(export.line),
+        "left_out": {} if export is None else dict(export.left_out),
+        "axes": [] if export is None else list(export.axes),
+        "timed": export is not None and export.time_s is not None,
+        "named": export is not None and export.name is not None,
+        "by": by,
+        "by_not_clear": not_clear,
+    }
 
 
 class _Join(NamedTuple):

@@ -10,9 +10,8 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
-from compd.errors import CompdError
+from compd.errors import CompdError, RecordingError
 from compd.instruments import instrument_formats
-from compd.page.joining.export_routes import export_routes
 from compd.page.joining.exports import MOST_BYTES, Exports
 from compd.page.joining.named_files import gauges_and_plans
 from compd.page.recordings import Recordings
@@ -21,6 +20,28 @@ from compd.page.workers.answering import CLIENT_GONE, BrowserGone, while_asked
 from compd.page.workers.limits import WorkerLimits
 from compd.page.workers.worker_group import WorkerGroup
 from compd.page.workers.workers import Workers
+
+
+def export_routes(exports: Exports) -> list[Route]:
+    """GET /join/exports; DELETE /join/exports/{name} for tokens that may change files."""
+
+    async def usage(request: Request) -> Response:
+        return answer((await asyncio.to_thread(exports.usage)).as_json())
+
+    async def delete(request: Request) -> Response:
+        if not may_change(request):
+            return refused(LOOKS_ONLY, 403)
+        try:
+            deleted = exports.delete(request.path_params["name"])
+        except RecordingError as error:
+            return refused(str(error), 409)
+        return answer({}) if deleted else refused("there is no such export", 404)
+
+    return [
+        Route("/join/exports", usage),
+        Route("/join/exports/{name}", delete, methods=["DELETE"]),
+    ]
+
 
 EXPORTS = "exports"
 _JOINER = "compd.page.joining.joiner:Joiner"

@@ -3,28 +3,110 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
-from compd.errors import CompdError
+from compd.errors import CompdError, Problem, StateError
 from compd.page.recordings import NAME, Recordings, is_own, recording_tables
-from compd.page.requests import keys_of, refused
+from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
 from compd.page.workbench.diagnoses import Diagnoses
-from compd.page.workbench.diagnosis_handlers import DIAGNOSIS_HANDLERS
 from compd.page.workbench.effect_libraries import OWN_NAME, EffectLibraries
-from compd.page.workbench.formula_handlers import FORMULA_HANDLERS
 from compd.page.workbench.handlers import HANDLERS, Handler, plain
 from compd.page.workbench.open_workbench import OpenWorkbench
 from compd.page.workbench.plan_handlers import PLAN_HANDLERS
 from compd.page.workers.answering import CLIENT_GONE, BrowserGone
 from compd.page.workers.limits import too_many
 from compd.page.workers.workers import Workers
+
+_QUESTIONS = "compd.page.workbench.formula_questions:"
+
+
+async def _form(request: Request, workbench: OpenWorkbench) -> Response:
+    return plain(await workbench.ask(f"{_QUESTIONS}form"))
+
+
+async def _check(request: Request, workbench: OpenWorkbench) -> Response:
+    """Allowed to everyone, since it changes nothing."""
+    declaration = _declaration(await keys_of(request))
+    return plain(await workbench.ask(f"{_QUESTIONS}checked", declaration))
+
+
+async def _save(request: Request, workbench: OpenWorkbench) -> Response:
+    """Save an effect, or with `delete` remove one; the answer is the summary."""
+    keys = await keys_of(request)
+    if not may_change(request):
+        return refused(LOOKS_ONLY, 403)
+    if "delete" in keys:
+        return plain(await workbench.ask(f"{_QUESTIONS}deleted", str(keys["delete"])))
+    return plain(await workbench.ask(f"{_QUESTIONS}saved", _declaration(keys), keys.get("replace") is True))
+
+
+def _declaration(keys: Mapping[str, Any]) -> dict[str, Any]:
+    """The effect in a request. Raises HTTPException for any other body, StateError for text that no file can hold."""
+    declaration = keys.get("declaration")
+    if not isinstance(declaration, dict):
+        raise HTTPException(400, "declaration is a mapping: id, port, formula ...")
+    try:
+        json.dumps(declaration, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        what = "an invalid character, which no file can hold"
+        raise StateError(Problem(where="formula", what=what, next_step="type it anew")) from error
+    return declaration
+
+
+FORMULA_HANDLERS = (
+    Handler("/formula", _form),
+    Handler("/formula", _check, "POST"),
+    Handler("/own", _save, "POST"),
+)
+
+
+# The page of a diagnosis is one file including its scripts and styles. Its sandbox has no cookie of this server and
+# allows no request to any server.
+_PAGE_POLICY = (
+    "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
+    "style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+
+async def _diagnosis(request: Request, workbench: OpenWorkbench) -> Response:
+    """Progress of the newest diagnosis; with its findings, unless the browser already shows them."""
+    return JSONResponse(workbench.diagnosis_summary(request.query_params.get("shown", "")))
+
+
+async def _diagnose(request: Request, workbench: OpenWorkbench) -> Response:
+    """`cancel`: end the running one; else begin one. Allowed to everyone, since it changes nothing."""
+    keys = await keys_of(request)
+    if keys.get("cancel"):
+        if workbench.diagnosis is not None:
+            workbench.diagnosis.cancel()
+    else:
+        await workbench.diagnose()
+    return JSONResponse(workbench.diagnosis_summary())
+
+
+async def _page(request: Request, workbench: OpenWorkbench) -> Response:
+    job = workbench.diagnosis
+    page = b"" if job is None else await asyncio.to_thread(lambda: job.page)
+    if not page:
+        return refused("there is no page of a diagnosis yet", 404)
+    return Response(page, media_type="text/html", headers={"Content-Security-Policy": _PAGE_POLICY})
+
+
+DIAGNOSIS_HANDLERS = (
+    Handler("/diagnosis", _diagnosis),
+    Handler("/diagnosis", _diagnose, "POST"),
+    Handler("/diagnosis/page", _page),
+)
+
 
 # Name of a model file that the page may create.
 MODEL_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\.model\.yaml")

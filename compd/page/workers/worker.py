@@ -7,6 +7,8 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
@@ -14,8 +16,27 @@ from typing import Any, Protocol
 
 from compd.errors import CompdError
 from compd.page.workers import limits as limited
-from compd.page.workers.asked import Asked
 from compd.page.workers.limits import WorkerLimits
+
+
+@dataclass(eq=False)
+class Asked:
+    """One question.
+
+    question : "package.module:function", or "package.module:Class.method", of what gets the worker's state first. It is
+        named, so that the server imports none of it. given : its further arguments, plain data.
+    seconds : that the answer may take. progress : called with each step that is told, by the worker's thread.
+    answer : bytes that are ready to be sent, or the exception.
+    is_cancelled : whether the question was abandoned.
+    """
+
+    question: str
+    given: Sequence[Any]
+    seconds: float
+    progress: Callable[[str], None] | None = None
+    answer: Future[bytes] = field(default_factory=Future)
+    is_cancelled: bool = False
+
 
 # A process closes its connection just before its end.
 _ENDS_WITHIN_S = 5.0

@@ -14,9 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from compd.conformance import DriverUnderTest, driver_under_test, faults, run_conformance
-from compd.conformance.cases import CaseResult, Subject, run_case
 from compd.conformance.faults import Fault
 from compd.conformance.harness import ASKED_AGAIN_TIMEOUTS
+from compd.conformance.report import CaseResult, Subject, run_case
 from compd.conformance.value_cases import share_of
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 from compd.gauge_tools import polled_drivers

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compd.page.fault_counts import FaultCounts
+from compd.page.broadcast import FaultCounts
 
 
 def status(**counts):

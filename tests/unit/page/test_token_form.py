@@ -8,11 +8,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from compd.live.service import WRONG_TOKEN_REST_S
-from compd.page.guard import COOKIE, MOST_HEADERS, Guard, Token, hashed
+from compd.page.guard import COOKIE, LONGEST_FORM_BYTES, MOST_HEADERS, Guard, Token, WrongTokens, hashed
 from compd.page.recordings import Recordings
 from compd.page.server import Server
-from compd.page.token_form import LONGEST_FORM_BYTES
-from compd.page.wrong_tokens import WrongTokens
 from tests.support.hand_clock import HandClock
 from tests.support.scripted_page import ScriptedLink
 

@@ -17,11 +17,10 @@ from compd.diagnosis import CandidateResult, Diagnosis, ErrorFall, error_fall, s
 from compd.diagnosis.findings import GrossRows, UntestedEffect
 from compd.model.effects import FittedEffect
 from compd.model.library import find_effect
-from compd.report.diagnosis_page import write_diagnosis_page
+from compd.report.diagnosis_page import plot_time, write_diagnosis_page
 from compd.report.falling_error import NAME_WIDTH, plot_falling_error
 from compd.report.small_multiples import axis_title, axis_unit
 from compd.report.step_figure import plot_step
-from compd.report.time_figure import plot_time
 from tests.support.diagnoses import (
     FRAME,
     Noise,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from compd.report.planned_rows import planned_rows_table
+from compd.report.diagnosis_evidence import planned_rows_table
 
 
 def row(number: int, **changed: Any) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import pytest
 
 from compd.gauge_description import Answers, learn_gauge
 from compd.gauge_description.capture import CapturedReply
-from compd.gauge_description.checksum_search import checksum_end
+from compd.gauge_description.observed_exchange import checksum_end
 
 NUMBERS = [b"+012.300", b"-002.310", b"+000.001", b"-101.750"]
 

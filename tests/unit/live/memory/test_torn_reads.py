@@ -11,7 +11,7 @@ import pytest
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.memory.latest import Latest
 from compd.live.memory.readings import Readings, pack
-from compd.live.memory.shared_record import SharedRecord
+from compd.live.memory.shared_message import SharedRecord
 from compd.live.memory.shared_ring import ENTRIES, RingReader, SharedRing
 from tests.support.other_process import beside
 
