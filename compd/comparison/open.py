@@ -15,6 +15,7 @@ from pathlib import Path
 
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.criteria import ComparisonCriteria
 from compd.configuration import Configuration
 from compd.configuration.shipped import Machine, load_machine, shipped_names
 from compd.errors import Problem, RecordingError
@@ -23,7 +24,9 @@ from compd.recording.recording import Recording
 from compd.recording.sidecar import EXTERNAL, read_sidecar
 
 
-def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedRecording:
+def open_recording(
+    path: str | Path, machine: Machine | None = None, *, criteria: ComparisonCriteria = ComparisonCriteria()
+) -> AlignedRecording:
     """Open a recording with its machine, and compute what the machine's kinematics predicts in each of its rows.
 
     Parameters
@@ -35,6 +38,8 @@ def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedR
         The machine as `load_machine` takes it. Left out, the configuration that comes with compd under the name in
         the sidecar; with ``machine: external`` in the sidecar there is none, and the prediction of your own model is
         read from the columns ``model_x_mm`` ...
+    criteria : ComparisonCriteria
+        The numbers by which the recording is aligned, compared and fitted; every one has its default.
 
     Returns
     -------
@@ -56,7 +61,8 @@ def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedR
     >>> recording.labels, recording.measured_mm.shape
     (('x', 'y', 'z'), (608, 3))
     """
-    return align_recording(*read_with_machine(Path(path), machine))
+    recording, configuration = read_with_machine(Path(path), machine)
+    return align_recording(recording, configuration, criteria)
 
 
 def read_with_machine(

@@ -27,6 +27,7 @@ from compd.comparison.alignment.registration import (
     points_spread_mm,
     registration_columns,
 )
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import in_place_unit
 from compd.errors import CompdError
 from compd.model.deltas import Deltas, deltas_by_effect, split_by_port, sum_deltas
@@ -79,6 +80,8 @@ class AlignedRecording:
     part_of : AlignedRecording or None
         Of a block of a long recording the sample of it that places the instrument's frame, or fixed balls and pins;
         None for a whole recording.
+    criteria : ComparisonCriteria
+        The numbers by which it was aligned, and by which it is compared and fitted.
     """
 
     recording: Recording
@@ -91,6 +94,7 @@ class AlignedRecording:
     geometry_hash: str = ""
     ends: FixedEnds | None = None
     part_of: AlignedRecording | None = None
+    criteria: ComparisonCriteria = ComparisonCriteria()
     _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
 
     @property

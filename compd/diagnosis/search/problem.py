@@ -148,7 +148,9 @@ class DiagnosisProblem:
         """What each row counts beside some candidates alone."""
         columns = [self.nuisance, *(candidate.columns_um / self.sigma_um[:, None] for candidate in candidates)]
         visit, noise = self.aligned.recording.visit, 1.0 if self.floor_known else 0.0
-        return weigh_rows(columns, self.residual, self.known, visit, noise, self.criteria)
+        return weigh_rows(
+            columns, self.residual, self.known, visit, noise, self.criteria, self.aligned.criteria.huber_sigmas
+        )
 
 
 def build_problem(
@@ -176,13 +178,15 @@ def build_problem(
     if weights is None:
         everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
         noise = 1.0 if comparison.floor.known else 0.0
-        weights = weigh_rows(everything, residual, known, aligned.recording.visit, noise, criteria)
+        weights = weigh_rows(
+            everything, residual, known, aligned.recording.visit, noise, criteria, aligned.criteria.huber_sigmas
+        )
     rows = known & ~weights.gross
     root = np.sqrt(weights.weight[rows])
     data = RegressionData(
         residual[rows] * root[:, None],
-        tuple(_renumbered(fold[rows]) for fold in row_splits(aligned)),
-        _renumbered(neighbour_blocks(aligned.recording)[rows]),
+        tuple(_renumbered(fold[rows]) for fold in row_splits(aligned, criteria.folds)),
+        _renumbered(neighbour_blocks(aligned.recording, aligned.criteria.blocks)[rows]),
         Regressors(nuisance[rows] * root[:, None, None], np.full(nuisance.shape[2], np.inf)),
     )
     return DiagnosisProblem(

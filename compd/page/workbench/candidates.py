@@ -15,7 +15,7 @@ from compd.comparison.thinning import thinned
 from compd.diagnosis.candidate_results import candidate_results
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.diagnose import MOST_ROWS, candidate_pool
+from compd.diagnosis.diagnose import candidate_pool
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep
 from compd.diagnosis.search.gross_rows import RowWeights
 from compd.diagnosis.search.problem import DiagnosisProblem, build_problem, fitted_along_columns
@@ -40,22 +40,23 @@ class Candidates:
         """weighed : of the same comparison, by which rows count as they do there; None to weigh them anew."""
         self._comparison = comparison
         self._weighed = weighed
+        self._criteria = Criteria() if weighed is None else weighed.criteria
         self.library = {effect.id: effect for effect in library}
 
     @cached_property
     def _searched(self) -> Comparison:
         """Of the rows that effects are ranked on: evenly thinned where there are very many, as for a diagnosis."""
         full = self._comparison
-        thin = thinned(full.aligned, MOST_ROWS)
+        thin = thinned(full.aligned, self._criteria.search.max_rows)
         return full if thin is full.aligned else compare(thin, full.fitted)
 
     @cached_property
     def problem(self) -> DiagnosisProblem:
         """The residual and the columns of every effect."""
         searched = self._searched
-        pool = candidate_pool(searched, list(self.library.values()))
+        pool = candidate_pool(searched, list(self.library.values()), self._criteria.candidates)
         weights = None if self._weighed is None else _weights(self._weighed)
-        return build_problem(searched, pool, Criteria(), weights)
+        return build_problem(searched, pool, self._criteria, weights)
 
     @cached_property
     def losses(self) -> SubsetLosses:

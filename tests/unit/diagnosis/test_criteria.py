@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import Field, fields, replace
+from dataclasses import Field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +12,21 @@ import pytest
 
 import compd
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.criteria import ComparisonCriteria, thresholds, with_value
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.diagnose import diagnose
+from compd.fleet.criteria import FleetCriteria
 from tests.support.external_recordings import along, record_external
 
-ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis")]
-THRESHOLDS = [*fields(Criteria), *fields(ComparisonCriteria)]
+ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis", "fleet")]
+KINDS = (Criteria, ComparisonCriteria, FleetCriteria)
+THRESHOLDS = {name: field for kind in KINDS for name, field in thresholds(kind).items()}
 ROWS = 240
 PLAY = along("x", "play", "k * moved_1", parameters={"k": {"unit": "um", "plausible": [1, 4], "source": "a test"}})
 WINDUP = along("x", "windup", "k * moved_1 * (1 + position_mm / 4000)")
 
 
-@pytest.mark.parametrize("threshold", THRESHOLDS, ids=lambda threshold: threshold.name)
+@pytest.mark.parametrize("threshold", THRESHOLDS.values(), ids=THRESHOLDS)
 def test_every_threshold_says_what_it_means_in_which_unit_and_why(threshold: Field[Any]) -> None:
     assert set(threshold.metadata) == {"unit", "meaning", "reason"}
     assert all(text.strip() for text in threshold.metadata.values())
@@ -33,7 +35,7 @@ def test_every_threshold_says_what_it_means_in_which_unit_and_why(threshold: Fie
 def test_every_threshold_is_used() -> None:
     trees = [ast.parse(path.read_text(encoding="utf-8")) for room in ROOMS for path in room.rglob("*.py")]
     used = {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-    assert {threshold.name for threshold in THRESHOLDS} - used == set()
+    assert {threshold.name for threshold in THRESHOLDS.values()} - used == set()
 
 
 @pytest.fixture(scope="module")
