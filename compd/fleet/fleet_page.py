@@ -16,7 +16,7 @@ from compd.report.page_table import PageTable
 
 def write_fleet_page(path: Path, results: Sequence[RecordingResult], criteria: FleetCriteria = FleetCriteria()) -> None:
     """Write the page; it works offline. results : at least one.  criteria : by which drifts and machines are named."""
-    overview = Overview(results, criteria)
+    overview = Overview(results, criteria=criteria)
     verdict = overview.headline
     panels = [
         Panel(

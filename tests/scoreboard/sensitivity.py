@@ -82,12 +82,12 @@ def variants() -> list[Variant]:
 
 
 def changed(variant: Variant) -> Criteria:
-    """The criteria with this variant; a count stays whole, and is not below 1."""
+    """The criteria with this variant; a count stays whole."""
     if not variant.name:
         return Criteria()
     value = thresholds()[variant.name].default
     varied = value * FACTORS[variant.change]
-    return with_value(Criteria(), variant.name, max(1, round(varied)) if isinstance(value, int) else varied)
+    return with_value(Criteria(), variant.name, round(varied) if isinstance(value, int) else varied)
 
 
 def run_variant(trial: Trial) -> dict[str, Any]:

@@ -21,7 +21,7 @@ class ChangeCandidate(Candidate):
     whole: Candidate
 
 
-def moments_s(aligned: AlignedRecording, criteria: CandidateCriteria) -> list[float]:
+def moments_s(aligned: AlignedRecording, criteria: CandidateCriteria = CandidateCriteria()) -> list[float]:
     """Moments at which something may have changed, s: where sessions but the first start, and quantiles of the rows."""
     time_s = aligned.rows.time_s
     starts = time_s[aligned.rows.session_start][1:]
@@ -30,7 +30,9 @@ def moments_s(aligned: AlignedRecording, criteria: CandidateCriteria) -> list[fl
     return sorted({*starts.tolist(), *quantiles.tolist()})
 
 
-def moments_between_s(moments: Sequence[float], moment_s: float, criteria: CandidateCriteria) -> list[float]:
+def moments_between_s(
+    moments: Sequence[float], moment_s: float, criteria: CandidateCriteria = CandidateCriteria()
+) -> list[float]:
     """Moments between one of those that were tried, s, and its neighbours."""
     place = list(moments).index(moment_s)
     ends = [moments[other] for other in (place - 1, place + 1) if 0 <= other < len(moments)]
@@ -41,7 +43,7 @@ def change_candidates(
     candidates: Sequence[Candidate],
     aligned: AlignedRecording,
     times_s: Sequence[float],
-    criteria: CandidateCriteria,
+    criteria: CandidateCriteria = CandidateCriteria(),
 ) -> list[ChangeCandidate]:
     """Each of some effects from each moment on; what it did before stays as it is."""
     time_s = aligned.rows.time_s

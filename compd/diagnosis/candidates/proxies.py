@@ -32,7 +32,10 @@ class ProxyCandidate(Candidate):
 
 
 def proxy_candidates(
-    aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str], criteria: CandidateCriteria
+    aligned: AlignedRecording,
+    effects: Sequence[Effect],
+    present: Collection[str],
+    criteria: CandidateCriteria = CandidateCriteria(),
 ) -> tuple[ProxyCandidate, ...]:
     """Every effect that lacks nothing but thermometers, with each thermometer of the recording in their place.
 

@@ -13,7 +13,10 @@ from compd.diagnosis.candidates.candidates import Candidate, variant
 
 
 def refined_variants(
-    candidates: Sequence[Candidate], members: Iterable[int], aligned: AlignedRecording, criteria: CandidateCriteria
+    candidates: Sequence[Candidate],
+    members: Iterable[int],
+    aligned: AlignedRecording,
+    criteria: CandidateCriteria = CandidateCriteria(),
 ) -> list[Candidate]:
     """For each member of a set, its effect at constants between the chosen one and its neighbours among all candidates.
 

@@ -15,6 +15,7 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria, thresholds, with_value
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.verdict import Diagnosis
 from compd.fleet.criteria import FleetCriteria
 from tests.support.external_recordings import along, record_external
 
@@ -53,7 +54,10 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> AlignedRecording:
 
 def criteria(stage: AlignedRecording, **changed: float) -> dict[str, Any]:
     """What a diagnosis with a changed threshold says."""
-    diagnosis = diagnose(stage, (), None, [PLAY], criteria=replace(Criteria(), **changed))
+    return what_is_said(diagnose(stage, (), None, [PLAY], criteria=replace(Criteria(), **changed)))
+
+
+def what_is_said(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": diagnosis.verdict,
         "steps": [step.effect.id for step in diagnosis.steps],
@@ -88,6 +92,57 @@ def test_a_changed_threshold_changes_what_is_said(
 ) -> None:
     result = criteria(stage, **changed)
     assert {key: result[key] for key in said} == said
+
+
+@pytest.mark.parametrize(("slack", "said"), [(0.0, "unexplained"), (0.25, "identified")])
+def test_a_number_slightly_out_of_its_range_is_a_cause_within_the_slack(
+    tmp_path: Path, slack: float, said: str
+) -> None:
+    """4.4 um of play, where 1 to 4 um are plausible: a tenth of the range too much."""
+    rng = np.random.default_rng(2)
+    columns = {"moved_1": rng.choice([-1.0, 1.0], ROWS), "position_mm": rng.uniform(0, 100, ROWS)}
+    error_um = 4.4 * columns["moved_1"]
+    path = record_external(
+        tmp_path / "run.csv", columns, {"x": error_um}, model_mm={"x": columns["position_mm"]}
+    ).recording.path
+    diagnosis = compd.diagnose(path, effects=PLAY, criteria=Criteria(range_slack=slack))
+    assert diagnosis.verdict == said
+    assert [step.effect.id for step in diagnosis.steps] == (["play"] if said == "identified" else [])
+    assert diagnosis.criteria.range_slack == slack
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("search.max_members", 0, {"steps": []}),
+        ("search.further_members", 0, {"steps": []}),
+        ("candidates.min_motion_um", 1e3, {"steps": [], "verdict": "unexplained"}),
+        ("descriptions.promising", 0, {"follows": []}),
+        ("gross.max_columns_share", 0.0, {"gross": ()}),
+    ],
+)
+def test_a_changed_number_of_a_section_changes_what_is_said(
+    stage: AlignedRecording, name: str, value: float, said: dict[str, Any]
+) -> None:
+    result = what_is_said(diagnose(stage, (), None, [PLAY], criteria=with_value(Criteria(), name, value)))
+    assert {key: result[key] for key in said} == said
+
+
+def test_a_comparison_rests_on_the_criteria_of_its_recording(stage: AlignedRecording) -> None:
+    path = stage.recording.path
+    lenient = ComparisonCriteria(outlier_sigmas=1e3, trend_share=2.0)
+    opened = compd.open_recording(path, criteria=lenient)
+    for comparison in (
+        compd.compare(path, criteria=lenient),
+        compd.compare(opened),
+        compd.compare(stage, criteria=lenient),
+    ):
+        assert comparison.criteria == lenient
+        assert comparison.trends == ()
+    assert compd.compare(stage).trends
+    assert compd.compare(stage).criteria == ComparisonCriteria()
+    assert compd.diagnose(opened, effects=PLAY).before.trends == ()
+    assert compd.compare_stream(path, criteria=lenient).trends == ()
 
 
 def test_more_disturbance_widens_the_standard_errors(stage: AlignedRecording) -> None:

@@ -45,9 +45,7 @@ LARGEST_TABLE = 4
 MESSAGES = [*REQUESTS.values(), *SENT_MESSAGES.values()]
 FILES = [ModelDocument, EffectEntry, ParameterEntry, ModelStep, FormulaDeclaration, FormulaParameter]
 THRESHOLDS = [
-    (name, field)
-    for kind in (Criteria, ComparisonCriteria, FleetCriteria)
-    for name, field in thresholds(kind).items()
+    (name, field) for kind in (Criteria, ComparisonCriteria, FleetCriteria) for name, field in thresholds(kind).items()
 ]
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from compd.comparison.alignment.registration import register
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.statistics.robust import (
-    HUBER,
     SCALE_EFFICIENCY,
     huber_weights,
     robust_regression,
@@ -73,7 +73,7 @@ def test_weights_hold_back_the_worst_coordinate() -> None:
     residual = RNG.normal(0, 1.0, (2000, 2))
     residual[0] = [0.0, 25.0 * robust_sigma(residual)[1]]
     once, twice = huber_weights(residual), huber_weights(residual, exponent=2.0)
-    np.testing.assert_allclose(once[0], HUBER / 25.0, rtol=0.01)
+    np.testing.assert_allclose(once[0], ComparisonCriteria.huber_sigmas / 25.0, rtol=0.01)
     np.testing.assert_allclose(twice, once**2)
     assert (once[np.abs(residual).max(axis=1) < 2.0] == 1.0).all()
 
