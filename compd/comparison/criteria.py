@@ -264,6 +264,13 @@ class ComparisonCriteria:
         meaning="of a longer visit so many rows, evenly spread, are compared in pairs",
         reason="66 pairs know the scatter of a visit; a point that was watched for an hour would have millions",
     )
+    max_filled_share: float = threshold(
+        0.1,
+        unit="share of the rows",
+        meaning="up to so many empty cells of a quantity are filled with the nearest row's value, so that it can be "
+        "followed; no effect is computed from them",
+        reason="a choice: beyond it too little of what a residual follows would be measured",
+    )
     sample_rows: int = threshold(
         20_000,
         unit="rows",

@@ -108,7 +108,10 @@ def find_trends(
         ratio = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(rms(residual_um[used][:, aligned.lengths]), 1e-12)
         coordinates += [(f"link {i + 1}", column, float(ratio[i] * floor.um)) for i, column in enumerate(links_um.T)]
     time_s = aligned.recording.time_s
-    all_covariates = [covariate._replace(values=filled(covariate.values, time_s)) for covariate in covariates(aligned)]
+    all_covariates = [
+        covariate._replace(values=filled(covariate.values, time_s, criteria.max_filled_share))
+        for covariate in covariates(aligned)
+    ]
     block = neighbour_blocks(aligned.recording, criteria.blocks)
     tests = len(coordinates) * len(all_covariates)
     trends: list[tuple[float, Trend]] = []

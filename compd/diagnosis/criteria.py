@@ -11,6 +11,8 @@ stands where it is used, beside a comment, where it is
 - a matter of words: how many effects a sentence names, to how many digits a formula is rounded;
 - the form of a proposed measurement: at which places, loads and speeds rows are sought.
 
+How a recording is joined, read and checked is decided before, and refused or told where it is in doubt.
+
 tests/unit/diagnosis/test_module_numbers.py lists the numbers that stand where they are used, each with its reason.
 """
 

@@ -238,7 +238,8 @@ class AlignedRecording:
 
         For what describes a residual; what the effects of a model compute is never made of filled values.
         """
-        quantities = {name: filled(values, self.rows.time_s) for name, values in self.rows.quantities.items()}
+        most, time_s = self.criteria.max_filled_share, self.rows.time_s
+        quantities = {name: filled(values, time_s, most) for name, values in self.rows.quantities.items()}
         if all(values is self.rows.quantities[name] for name, values in quantities.items()):
             return self
         return replace(self, rows=replace(self.rows, quantities=quantities))

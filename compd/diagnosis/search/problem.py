@@ -227,7 +227,7 @@ def _everything(
     columns = [candidate.columns_um / sigma_um[:, None] for candidate in first_variants.values()]
     time_s = aligned.rows.time_s
     for values in (time_s, time_s**2, *aligned.gaps_filled.rows.quantities.values()):
-        without_gaps = filled(values, time_s)
+        without_gaps = filled(values, time_s, aligned.criteria.max_filled_share)
         column = without_gaps[known]
         if len(column) and np.isfinite(column).all() and np.ptp(column) > 0:
             scaled = np.nan_to_num(without_gaps - column.mean()) / np.ptp(column)
