@@ -34,9 +34,22 @@ def test_every_threshold_says_what_it_means_in_which_unit_and_why(threshold: Fie
 
 
 def test_every_threshold_is_used() -> None:
+    """As an attribute of criteria, or of its section: `criteria.p_value`, `criteria.search.max_members`."""
     trees = [ast.parse(path.read_text(encoding="utf-8")) for room in ROOMS for path in room.rglob("*.py")]
-    used = {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-    assert {threshold.name for threshold in THRESHOLDS.values()} - used == set()
+    used = {
+        (owner(node.value), node.attr) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)
+    }
+    unused = [
+        name
+        for name, field in THRESHOLDS.items()
+        if not {(part, field.name) for part in ("criteria", "_criteria", name.partition(".")[0])} & used
+    ]
+    assert unused == []
+
+
+def owner(node: ast.expr) -> str:
+    """The last name of an expression: "criteria" of self.criteria."""
+    return node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
 
 
 @pytest.fixture(scope="module")
