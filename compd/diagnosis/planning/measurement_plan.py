@@ -73,12 +73,15 @@ class MeasurementPlan:
 
     @property
     def is_wide_enough(self) -> bool:
-        """Whether the rivals will differ by three standard deviations or more, whatever they did before."""
+        """Whether the rivals will differ by `min_separation` of the criteria or more, whatever they did before."""
         return self.separation >= self.criteria.min_separation
 
     @property
     def tells_apart(self) -> bool:
-        """Whether the rivals will differ by three standard deviations or more, by one more than before."""
+        """Whether the rivals will differ by three standard deviations or more, by one more than before.
+
+        The two numbers are those of the criteria.
+        """
         return self.is_wide_enough and self.separation - self.before >= self.criteria.min_gain
 
     @property
