@@ -32,6 +32,7 @@ def add_to_model(
     effect: Effect,
     aligned: AlignedRecording,
     refine: Refinement = unrefined,
+    criteria: Criteria = Criteria(),
 ) -> ModelFile:
     """Add an effect and fit all effects together; its nonlinear constants are searched.
 
@@ -50,11 +51,15 @@ def add_to_model(
     kept = _as_counted(model.fitted, aligned.rows)
     result = search_constants(aligned, kept, counted_from(effect, aligned.rows), before.floor.by_axis_um)
     extended = replace(model, declared=(*model.declared, declared))
-    return _changed(extended, model, refine(result, before.floor.by_axis_um), before, "add", effect.id)
+    return _changed(extended, model, refine(result, before.floor.by_axis_um), before, "add", effect.id, criteria)
 
 
-def remove_effect(
-    model: ModelFile, effect_id: str, aligned: AlignedRecording, refine: Refinement = unrefined
+def remove(
+    model: ModelFile,
+    effect_id: str,
+    aligned: AlignedRecording,
+    refine: Refinement = unrefined,
+    criteria: Criteria = Criteria(),
 ) -> ModelFile:
     """Take an effect out and fit the others again, `refine` as of `add`.
 
@@ -74,10 +79,15 @@ def remove_effect(
     kept = _as_counted(model.fitted[:k] + model.fitted[k + 1 :], aligned.rows)
     result = fit(aligned, kept, before.floor.by_axis_um)
     reduced = replace(model, declared=model.declared[:k] + model.declared[k + 1 :])
-    return _changed(reduced, model, refine(result, before.floor.by_axis_um), before, "remove", effect_id)
+    return _changed(reduced, model, refine(result, before.floor.by_axis_um), before, "remove", effect_id, criteria)
 
 
-def refit_model(model: ModelFile, aligned: AlignedRecording, refine: Refinement = unrefined) -> ModelFile:
+def refit(
+    model: ModelFile,
+    aligned: AlignedRecording,
+    refine: Refinement = unrefined,
+    criteria: Criteria = Criteria(),
+) -> ModelFile:
     """Fit all effects again from zero, nonlinear constants as they are, `refine` as of `add`.
 
     They then count from machine zero where the recording has the quantities there, else from 20 degC.
@@ -92,7 +102,7 @@ def refit_model(model: ModelFile, aligned: AlignedRecording, refine: Refinement 
         for effect, fitted in zip(effects, model.fitted, strict=True)
     ]
     result = fit(aligned, unfitted, before.floor.by_axis_um)
-    return _changed(model, model, refine(result, before.floor.by_axis_um), before, "fit", "")
+    return _changed(model, model, refine(result, before.floor.by_axis_um), before, "fit", "", criteria)
 
 
 def undo_step(stored: StoredModel, where: str) -> StoredModel:
@@ -122,16 +132,21 @@ def undo_step(stored: StoredModel, where: str) -> StoredModel:
 
 
 def _changed(
-    model: ModelFile, old: ModelFile, result: FitResult, before: Comparison, kind: Kind, effect_id: str
+    model: ModelFile,
+    old: ModelFile,
+    result: FitResult,
+    before: Comparison,
+    kind: Kind,
+    effect_id: str,
+    criteria: Criteria,
 ) -> ModelFile:
     """The model with the result of a fit and the step that led to it, standard errors with disturbances.
 
     model : with its declarations after the step.  old : before it.
     """
     aligned = before.aligned
-    criteria = Criteria()
     fitted_ids = [fitted.effect.id for fitted in result.fitted]
-    others = library_pool(aligned, list(load_library().values()), fitted_ids)
+    others = library_pool(aligned, list(load_library().values()), fitted_ids, criteria.candidates)
     result = with_disturbances(result, aligned, before.floor.by_axis_um, others.candidates, criteria)
     after = compare(aligned, result.fitted, result.covariance)
     step = ModelStep(

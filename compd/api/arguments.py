@@ -7,7 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-from compd.comparison import AlignedRecording, open_recording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.open import open_recording
 from compd.errors import Problem, StateError
 from compd.model.effects import Effect
 from compd.model_file import ModelFile, read_model_file
@@ -20,9 +22,14 @@ Model: TypeAlias = ModelFile | str | Path | None
 Effects: TypeAlias = str | Path | Effect | Sequence[Effect | str | Path]
 
 
-def opened_recording(recording: Recorded) -> AlignedRecording:
-    """A recording; one given by its path is opened with its machine."""
-    return recording if isinstance(recording, AlignedRecording) else open_recording(recording)
+def opened_recording(recording: Recorded, criteria: ComparisonCriteria | None = None) -> AlignedRecording:
+    """A recording, opened with its machine where it is named by its path.
+
+    criteria : by which it is compared; None for its own. One that is open keeps how it was aligned.
+    """
+    if not isinstance(recording, AlignedRecording):
+        return open_recording(recording, criteria=criteria or ComparisonCriteria())
+    return recording if criteria is None else replace(recording, criteria=criteria)
 
 
 def opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.comparison import Comparison
-from compd.comparison import compare as compare_aligned
-from compd.diagnosis import Diagnosis
-from compd.diagnosis import diagnose as diagnose_aligned
-from compd.model.effects import can_concern
-from compd.model.library import gather_effects, load_library
+from compd.comparison.compare import compare as compare_aligned
+from compd.comparison.comparison import Comparison
+from compd.comparison.criteria import ComparisonCriteria
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.diagnose import diagnose as diagnose_aligned
+from compd.diagnosis.verdict import Diagnosis
+from compd.model.effect_needs import can_concern
+from compd.model.library import load_library
+from compd.model.library.effects_file import gather_effects
 
 
-def compare(recording: Recorded, model: Model = None) -> Comparison:
+def compare(recording: Recorded, model: Model = None, *, criteria: ComparisonCriteria | None = None) -> Comparison:
     """Compare a recording with the model of its machine; nothing is fitted.
 
     Parameters
@@ -22,6 +25,9 @@ def compare(recording: Recorded, model: Model = None) -> Comparison:
         What was measured, as `open_recording` returns it; or the path of a recording whose machine comes with compd.
     model : ModelFile, str or Path, optional
         The effects that the model has; left out, none: what is left then is everything that the gauges do not see.
+    criteria : ComparisonCriteria, optional
+        The numbers on which the result rests; left out, those by which the recording was opened. A recording that is
+        open already keeps its frame and its speeds: `open_recording` takes criteria, too.
 
     Returns
     -------
@@ -46,7 +52,7 @@ def compare(recording: Recorded, model: Model = None) -> Comparison:
     >>> round(comparison.floor.um, 2)  # what noise alone would be
     0.16
     """
-    aligned = opened_recording(recording)
+    aligned = opened_recording(recording, criteria)
     file = opened_model(model, aligned)
     return compare_aligned(aligned, file.fitted, file.covariance)
 
@@ -56,6 +62,7 @@ def diagnose(
     model: Model = None,
     *,
     effects: Effects = (),
+    criteria: Criteria = Criteria(),
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Learn which physical effect the model of the machine lacks.
@@ -73,6 +80,9 @@ def diagnose(
     effects : str, Path, Effect, or a sequence of these
         Effects of your own, tried beside those that are installed: each an effect, or a source of several as
         `load_effects` takes it.
+    criteria : Criteria
+        The numbers on which the verdict rests; every one has its default. Those of the comparison beneath are the
+        recording's: `open_recording` takes them.
     progress : callable
         Called with a text when a stage of the search begins. A diagnosis takes seconds.
 
@@ -92,7 +102,7 @@ def diagnose(
     act inside a machine that compd does not know.
 
     The selection is by cross-validation over sessions with a penalty for each further effect (M. Stone, J. R. Stat.
-    Soc. B 36 (1974) 111); every threshold stands with its reason in `compd.diagnosis.criteria`.
+    Soc. B 36 (1974) 111); every number that decides stands with its reason in `compd.diagnosis.criteria`.
 
     Examples
     --------
@@ -107,4 +117,5 @@ def diagnose(
     rows = aligned.rows
     library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
     candidates = [*library, *given.values()]
-    return diagnose_aligned(aligned, file.fitted, file.covariance, candidates, progress or (lambda status: None))
+    progress = progress or (lambda status: None)
+    return diagnose_aligned(aligned, file.fitted, file.covariance, candidates, progress, criteria)

@@ -9,23 +9,18 @@ from typing import NamedTuple
 
 from compd.api.arguments import Model, opened_model
 from compd.arrays import FloatArray
-from compd.comparison import (
-    SAMPLE_ROWS,
-    AlignedRecording,
-    FitResult,
-    RecordingStream,
-    Sample,
-    StreamedComparison,
-    compare_blocks,
-    draw_sample,
-    fit_blocks,
-    is_long,
-    open_recording,
-    open_stream,
-)
-from compd.configuration import Machine
-from compd.model_changes import refit_model
-from compd.model_file import ModelFile
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.fit import FitResult
+from compd.comparison.open import open_recording
+from compd.comparison.stream.block_comparison import compare_blocks
+from compd.comparison.stream.block_fit import fit_blocks
+from compd.comparison.stream.recording_stream import RecordingStream, is_long, open_stream
+from compd.comparison.stream.sample import Sample, draw_sample
+from compd.comparison.stream.streamed_comparison import StreamedComparison
+from compd.configuration.shipped import Machine
+from compd.diagnosis import model_changes
+from compd.model_file.model_file import ModelFile
 
 # Called with the number of finished rows, block after block.
 Progress = Callable[[int], None]
@@ -49,10 +44,15 @@ class LongRecording(NamedTuple):
         return fit_blocks(self.stream, self.sample, result, sigma_um, progress=progress)
 
 
-def open_long(path: Path, machine: Machine | None = None, progress: Progress = _silent) -> LongRecording:
-    """Draw the sample of a recording; arguments and errors as for `open_sample`."""
+def open_long(
+    path: Path,
+    machine: Machine | None = None,
+    progress: Progress = _silent,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> LongRecording:
+    """Draw the sample of a recording; arguments and errors as of `open_sample`."""
     stream = open_stream(path, machine)
-    return LongRecording(stream, draw_sample(stream, progress=progress))
+    return LongRecording(stream, draw_sample(stream, criteria=criteria, progress=progress))
 
 
 def open_whole_or_sample(path: Path, machine: Machine | None = None) -> tuple[AlignedRecording, int]:
@@ -68,7 +68,12 @@ def open_whole_or_sample(path: Path, machine: Machine | None = None) -> tuple[Al
 
 
 def compare_stream(
-    path: str | Path, model: Model = None, *, machine: Machine | None = None, progress: Progress = _silent
+    path: str | Path,
+    model: Model = None,
+    *,
+    machine: Machine | None = None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    progress: Progress = _silent,
 ) -> StreamedComparison:
     """Compare a recording of any length with the model of its machine, in constant memory; nothing is fitted.
 
@@ -81,6 +86,8 @@ def compare_stream(
     model : ModelFile, str or Path, optional
         As for `compare`.
     machine : str, Path or Configuration, optional
+        As for `open_recording`.
+    criteria : ComparisonCriteria
         As for `open_recording`.
     progress : callable
         Called with the number of rows that are done, after each block: twice the recording's rows at the end.
@@ -108,7 +115,7 @@ def compare_stream(
     >>> round(comparison.rms_um, 2)
     0.82
     """
-    stream, sample = open_long(Path(path), machine, progress)
+    stream, sample = open_long(Path(path), machine, progress, criteria)
     file = opened_model(model, sample.aligned)
     return compare_blocks(
         stream, sample, file.fitted, file.covariance, progress=lambda done: progress(sample.rows + done)
@@ -116,7 +123,12 @@ def compare_stream(
 
 
 def open_sample(
-    path: str | Path, machine: Machine | None = None, *, rows: int = SAMPLE_ROWS, progress: Progress = _silent
+    path: str | Path,
+    machine: Machine | None = None,
+    *,
+    rows: int | None = None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    progress: Progress = _silent,
 ) -> AlignedRecording:
     """Open a sample of a recording of any length, spread evenly; `diagnose`, `compare` and `add_effect` take it.
 
@@ -127,7 +139,10 @@ def open_sample(
     machine : str, Path or Configuration, optional
         As for `open_recording`.
     rows : int
-        How many rows the sample has, about: rows of one visit stay together.
+        How many rows the sample has, about: rows of one visit stay together. Left out, `sample_rows` of the criteria,
+        20,000.
+    criteria : ComparisonCriteria
+        As for `open_recording`.
     progress : callable
         Called with the number of rows that are done, after each block.
 
@@ -146,11 +161,16 @@ def open_sample(
     >>> compd.open_sample("monday.csv", rows=100).recording.rows
     95
     """
-    return draw_sample(open_stream(Path(path), machine), rows, progress=progress).aligned
+    return draw_sample(open_stream(Path(path), machine), rows, criteria, progress).aligned
 
 
 def fit_stream(
-    path: str | Path, model: ModelFile | str | Path, *, machine: Machine | None = None, progress: Progress = _silent
+    path: str | Path,
+    model: ModelFile | str | Path,
+    *,
+    machine: Machine | None = None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    progress: Progress = _silent,
 ) -> ModelFile:
     """Fit all effects of a model again, to all rows of a recording of any length, in constant memory.
 
@@ -163,6 +183,8 @@ def fit_stream(
     model : ModelFile, str or Path
         The model; it is not changed, nor is its file.
     machine : str, Path or Configuration, optional
+        As for `open_recording`.
+    criteria : ComparisonCriteria
         As for `open_recording`.
     progress : callable
         Called with the number of rows that are done of each pass: that of the sample, then two to five of the fit.
@@ -185,6 +207,6 @@ def fit_stream(
     >>> [round(number.value, 2) for number in compd.fit_stream("monday.csv", model).numbers()]
     [1.11]
     """
-    long = open_long(Path(path), machine, progress)
+    long = open_long(Path(path), machine, progress, criteria)
     refine = partial(long.refine, progress=progress)
     return refit_model(opened_model(model, long.sample.aligned), long.sample.aligned, refine)

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.configuration import Machine, load_machine, shipped_names
+from compd.configuration.shipped import Machine, load_machine, shipped_names
+from compd.diagnosis import model_changes
+from compd.diagnosis.criteria import Criteria
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effects import Effect
 from compd.model.library import find_effect, gather_effects, load_library, named_effect
@@ -62,7 +64,8 @@ def add_effect(
     recording: Recorded,
     *,
     effects: Effects = (),
-    refine: Refinement = unrefined,
+    refine: model_changes.Refinement = model_changes.unrefined,
+    criteria: Criteria = Criteria(),
 ) -> ModelFile:
     """Add an effect to a model: all its effects are fitted together on a recording, and the ledger gets a line.
 
@@ -80,6 +83,8 @@ def add_effect(
         Effects of your own beside those that are installed, as for `diagnose`.
     refine : callable
         Makes of the fit a better one: of a sample the fit to all rows, as `fit_stream` has it.
+    criteria : Criteria
+        As for `diagnose`: of these, `disturbance` widens the standard errors.
 
     Returns
     -------
@@ -107,7 +112,7 @@ def add_effect(
     resolved = _resolve_effect(effect, gather_effects(effects))
     declared = resolved.declared if isinstance(resolved.declared, str) else dict(resolved.declared)
     aligned = opened_recording(recording)
-    return add_to_model(opened_model(model, aligned), declared or resolved.id, resolved, aligned, refine)
+    return model_changes.add(opened_model(model, aligned), declared or resolved.id, resolved, aligned, refine, criteria)
 
 
 def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapping[str, Effect]) -> Effect:

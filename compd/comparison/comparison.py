@@ -77,8 +77,6 @@ class Comparison:
         The residual as errors of link lengths, um; None where none can be inferred.
     attitude_residual_urad : (N, 3) array or None
         Rotation vector from the modelled to the measured attitude in {M}, urad; None where none was measured.
-    criteria : ComparisonCriteria
-        The thresholds on which it rests, each with unit, meaning and reason.
     constant_um : (m,) array
         Constant of each coordinate that was taken off the residual, um: of an external model, or an instrument's frame;
         zeros for a machine in its own frame.
@@ -97,8 +95,12 @@ class Comparison:
     trends: tuple[Trend, ...]
     link_residual_um: FloatArray | None
     attitude_residual_urad: FloatArray | None
-    criteria: ComparisonCriteria
     constant_um: FloatArray
+
+    @property
+    def criteria(self) -> ComparisonCriteria:
+        """The thresholds on which it rests, those of its recording, each with unit, meaning and reason."""
+        return self.aligned.criteria
 
     @cached_property
     def rms_by_axis_um(self) -> FloatArray:

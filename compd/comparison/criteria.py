@@ -1,24 +1,164 @@
-"""Thresholds on which the result of a comparison rests, each with its meaning, its unit and its reason."""
+"""The numbers on which the result of a comparison rests, each with its meaning, its unit and its reason.
+
+`compd.diagnosis.criteria` states which numbers are criteria and which are not.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import Field, dataclass, field, fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 
-def threshold(value: float, *, unit: str, meaning: str, reason: str) -> Any:
+def threshold(value: float | tuple[float, ...], *, unit: str, meaning: str, reason: str) -> Any:
     """A field of a frozen dataclass of thresholds; unit, meaning and reason are its metadata, "1" is no unit."""
     return field(default=value, metadata={"unit": unit, "meaning": meaning, "reason": reason})
+
+
+def thresholds(kind: type[Any]) -> dict[str, Field[Any]]:
+    """Every threshold of a class of criteria by its name, of a section with the section's: "search.max_members"."""
+    return dict(_thresholds(kind, ""))
+
+
+def _thresholds(kind: type[Any], section: str) -> Iterator[tuple[str, Field[Any]]]:
+    for member in fields(kind):
+        if is_dataclass(member.default):
+            yield from _thresholds(type(member.default), f"{member.name}.")
+        else:
+            yield f"{section}{member.name}", member
+
+
+def value_of(criteria: object, name: str) -> Any:
+    """The value of a threshold, by its name in `thresholds`."""
+    section, _, own = name.rpartition(".")
+    return getattr(getattr(criteria, section) if section else criteria, own)
+
+
+def with_value(criteria: T, name: str, value: object) -> T:
+    """The criteria with another value of one threshold, by its name in `thresholds`.
+
+    Example: with_value(Criteria(), "search.max_members", 3).
+    """
+    section, _, own = name.rpartition(".")
+    if section:
+        return replace(criteria, **{section: replace(getattr(criteria, section), **{own: value})})  # type: ignore[type-var]
+    return replace(criteria, **{own: value})  # type: ignore[type-var]
+
+
+@dataclass(frozen=True)
+class PeriodCriteria:
+    """The search for the period of an effect in a residual."""
+
+    peaks: int = threshold(
+        5,
+        unit="periods",
+        meaning="so many of the strongest periods of a residual are tried with an effect's own columns",
+        reason="a choice: more would be chance",
+    )
+    trials: int = threshold(
+        3,
+        unit="values",
+        meaning="so many of the tried values of an effect's constants, the best ones, become candidates",
+        reason="a choice: the period, its double, and one more peak",
+    )
+    min_rows: int = threshold(
+        12,
+        unit="rows",
+        meaning="in fewer rows no period is looked for",
+        reason="a choice: a sine beside a parabola has five numbers and its period, and twice as many rows test them",
+    )
+    min_turns: float = threshold(
+        2.0,
+        unit="turns",
+        meaning="a period must fit so many times into the range of its quantity to be found in a residual",
+        reason="a choice: over less, a sine is hardly told from what is slow along the quantity",
+    )
+    max_turns: float = threshold(
+        5000.0,
+        unit="turns",
+        meaning="and not more often",
+        reason="a choice: it bounds the search; 5000 turns are a pitch of 0.1 mm on 500 mm",
+    )
+    neighbour_turns: float = threshold(
+        0.25,
+        unit="turns over the range of the quantity",
+        meaning="periods that differ by so much are neighbours, between which a period is refined; and the rows must "
+        "cover a turn but for so much of it, or the effect cannot be tested",
+        reason="at a quarter of a turn a period fits half as well at best",
+    )
+    slow_degree: int = threshold(
+        2,
+        unit="degree of a polynomial",
+        meaning="what is slow along the quantity is taken away before periods are looked for",
+        reason="a choice: a slope and a bend are another cause's",
+    )
+    outlier_sigmas: float = threshold(
+        4.0,
+        unit="robust standard deviations",
+        meaning="a value farther out counts as one there: it would be noise at every frequency",
+        reason="a normal error is as large once in 16,000",
+    )
+    image_window: float = threshold(
+        0.9,
+        unit="spectral window, rms over the series",
+        meaning="from here on frequencies are images of one another, and those above half of it are not searched",
+        reason="a choice: 0.81 of the square of a sine shows at its image",
+    )
+    image_multiples: int = threshold(
+        5,
+        unit="multiples",
+        meaning="so many multiples of an image's frequency must be images, too, for an even grid of values",
+        reason="a choice: images of a few sessions, far apart, fade before",
+    )
+    chance: float = threshold(
+        0.01,
+        unit="probability",
+        meaning="by less chance than this a searched period may contradict the period of the machine's description",
+        reason="a choice: the description is right in most cases",
+    )
+
+
+@dataclass(frozen=True)
+class SpeedCriteria:
+    """From which rows the speed of a gauge is known, where it was not recorded."""
+
+    near_s: float = threshold(
+        3.0,
+        unit="s",
+        meaning="rows farther apart tell nothing of each other's speed",
+        reason="a choice: between two dwells lies a whole move",
+    )
+    close_s: float = threshold(
+        0.25,
+        unit="s",
+        meaning="rows so close follow any motion of a machine",
+        reason="a choice: a machine takes a few tenths of a second to reach its speed",
+    )
+    still_mm_per_s: float = threshold(
+        0.005,
+        unit="mm/s",
+        meaning="slower is standing still",
+        reason="a gauge of 50 ms latency would be 0.25 um late",
+    )
+    steady_share: float = threshold(
+        0.1,
+        unit="share of the larger speed",
+        meaning="speeds before and after a row that differ by less are one steady speed",
+        reason="a choice",
+    )
 
 
 @dataclass(frozen=True)
 class ComparisonCriteria:
     """Thresholds of a comparison: what counts as an outlier, as the noise floor, and as a trend of the residual.
 
-    Each field's metadata hold `unit`, `meaning` and `reason`::
+    They travel with the recording (`AlignedRecording.criteria`). Each field's metadata hold `unit`, `meaning` and
+    `reason`::
 
-        for criterion in dataclasses.fields(ComparisonCriteria):
-            print(criterion.name, criterion.default, criterion.metadata["unit"], criterion.metadata["reason"])
+        for name, criterion in thresholds(ComparisonCriteria).items():
+            print(name, criterion.default, criterion.metadata["unit"], criterion.metadata["reason"])
     """
 
     outlier_sigmas: float = threshold(
@@ -105,3 +245,67 @@ class ComparisonCriteria:
         meaning="one end of the workspace is named where the error there is so many times that at the other end",
         reason="a choice: twice the mean square",
     )
+    huber_sigmas: float = threshold(
+        2.5,
+        unit="robust standard deviations",
+        meaning="in a fit a row farther off counts less, by the inverse of its distance",
+        reason="Huber, Robust Statistics (1981), chapter 7: 1.345 is 95 % efficient on normal noise; at 2.5 nearly "
+        "nothing of the noise is held back, only what lies between noise and outliers",
+    )
+    blocks: int = threshold(
+        24,
+        unit="blocks of neighbouring rows",
+        meaning="fewer sessions are cut into so many blocks, on which standard errors and p-values rest",
+        reason="enough for 15 % on a standard error, and long enough for temperatures to change in between",
+    )
+    max_rows_of_visit: int = threshold(
+        12,
+        unit="rows",
+        meaning="of a longer visit so many rows, evenly spread, are compared in pairs",
+        reason="66 pairs know the scatter of a visit; a point that was watched for an hour would have millions",
+    )
+    max_filled_share: float = threshold(
+        0.1,
+        unit="share of the rows",
+        meaning="up to so many empty cells of a quantity are filled with the nearest row's value, so that it can be "
+        "followed; no effect is computed from them",
+        reason="a choice: beyond it too little of what a residual follows would be measured",
+    )
+    sample_rows: int = threshold(
+        20_000,
+        unit="rows",
+        meaning="so many rows of a recording that is compared block by block fix its noise floor, frame and outliers",
+        reason="they know a standard deviation within 0.5 %, and a comparison of them takes 0.2 GB",
+    )
+    trends_per_coordinate: int = threshold(
+        2,
+        unit="trends",
+        meaning="so many trends of each coordinate are reported at most",
+        reason="a choice: more are noise in a report",
+    )
+    max_collinear: int = threshold(
+        4,
+        unit="covariates",
+        meaning="so many collinear covariates are named along with a trend at most",
+        reason="a choice: more are noise in a report",
+    )
+    max_trend_rows: int = threshold(
+        10_000,
+        unit="rows",
+        meaning="so many rows, evenly spread, are searched for trends at most",
+        reason="more rows would not change what the sentences say",
+    )
+    min_trend_rows: int = threshold(
+        10,
+        unit="rows",
+        meaning="fewer rows that have a covariate show no trend",
+        reason="a choice: a line through fewer rows says nothing",
+    )
+    min_rows_of_ends: int = threshold(
+        30,
+        unit="rows",
+        meaning="with fewer rows the ends of the workspace are not compared",
+        reason="a choice: ten rows in each third",
+    )
+    periods: PeriodCriteria = PeriodCriteria()
+    speeds: SpeedCriteria = SpeedCriteria()

@@ -29,8 +29,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.neighbour_block import neighbour_blocks
+from compd.comparison.neighbour_blocks import neighbour_blocks
 from compd.comparison.nuisance import nuisance_beside
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.quantity_ranges import Ranges, quantity_ranges
@@ -91,7 +90,6 @@ def fit(
     aligned: AlignedRecording,
     effects: Sequence[FittedEffect],
     weight_sigma_um: FloatArray | None = None,
-    criteria: ComparisonCriteria = ComparisonCriteria(),
     outlier: BoolArray | None = None,
 ) -> FitResult:
     """Fit the effects together, and with them the nuisance terms: the instrument's frame, initial states of lags.
@@ -130,7 +128,7 @@ def fit(
         )
         if outlier is not None:
             break
-        found = outlier_rows(residual_um / sigma_um, usable, aligned.recording.visit, criteria)
+        found = outlier_rows(residual_um / sigma_um, usable, aligned.recording.visit, aligned.criteria)
         # a set of outliers that comes back would alternate for ever
         if (found == left_out).all() or found.tobytes() in earlier:
             break
@@ -138,9 +136,9 @@ def fit(
         left_out = found
     residual_um[~usable] = np.nan
     used = usable & ~left_out
-    block = neighbour_blocks(aligned.recording)[used]
+    block = neighbour_blocks(aligned.recording, aligned.criteria.blocks)[used]
     whitened = residual_um[used] / sigma_um
-    root_weight = np.sqrt(huber_weights(whitened))[:, None]
+    root_weight = np.sqrt(huber_weights(whitened, huber=aligned.criteria.huber_sigmas))[:, None]
     G = G_um[used] / sigma_um[:, None] * root_weight[:, :, None]
     whole = cluster_covariance(G, whitened * root_weight, block)
     covariance = whole[: len(theta), : len(theta)]
@@ -202,7 +200,7 @@ def _gauss_newton(
         _, total = effect_deltas(effects, aligned.rows)
         residual_um = (aligned.measured_mm - aligned.predicted_mm(total)) * UM_PER_MM - G_um[:, :, P:] @ nuisance
         whitened = residual_um[use] / sigma_um
-        weights = np.repeat(huber_weights(whitened), len(sigma_um))
+        weights = np.repeat(huber_weights(whitened, huber=aligned.criteria.huber_sigmas), len(sigma_um))
         step = solve_least_squares(G, whitened.ravel(), weights)
         theta, nuisance = theta + step[:P], nuisance + step[P:]
         change_um = rms(G_um[use] @ step)

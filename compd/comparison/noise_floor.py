@@ -72,13 +72,18 @@ class Scatter(NamedTuple):
     pairs: int
 
 
-def repeat_scatter(residual_um: FloatArray, use: BoolArray, visit: IntArray | None) -> Scatter | None:
+def repeat_scatter(
+    residual_um: FloatArray,
+    use: BoolArray,
+    visit: IntArray | None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+) -> Scatter | None:
     """Scatter of residual_um (N, m) within visits; None where no visit of the rows `use` (N,) is repeated.
 
     visit : (N,) number of the visit, negative for none.
     Of the residual, not of the reference: a change between two repeats that the model follows is no noise.
     """
-    pairs = replicate_pairs(use & np.isfinite(residual_um).all(axis=1), visit)
+    pairs = replicate_pairs(use & np.isfinite(residual_um).all(axis=1), visit, criteria.max_rows_of_visit)
     if pairs is None:
         return None
     sigma_um = trimmed_scale(pairs.difference(residual_um), pairs.weight)
@@ -140,7 +145,7 @@ def _noise_floor(
     """As `noise_floor`."""
     expected_um = np.sqrt(declared_um**2 + np.nan_to_num(gauges_um) ** 2)
     is_declared = bool(np.isfinite(declared_um).all())
-    scatter = repeat_scatter(residual_um, use, visit)
+    scatter = repeat_scatter(residual_um, use, visit, criteria)
     if scatter is not None and scatter.pairs >= criteria.fewest_pairs:
         scatter = scatter._replace(by_axis_um=np.maximum(scatter.by_axis_um, digit_um))
         if (scatter.by_axis_um > 0).all():

@@ -90,4 +90,4 @@ def _fitted_parameters(aligned: AlignedRecording, G: FloatArray, residual_um: Fl
         return np.zeros(G.shape[2])
     # of attitudes beside lengths each coordinate counts in its own scatter: urad and um have no size in common
     size_um = np.maximum(trimmed_scale(residual_um[use]), LEAST_SIGMA) if aligned.with_attitude else np.ones(1)
-    return robust_regression(G[use] / size_um[:, None], residual_um[use] / size_um)
+    return robust_regression(G[use] / size_um[:, None], residual_um[use] / size_um, huber=aligned.criteria.huber_sigmas)

@@ -15,12 +15,16 @@ from pathlib import Path
 
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.configuration import Configuration, Machine, load_machine, shipped_names
+from compd.comparison.criteria import ComparisonCriteria
+from compd.configuration import Configuration
+from compd.configuration.shipped import Machine, load_machine, shipped_names
 from compd.errors import Problem, RecordingError
 from compd.recording import EXTERNAL, Recording, read_recording, read_sidecar
 
 
-def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedRecording:
+def open_recording(
+    path: str | Path, machine: Machine | None = None, *, criteria: ComparisonCriteria = ComparisonCriteria()
+) -> AlignedRecording:
     """Open a recording with its machine, and compute what the machine's kinematics predicts in each of its rows.
 
     Parameters
@@ -32,6 +36,8 @@ def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedR
         The machine as `load_machine` takes it. Left out, the configuration that comes with compd under the name in
         the sidecar; with ``machine: external`` in the sidecar there is none, and the prediction of your own model is
         read from the columns ``model_x_mm`` ...
+    criteria : ComparisonCriteria
+        The numbers by which the recording is aligned, compared and fitted; every one has its default.
 
     Returns
     -------
@@ -53,7 +59,8 @@ def open_recording(path: str | Path, machine: Machine | None = None) -> AlignedR
     >>> recording.labels, recording.measured_mm.shape
     (('x', 'y', 'z'), (608, 3))
     """
-    return align_recording(*read_with_machine(Path(path), machine))
+    recording, configuration = read_with_machine(Path(path), machine)
+    return align_recording(recording, configuration, criteria)
 
 
 def read_with_machine(

@@ -48,7 +48,7 @@ def outlier_limits(
     middle_um = np.median(residual_um[use], axis=0)
     sigma_um = robust_sigma(residual_um[use] - middle_um)
     limit_um = criteria.outlier_sigmas * np.maximum(sigma_um, LEAST_SIGMA)
-    pairs = replicate_pairs(use & np.isfinite(residual_um).all(axis=1), visit)
+    pairs = replicate_pairs(use & np.isfinite(residual_um).all(axis=1), visit, criteria.max_rows_of_visit)
     if pairs is None:
         return OutlierLimits(middle_um, limit_um, None)
     # of few repeats, an outlier among them makes most of the scatter, which then must not be its own measure

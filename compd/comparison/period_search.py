@@ -27,13 +27,6 @@ from compd.model.formula import column_values
 from compd.statistics import PeriodLimits, solve_least_squares, strongest_periods
 from compd.units import UM_PER_MM
 
-# Periods that are tried with the effect's own columns; more would be chance.
-PEAKS = 5
-# Periods that differ by so many turns over the range of the quantity are neighbours.
-QUARTER_TURN = 0.25
-# Fewer rows show no period.
-FEWEST_ROWS = 12
-
 
 class PromisingConstants(NamedTuple):
     """What a search for periods found.
@@ -53,14 +46,15 @@ class PromisingConstants(NamedTuple):
 
 
 def promising_constants(
-    effect: Effect, aligned: AlignedRecording, residual_um: FloatArray, rows: BoolArray, count: int = 3
+    effect: Effect, aligned: AlignedRecording, residual_um: FloatArray, rows: BoolArray
 ) -> PromisingConstants:
     """The nonlinear constants, with a searched period, at which an effect explains most of a residual.
 
     The machine's setting of a period, where there is one, is in the effect's own grid: what is found here may differ.
 
-    residual_um : (N, m) to explain.  rows : (N,) those that count.  count : how many to return at most.
+    residual_um : (N, m) to explain.  rows : (N,) those that count.
     """
+    criteria = aligned.criteria.periods
     constant = next((constant for constant in effect.constants if constant.period_of), None)
     if constant is None:
         return PromisingConstants([], 0)
@@ -70,14 +64,14 @@ def promising_constants(
     ]
     others = [dict(items) for items in dict.fromkeys(tuple(other.items()) for other in others)]
     quantity, series, usable = _at_places(effect, constant, others[0], aligned, residual_um, rows)
-    if usable.sum() < FEWEST_ROWS:
+    if usable.sum() < criteria.min_rows:
         return PromisingConstants([], 0)
-    limits = PeriodLimits(constant.low, constant.high)
-    search = strongest_periods(quantity, series, limits, PEAKS)
+    limits = PeriodLimits(constant.low, constant.high, criteria.min_turns, criteria.max_turns)
+    search = strongest_periods(quantity, series, limits, criteria.peaks, criteria)
     periods = [period for peak in search.periods for period in (peak, 2 * peak) if period <= constant.high]
     trials = [{**other, constant.name: period} for period in periods for other in others]
     trials.sort(key=lambda trial: -_explained_um2(effect, trial, aligned, residual_um, usable))
-    return PromisingConstants(trials[:count], search.independent)
+    return PromisingConstants(trials[: criteria.trials], search.independent)
 
 
 def longest_period(effect: Effect, constant: Constant, aligned: AlignedRecording) -> float:
@@ -85,7 +79,7 @@ def longest_period(effect: Effect, constant: Constant, aligned: AlignedRecording
 
     Over less a sine of any period and phase is a slope and a bend, and would take the place of what makes these.
     """
-    return min(constant.high, _span(effect, constant, aligned) / (1 - QUARTER_TURN))
+    return min(constant.high, _span(effect, constant, aligned) / (1 - aligned.criteria.periods.neighbour_turns))
 
 
 def neighbouring_periods(
@@ -96,7 +90,8 @@ def neighbouring_periods(
     None is beyond what is plausible, or too long to be seen to repeat.
     """
     turns = _span(effect, constant, aligned) / period
-    share = min(QUARTER_TURN / max(turns, QUARTER_TURN), 0.5)
+    apart = aligned.criteria.periods.neighbour_turns
+    share = min(apart / max(turns, apart), 0.5)
     longest = max(longest_period(effect, constant, aligned), period)
     return max(period / (1 + share), min(constant.low, period)), min(period / (1 - share), longest)
 

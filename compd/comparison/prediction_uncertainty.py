@@ -51,7 +51,7 @@ def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True) -> GaugeNo
         by_digit = last_digit_um(values_um[usable])
         scatter = None
         if from_repeats and values_um.size:
-            scatter = repeat_scatter(values_um, usable, recording.visit)
+            scatter = repeat_scatter(values_um, usable, recording.visit, aligned.criteria)
         repeated |= scatter is not None
         noise_mm[port] = (by_digit if scatter is None else np.maximum(scatter.by_axis_um, by_digit)) / UM_PER_MM
     how = "scatter of the gauges within visits" if repeated else "the gauges' last digits alone: a lower bound"

@@ -33,15 +33,16 @@ def compare(
     aligned: AlignedRecording,
     fitted: Sequence[FittedEffect] = (),
     covariance: FloatArray | None = None,
-    criteria: ComparisonCriteria = ComparisonCriteria(),
     outlier: BoolArray | None = None,
 ) -> Comparison:
     """Compare a recording with the model and its effects; nothing of these is fitted here, but the nuisance terms are.
 
     covariance : (P, P) of the effects' parameters jointly; where None, from each effect's own.
     outlier : (N,) rows that do not count; None to find them.
+    The criteria are those of the recording.
     Raises CompdError where an effect needs what the recording has not, RecordingError where too few rows are usable.
     """
+    criteria = aligned.criteria
     by_effect, total = effect_deltas(fitted, aligned.rows)
     predicted_mm = aligned.predicted_mm(total)
     known, left_out = _known_rows(aligned, predicted_mm, criteria)
@@ -77,10 +78,9 @@ def compare(
         uncertainty=uncertainty,
         gauges=gauges,
         contributions=contributions(aligned, fitted, by_effect, used),
-        trends=find_trends(aligned, residual_um, links_um, used, floor, criteria),
+        trends=find_trends(aligned, residual_um, links_um, used, floor),
         link_residual_um=links_um,
         attitude_residual_urad=aligned.attitude_residual_urad(total),
-        criteria=criteria,
         constant_um=np.asarray(along.registration_um[used].mean(axis=0)),
     )
 
@@ -148,7 +148,7 @@ def _uncertainty(
     # who lifts a probe off and sets it down again moves the scales by the seat's noise, which is the reference's
     gauges = gauge_noise(aligned, from_repeats=aligned.ends is None)
     uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
-    repeats = repeat_scatter(residual_um, used, aligned.recording.visit)
+    repeats = repeat_scatter(residual_um, used, aligned.recording.visit, criteria)
     if repeats is not None:
         gauges_um = np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0))
         # what the gauges' noise alone does to the residual cannot be more than the residual's own scatter

@@ -25,14 +25,6 @@ from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.noise_floor import NoiseFloor
 from compd.statistics import cluster_std, filled
 
-# Trends per coordinate, and collinear covariates per trend: more are noise in a report.
-PER_COORDINATE = 2
-MOST_COLLINEAR = 4
-# More rows would not change what the sentences say.
-ROWS = 10_000
-# A line through fewer rows, and a comparison of the workspace's ends with fewer, says nothing.
-FEWEST_ROWS = 10
-FEWEST_ROWS_OF_ENDS = 30
 ENDS = {
     "x": ("towards -x", "towards +x"),
     "y": ("towards -y", "towards +y"),
@@ -101,22 +93,25 @@ def find_trends(
     links_um: FloatArray | None,
     used: BoolArray,
     floor: NoiseFloor,
-    criteria: ComparisonCriteria = ComparisonCriteria(),
 ) -> tuple[Trend, ...]:
     """The trends of all coordinates, the one that explains most (in um^2) first.
 
     residual_um : (N, m).  links_um : (N, n) the same as errors of link lengths, or None.  used : (N,) rows that count.
     A coordinate at the noise floor has none. A link is named only for what it shows more clearly than the tip does.
     """
-    used = _thinned(used)
+    criteria = aligned.criteria
+    used = _thinned(used, criteria.max_trend_rows)
     coordinates = [(label, residual_um[:, k], float(floor.by_axis_um[k])) for k, label in enumerate(aligned.labels)]
     if links_um is not None:
         # the floor at a link: noise at the tip, pulled back through the same Jacobian as the residual
         ratio = np.sqrt(np.mean(links_um[used] ** 2, axis=0)) / max(rms(residual_um[used][:, aligned.lengths]), 1e-12)
         coordinates += [(f"link {i + 1}", column, float(ratio[i] * floor.um)) for i, column in enumerate(links_um.T)]
     time_s = aligned.recording.time_s
-    all_covariates = [covariate._replace(values=filled(covariate.values, time_s)) for covariate in covariates(aligned)]
-    block = neighbour_blocks(aligned.recording)
+    all_covariates = [
+        covariate._replace(values=filled(covariate.values, time_s, criteria.max_filled_share))
+        for covariate in covariates(aligned)
+    ]
+    block = neighbour_blocks(aligned.recording, criteria.blocks)
     tests = len(coordinates) * len(all_covariates)
     trends: list[tuple[float, Trend]] = []
     for label, values, floor_um in coordinates:
@@ -124,7 +119,7 @@ def find_trends(
             continue
         link = int(label.removeprefix("link ")) if label.startswith("link") else 0
         candidates = [covariate for covariate in all_covariates if not link or covariate.link in (0, link)]
-        largest_at = _largest_at(aligned, values, used, criteria.location_ratio, aligned.unit_of(label))
+        largest_at = _largest_at(aligned, values, used, aligned.unit_of(label))
         trends += _coordinate_trends(label, values, used, candidates, block, tests, largest_at, criteria)
     trends.sort(key=lambda pair: -pair[0])
     return _without_weaker_links(
@@ -132,11 +127,11 @@ def find_trends(
     )
 
 
-def _thinned(used: BoolArray) -> BoolArray:
-    """At most ROWS of the rows, evenly spread."""
+def _thinned(used: BoolArray, max_rows: int) -> BoolArray:
+    """At most `max_rows` of the rows, evenly spread."""
     rows = np.flatnonzero(used)
     chosen = np.zeros_like(used)
-    chosen[rows[np.linspace(0, len(rows) - 1, min(ROWS, len(rows))).astype(np.int64)]] = True
+    chosen[rows[np.linspace(0, len(rows) - 1, min(max_rows, len(rows))).astype(np.int64)]] = True
     return chosen
 
 
@@ -176,8 +171,8 @@ def _coordinate_trends(
     if p < criteria.trend_p_value and mean**2 > criteria.trend_share * mean_square:
         trends.append((mean**2, Trend(label, None, "", mean, mean**2 / mean_square, p)))
     total = float(np.mean(rest[used] ** 2))
-    for _ in range(PER_COORDINATE):
-        lines = [_fit_line(covariate, rest, used, block) for covariate in candidates]
+    for _ in range(criteria.trends_per_coordinate):
+        lines = [_fit_line(covariate, rest, used, block, criteria.min_trend_rows) for covariate in candidates]
         best = max(lines, key=lambda line: line.explained, default=None)
         left = float(np.mean(rest[used] ** 2))
         if best is None or best.explained * left < criteria.trend_share * total:
@@ -191,8 +186,9 @@ def _coordinate_trends(
         collinear = tuple(
             other.name
             for other in candidates
-            if other is not covariate and _correlation(covariate, other, used) > criteria.collinear_correlation
-        )[:MOST_COLLINEAR]
+            if other is not covariate
+            and _correlation(covariate, other, used, criteria.min_trend_rows) > criteria.collinear_correlation
+        )[: criteria.max_collinear]
         trend = Trend(label, covariate.name, covariate.unit, slope, explained, p, collinear, largest_at)
         trends.append((explained * total, trend))
         largest_at = ""  # once per coordinate is enough
@@ -211,10 +207,10 @@ class _Line:
     clusters: int = 0
 
 
-def _fit_line(covariate: Covariate, values: FloatArray, used: BoolArray, block: IntArray) -> _Line:
+def _fit_line(covariate: Covariate, values: FloatArray, used: BoolArray, block: IntArray, min_rows: int) -> _Line:
     """The line through the used rows that have the covariate; slope 0 where it hardly changes or few rows have it."""
     rows = used & np.isfinite(covariate.values)
-    if rows.sum() < FEWEST_ROWS:
+    if rows.sum() < min_rows:
         return _Line(covariate)
     x = covariate.values[rows] - covariate.values[rows].mean()
     y = values[rows] - values[rows].mean()
@@ -237,23 +233,23 @@ def _p_value(t: float, clusters: int, tests: int) -> float:
     return float(min(1.0, betainc(dof / 2, 0.5, dof / (dof + t**2)) * tests))
 
 
-def _correlation(covariate: Covariate, other: Covariate, used: BoolArray) -> float:
+def _correlation(covariate: Covariate, other: Covariate, used: BoolArray, min_rows: int) -> float:
     """Absolute correlation of two covariates, 0 to 1; 0 where one of them does not change."""
     rows = used & np.isfinite(covariate.values) & np.isfinite(other.values)
     a, b = covariate.values[rows], other.values[rows]
-    if len(a) < FEWEST_ROWS or np.ptp(a) == 0 or np.ptp(b) == 0:
+    if len(a) < min_rows or np.ptp(a) == 0 or np.ptp(b) == 0:
         return 0.0
     return float(abs(np.corrcoef(a, b)[0, 1]))
 
 
-def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray, least_ratio: float, unit: str) -> str:
+def _largest_at(aligned: AlignedRecording, values: FloatArray, used: BoolArray, unit: str) -> str:
     """The third of the workspace, or of the recording, in which the error is much larger than in the opposite third."""
-    largest, text = least_ratio, ""
+    largest, text = aligned.criteria.location_ratio, ""
     places = {"time": aligned.recording.time_s}
     places |= dict(zip("xyz", aligned.rows.tip_M_mm.T, strict=True))
     for name, place in places.items():
         rows = used & np.isfinite(place)
-        if rows.sum() < FEWEST_ROWS_OF_ENDS or np.ptp(place[rows]) == 0:
+        if rows.sum() < aligned.criteria.min_rows_of_ends or np.ptp(place[rows]) == 0:
             continue
         low, high = np.quantile(place[rows], [1 / 3, 2 / 3])
         rms_um = [rms(values[rows & (place <= low)]), rms(values[rows & (place >= high)])]

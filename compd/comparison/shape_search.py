@@ -19,15 +19,12 @@ from scipy.optimize import minimize_scalar
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.effect_fit import FitResult, fit, initial_effect
+from compd.comparison.fit import FitResult, fit, initial_effect
 from compd.comparison.period_search import neighbouring_periods, promising_constants
 from compd.model.effects import ConstantValues, Effect, FittedEffect
 
 # A constant is known well enough when an error of it moves the residual by less than its own standard error: 1 % is.
 FINE = 0.01
-# The chance by which a searched period may contradict the machine's description.
-CHANCE = 0.01
 
 
 class _Trial(NamedTuple):
@@ -43,7 +40,6 @@ def search_constants(
     model: Sequence[FittedEffect],
     effect: Effect,
     sigma_um: FloatArray,
-    criteria: ComparisonCriteria = ComparisonCriteria(),
 ) -> FitResult:
     """Fit `effect` jointly with the effects of the model, and search its nonlinear constants.
 
@@ -58,16 +54,16 @@ def search_constants(
     links = aligned.rows.links
     shapes = effect.constant_grid(aligned.rows)
     if len(shapes) == 1 and not any(constant.period_of for constant in effect.constants):
-        return fit(aligned, [*model, initial_effect(effect, shapes[0], links)], sigma_um, criteria)
-    without = fit(aligned, model, sigma_um, criteria)
-    limit_um2 = (criteria.outlier_sigmas * without.rms_um) ** 2
+        return fit(aligned, [*model, initial_effect(effect, shapes[0], links)], sigma_um)
+    without = fit(aligned, model, sigma_um)
+    limit_um2 = (aligned.criteria.outlier_sigmas * without.rms_um) ** 2
 
     def loss_um2(result: FitResult) -> float:
         known = np.isfinite(result.residual_um).all(axis=1)
         return float(np.mean(np.minimum(result.residual_um[known] ** 2, limit_um2)))
 
     def trial(shape: ConstantValues) -> _Trial:
-        result = fit(aligned, [*model, initial_effect(effect, shape, links)], sigma_um, criteria)
+        result = fit(aligned, [*model, initial_effect(effect, shape, links)], sigma_um)
         return _Trial(shape, loss_um2(result), result)
 
     best = min((trial(shape) for shape in shapes), key=lambda candidate: candidate.loss)
@@ -75,7 +71,8 @@ def search_constants(
     if promising.constants:
         suggested = min((trial(shape) for shape in promising.constants), key=lambda candidate: candidate.loss)
         if suggested.loss < best.loss and (
-            len(shapes) > 1 or _evident(suggested, best, loss_um2(without), promising.independent)
+            len(shapes) > 1
+            or _evident(suggested, best, loss_um2(without), promising.independent, aligned.criteria.periods.chance)
         ):
             best = suggested
             shapes = [*shapes, *promising.constants]
@@ -119,7 +116,7 @@ def _bracket(
     return constant.name, grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
 
 
-def _evident(suggested: _Trial, described: _Trial, loss_without: float, independent: int) -> bool:
+def _evident(suggested: _Trial, described: _Trial, loss_without: float, independent: int, chance: float) -> bool:
     """Whether a period that was searched is more probable than the one of the machine's description, and no chance.
 
     The gain of n values, n log(loss without / loss), has by noise alone a chi-squared distribution with as many
@@ -133,4 +130,4 @@ def _evident(suggested: _Trial, described: _Trial, loss_without: float, independ
     by_search, by_description = (
         float(chi2.logsf(numbers * np.log(loss_without / trial.loss), parameters)) for trial in (suggested, described)
     )
-    return bool(np.log(independent) + by_search < min(by_description, np.log(CHANCE)))
+    return bool(np.log(independent) + by_search < min(by_description, np.log(chance)))

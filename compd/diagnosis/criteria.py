@@ -1,10 +1,28 @@
-"""The numbers on which the verdict of a diagnosis rests, each with its meaning, its unit and where it is from."""
+"""The numbers on which the verdict of a diagnosis rests, each with its meaning, its unit and where it is from.
+
+A number is a criterion, and stands in `Criteria`, `ComparisonCriteria` or `FleetCriteria`, where another sensible value
+could change a verdict, which effects are named, their numbers, the noise floor, or what a comparison says. A number
+stands where it is used, beside a comment, where it is
+
+- numerics: what rounding may do, the step or the end of an iteration, the conditioning of equations, a draw's seed;
+- the definition of a method, or a constant that follows from one: a quantile of the normal distribution, the two bends
+  of `trimmed_scale` with the mean square that belongs to them, three points for a frame;
+- a matter of memory or time that leaves results as they are: the size of a batch or a block;
+- a matter of words: how many effects a sentence names, to how many digits a formula is rounded;
+- the form of a proposed measurement: at which places, loads and speeds rows are sought.
+
+How a recording is joined, read and checked is decided before, and refused or told where it is in doubt.
+
+tests/unit/diagnosis/test_module_numbers.py lists the numbers that stand where they are used, each with its reason.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from compd.comparison import threshold
+from compd.comparison.criteria import threshold
+from compd.diagnosis.candidate_criteria import CandidateCriteria, DescriptionCriteria
+from compd.diagnosis.search_criteria import FoldCriteria, GrossCriteria, PlanningCriteria, SearchCriteria
 
 _LOG = "natural logarithm of the mean square"
 
@@ -15,11 +33,17 @@ class Criteria:
 
     A loss L is the mean square per measured value on rows that were left out, divided by the variance of the noise, so
     that 1.0 is the noise floor. A set of effects is judged by log L and the prices of its members. Each field's
-    metadata hold `unit`, `meaning` and `reason`.
+    metadata hold `unit`, `meaning` and `reason`; `thresholds` has those of the sections, too. The numbers of the
+    comparison beneath are those of the recording, `AlignedRecording.criteria`.
+
+    candidates : what is tried: effects of the library, and changes in time.
+    descriptions : what is tried beside them, without a cause.
+    search : how sets of them are looked for.  folds : which rows are left out.  gross : which rows do not count.
+    planning : which measurement is proposed.
 
     A stricter diagnosis, for example::
 
-        diagnose(aligned, (), None, effects, criteria=Criteria(least_sigmas=3.0))
+        diagnose(aligned, (), None, effects, criteria=Criteria(least_sigmas=3.0, search=SearchCriteria(max_members=3)))
     """
 
     effect_price: float = threshold(
@@ -80,6 +104,14 @@ class Criteria:
         meaning="a parameter farther outside its plausible range is implausible",
         reason="by noise alone once in 370 parameters (normal distribution, two-sided)",
     )
+    range_slack: float = threshold(
+        0.25,
+        unit="share of the range's width",
+        meaning="by so much a parameter may exceed its plausible range whatever its standard error, but not have the "
+        "wrong sign",
+        reason="a choice: ranges are from handbooks, and round, and an effect of nearly the right form misses its "
+        "number by as much",
+    )
     p_value: float = threshold(
         0.05,
         unit="probability",
@@ -99,3 +131,9 @@ class Criteria:
         "above the floor",
         reason="a choice: two causes of a fifth of the noise each, too small to be found",
     )
+    candidates: CandidateCriteria = CandidateCriteria()
+    descriptions: DescriptionCriteria = DescriptionCriteria()
+    search: SearchCriteria = SearchCriteria()
+    folds: FoldCriteria = FoldCriteria()
+    gross: GrossCriteria = GrossCriteria()
+    planning: PlanningCriteria = PlanningCriteria()

@@ -19,10 +19,6 @@ from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.regression import RegressionData, Regressors, normal_equations
 from compd.diagnosis.search.significance import Family, OrthogonalComplement, p_values
 
-# A direction in which a term explains less than this share of its squares is left out of the proposed formulas: it
-# would be a formula for noise.
-DIRECTION_SHARE = 0.03
-
 
 def describe_remainder(problem: DiagnosisProblem, explanation: Explanation) -> tuple[EmpiricalFinding, ...]:
     """What the residual beside the effects that were found follows, the strongest first.
@@ -77,7 +73,11 @@ class _Remainder:
         complement = OrthogonalComplement(self._data.nuisance.values)
         columns = [complement(np.concatenate([fit.values for fit in family], axis=2)) for family in families]
         y = complement(self._data.y)
-        values: list[float] = p_values([Family([together], y) for together in columns], self._data.block).tolist()
+        values: list[float] = p_values(
+            [Family([together], y) for together in columns],
+            self._data.block,
+            self._problem.criteria.search.sign_flips,
+        ).tolist()
         return values
 
     def member(self, k: int) -> EmpiricalFinding:
@@ -89,7 +89,7 @@ class _Remainder:
         rest = [member for member in self._explanation.members if member != k]
         complement = OrthogonalComplement(losses.nuisance_with(rest).values)
         own = Family([complement(losses.values[k])], complement(losses.data.y))
-        p_value = float(p_values([own], losses.data.block)[0])
+        p_value = float(p_values([own], losses.data.block, losses.criteria.search.sign_flips)[0])
         loss, without = losses.loss(self._explanation.members), losses.loss(rest)
         covariate = candidate.quantity if isinstance(candidate, ProxyCandidate) else "time_s"
         units = {constant.name: constant.unit for constant in candidate.effect.constants}
@@ -130,7 +130,7 @@ class _Remainder:
                 declaration = fit.term.declaration(axis, fit.constant, sizes)
                 parts.append((squares, fit.term.covariate, declaration, parameters))
         parts.sort(key=lambda part: -part[0])
-        least = DIRECTION_SHARE * sum(part[0] for part in parts)
+        least = self._problem.criteria.descriptions.min_direction_share * sum(part[0] for part in parts)
         kept = [part for part in parts if part[0] >= least]
         main_fit = next(fit for fit in fits if fit.term.covariate == parts[0][1])
         main = main_fit.term

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from compd.comparison import AlignedRecording, Comparison, compare
@@ -42,12 +42,10 @@ class Holdout:
 
 
 def evaluate_holdout(diagnosis: Diagnosis, aligned: AlignedRecording) -> Holdout:
-    """Compare a holdout recording with the model before and after a diagnosis.
+    """Compare a holdout recording with the model before and after a diagnosis, by the same criteria.
 
     Raises CompdError where the recording lacks what an effect needs.
     """
-    before, after = (
-        compare(aligned, comparison.fitted, criteria=comparison.criteria)
-        for comparison in (diagnosis.before, diagnosis.after)
-    )
+    aligned = replace(aligned, criteria=diagnosis.before.criteria)
+    before, after = (compare(aligned, comparison.fitted) for comparison in (diagnosis.before, diagnosis.after))
     return Holdout(before, after)

@@ -21,19 +21,25 @@ def propose_measurement(
     the residual follows, else about where a constant comes from.
     """
     aligned, candidates = problem.aligned, explanation.losses.candidates
-    fitted = diagnosis.after.fitted
+    fitted, criteria = diagnosis.after.fitted, problem.criteria.planning
     for step in diagnosis.steps:
         if step.rivals:
             others = [effect for effect in fitted if effect is not step.fitted]
             rival = candidates[step.rivals[0].member]
             found = next_measurement(
-                aligned, others, step.fitted, rival.effect, problem.sigma_um, constants=rival.constants
+                aligned,
+                others,
+                step.fitted,
+                rival.effect,
+                problem.sigma_um,
+                constants=rival.constants,
+                criteria=criteria,
             )
             return found.as_json()
     by_id = {candidate.effect.id: candidate.effect for candidate in candidates if candidate.kind == "proxy"}
     likely = [by_id[untested.effect] for untested in diagnosis.untested if untested.likely]
     if likely:
-        return measurement_to_test(aligned, fitted, likely[0], problem.sigma_um).as_json()
+        return measurement_to_test(aligned, fitted, likely[0], problem.sigma_um, criteria=criteria).as_json()
     for finding in diagnosis.depends_on[:1]:
         if finding.is_change:
             return [
@@ -57,7 +63,7 @@ def propose_measurement(
     causes = [candidate.effect for candidate in problem.same_as_nuisance]
     if constant is not None and len(causes) > 1:
         by_axis = problem.comparison.constant_um
-        return measurement_of_constant(aligned, fitted, causes, by_axis, problem.sigma_um).as_json()
+        return measurement_of_constant(aligned, fitted, causes, by_axis, problem.sigma_um, criteria=criteria).as_json()
     return []
 
 

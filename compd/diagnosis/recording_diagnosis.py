@@ -10,7 +10,8 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording, Comparison, compare, fit, initial_effect, thinned
 from compd.diagnosis import stages
-from compd.diagnosis.candidate_result import candidate_results, explained_fraction, why_nothing_else
+from compd.diagnosis.candidate_criteria import CandidateCriteria
+from compd.diagnosis.candidate_results import candidate_results, explained_fraction, why_nothing_else
 from compd.diagnosis.candidates.candidates import CandidatePool, library_pool, periodic_candidates
 from compd.diagnosis.candidates.plausibility import estimate_parameters
 from compd.diagnosis.candidates.proxies import proxy_candidates
@@ -31,9 +32,6 @@ from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.diagnosis.words.summary import summary
 from compd.model.effects import Effect, FittedEffect
 
-# A longer recording is thinned to so many rows: effects of a fiftieth of the noise still show in them.
-MOST_ROWS = 5000
-
 
 def diagnose(
     aligned: AlignedRecording,
@@ -53,9 +51,9 @@ def diagnose(
         are refitted along.
     effects : the library.
     progress : called with a text when a stage begins.
-    criteria : numbers of the verdict.
+    criteria : numbers of the verdict; those of the comparison are the recording's.
 
-    A recording of more than MOST_ROWS rows is thinned evenly; the result is of the rows that were kept.
+    A recording of more rows than `criteria.search.max_rows` is thinned evenly; the result is of those that were kept.
 
     Raises CompdError as `compare` does.
 
@@ -66,14 +64,16 @@ def diagnose(
         [step.effect.id for step in diagnosis.steps]  # ["link_elasticity"]
     """
     progress(stages.COMPARISON)
-    aligned = thinned(aligned, MOST_ROWS)
+    aligned = thinned(aligned, criteria.search.max_rows)
     before = compare(aligned, fitted, covariance)
     explanation = explain_residual(before, effects, progress, criteria)
     progress(stages.FIT)
     return _diagnosis(explanation, covariance)
 
 
-def candidate_pool(before: Comparison, effects: Sequence[Effect]) -> CandidatePool:
+def candidate_pool(
+    before: Comparison, effects: Sequence[Effect], criteria: CandidateCriteria = CandidateCriteria()
+) -> CandidatePool:
     """What may explain the residual of a comparison: effects that its model has not, also at periods that the residual
     suggests, and what stands for effects that were not measured.
 
@@ -81,12 +81,12 @@ def candidate_pool(before: Comparison, effects: Sequence[Effect]) -> CandidatePo
     """
     aligned = before.aligned
     present = [effect.effect.id for effect in before.fitted]
-    pool = library_pool(aligned, effects, present)
+    pool = library_pool(aligned, effects, present, criteria)
     tried = {candidate.name: candidate.effect for candidate in pool.candidates}.values()
     return replace(
         pool,
         candidates=(*pool.candidates, *periodic_candidates(aligned, tried, before.residual_um, before.used)),
-        proxies=proxy_candidates(aligned, effects, present),
+        proxies=proxy_candidates(aligned, effects, present, criteria),
     )
 
 
@@ -101,7 +101,7 @@ def explain_residual(
     effects, progress, criteria : as of `diagnose`.
     """
     progress(stages.CANDIDATES)
-    pool = candidate_pool(before, effects)
+    pool = candidate_pool(before, effects, criteria.candidates)
     problem = build_problem(before, pool, criteria)
     explanation = explain(problem, progress)
     # which rows are gross, and what explains the others, depend on one another: both are determined twice
@@ -141,10 +141,11 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         candidates,
         describe_remainder(problem, explanation) if above else (),
         constant=describe_constant(problem, explanation, named, after.constant_um),
-        gross=gross_rows(problem.gross, aligned.recording.row),
+        gross=gross_rows(problem.gross, aligned.recording.row, criteria.gross),
         untested=_untested(problem, explanation, steps),
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
+        criteria=criteria,
     )
     return replace(
         diagnosis,
@@ -235,7 +236,8 @@ def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float
         variants = [complement(losses.values[k]) for k in own]
         best_of = [losses.candidates[k].best_of for k in own]
         families[name] = Family(variants, complement(losses.data.y), best_of)
-    return dict(zip(families, p_values(list(families.values()), losses.data.block).tolist(), strict=True))
+    found = p_values(list(families.values()), losses.data.block, losses.criteria.search.sign_flips)
+    return dict(zip(families, found.tolist(), strict=True))
 
 
 def _untested(

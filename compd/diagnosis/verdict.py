@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from compd.comparison import Comparison
+from compd.comparison.comparison import Comparison
+from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import (
     CandidateResult,
     ConstantFinding,
@@ -60,6 +61,8 @@ class Diagnosis:
         Error on rows that were left out with the model as it was, without its constant, um per coordinate.
     heldout_after_um : float
         The same with the effects of `steps`.
+    criteria : Criteria
+        The numbers on which it rests, each with unit, meaning and reason.
     summary : str
         The verdict in one or two sentences; `diagnose` fills it in last, from all the others.
     """
@@ -77,6 +80,7 @@ class Diagnosis:
     heldout_before_um: float = float("nan")
     heldout_after_um: float = float("nan")
     summary: str = ""
+    criteria: Criteria = Criteria()
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per effect of the library, as a pandas data frame.

@@ -12,12 +12,10 @@ from compd.fleet.overview import Overview
 from compd.fleet.recording_result import RecordingResult
 from compd.report import PageTable, Panel, write_page
 
-_CRITERIA = FleetCriteria()
 
-
-def write_fleet_page(path: Path, results: Sequence[RecordingResult]) -> None:
-    """Write the page; it works offline. results : at least one."""
-    overview = Overview(results)
+def write_fleet_page(path: Path, results: Sequence[RecordingResult], criteria: FleetCriteria = FleetCriteria()) -> None:
+    """Write the page; it works offline. results : at least one.  criteria : by which drifts and machines are named."""
+    overview = Overview(results, criteria=criteria)
     verdict = overview.headline
     panels = [
         Panel(
@@ -29,14 +27,14 @@ def write_fleet_page(path: Path, results: Sequence[RecordingResult]) -> None:
         Panel(
             "How parameters change from campaign to campaign",
             f"Bars are standard errors. A line is drawn where chance makes so steep a one less than once in "
-            f"{1 / _CRITERIA.drift_p_value:g} such pages; it takes {_CRITERIA.fewest_campaigns} campaigns.",
+            f"{1 / criteria.drift_p_value:g} such pages; it takes {criteria.fewest_campaigns} campaigns.",
             plot_drifts(overview),
         ),
         Panel(
             "The error of each machine",
             f"Dots are recordings. A machine differs where its median, or one of its parameters, is more than "
-            f"{_CRITERIA.outlying_score:g} robust standard deviations from the median of all machines that are built "
-            f"alike, errors of those with the same effects; it takes {_CRITERIA.fewest_machines} machines.",
+            f"{criteria.outlying_score:g} robust standard deviations from the median of all machines that are built "
+            f"alike, errors of those with the same effects; it takes {criteria.fewest_machines} machines.",
             plot_errors(overview),
         ),
         Panel(

@@ -9,9 +9,18 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from compd.api import LongRecording, compare, diagnose, open_long
-from compd.comparison import AlignedRecording, Comparison, compare_blocks, is_long, open_recording
-from compd.configuration import LINKS, Configuration, load
+from compd.api.diagnosis import compare, diagnose
+from compd.api.long_recordings import LongRecording, open_long
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.comparison import Comparison
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.open import open_recording
+from compd.comparison.stream.block_comparison import compare_blocks
+from compd.comparison.stream.recording_stream import is_long
+from compd.configuration import Configuration, load
+from compd.configuration.geometry import LINKS
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.model_changes import refit, unrefined
 from compd.errors import CompdError, Problem
 from compd.files import file_stamp
 from compd.fleet.fleet_recording import FleetRecording, content_hash
@@ -45,12 +54,15 @@ class Examination:
     machines : configurations of machines that do not come with compd.
     models : model files. A machine without one has no effects.
     effects : effects of one's own that a diagnosis tries, as `compd.load_effects` takes them.
+    criteria : numbers of the verdicts.  comparison : of the comparisons.
     """
 
     command: Command
     machines: MachineFiles = field(default_factory=MachineFiles)
     models: MachineFiles = field(default_factory=MachineFiles)
     effects: tuple[str, ...] = ()
+    criteria: Criteria = Criteria()
+    comparison: ComparisonCriteria = ComparisonCriteria()
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -64,8 +76,8 @@ class Examination:
     def basis(self, recording: FleetRecording) -> str:
         """Hash of all inputs of its result besides the code: results with equal hashes are equal.
 
-        The recording's files and its machine's name, the configuration, the model, effects of one's own, the command
-        and the release. "" if a file cannot be read.
+        The recording's files and its machine's name, the configuration, the model, effects of one's own, the command,
+        the release, and the criteria where they are not its own. "" where a file cannot be read.
         """
         content = content_hash(recording.path)
         files = [self.machines.of(recording), self.models.of(recording), *self._effect_files]
@@ -75,6 +87,7 @@ class Examination:
             return ""
         named = [effect for effect in self.effects if not Path(effect).is_absolute()]
         whole = [self.command, __version__, str(recording.path), recording.machine, str(recording.started_at), *named]
+        whole += [repr(criteria) for criteria in (self.criteria, self.comparison) if criteria != type(criteria)()]
         return content and hashlib.sha256("\0".join([content, *parts, *whole]).encode()).hexdigest()
 
     def __call__(self, recording: FleetRecording) -> RecordingResult:
@@ -83,10 +96,10 @@ class Examination:
         configuration = None if file is None else _configuration(file, file_stamp(file))
         path = recording.path
         if is_long(path):
-            long = open_long(path, configuration)
+            long = open_long(path, configuration, criteria=self.comparison)
             aligned = long.sample.aligned
         else:
-            long, aligned = None, open_recording(path, configuration)
+            long, aligned = None, open_recording(path, configuration, criteria=self.comparison)
         model = self._model(recording, aligned)
         if self.command == "diagnose":
             return self._diagnosed(recording, aligned, model)
@@ -121,7 +134,8 @@ class Examination:
         estimates: list[FleetEstimate] = []
         after_um = math.nan
         if model is not None and model.fitted:
-            refitted = refit_model(model, aligned) if long is None else refit_model(model, aligned, long.refine)
+            refine = unrefined if long is None else long.refine
+            refitted = refit(model, aligned, refine, self.criteria)
             after_um = refitted.steps[-1].rms_after_um
             estimates = [
                 FleetEstimate(number.effect, number.parameter, number.value, number.standard_error, number.unit)
@@ -135,7 +149,7 @@ class Examination:
     def _diagnosed(
         self, recording: FleetRecording, aligned: AlignedRecording, model: ModelFile | None
     ) -> RecordingResult:
-        diagnosis = diagnose(aligned, model, effects=self.effects)
+        diagnosis = diagnose(aligned, model, effects=self.effects, criteria=self.criteria)
         estimates = [
             FleetEstimate(
                 step.effect.id,
@@ -185,6 +199,8 @@ def examination(
     machines: Sequence[str | Path] = (),
     models: Sequence[str | Path] = (),
     effects: Sequence[str | Path] = (),
+    criteria: Criteria = Criteria(),
+    comparison: ComparisonCriteria = ComparisonCriteria(),
 ) -> Examination:
     """The examination of each recording, with its files checked before any work begins.
 
@@ -199,6 +215,10 @@ def examination(
         Model files, for the recordings of their machines; or patterns.
     effects : sequence of str or path
         Effects of one's own for `diagnose`, as `compd.load_effects` takes them.
+    criteria : Criteria
+        Numbers of the verdicts, as for `compd.diagnose`.
+    comparison : ComparisonCriteria
+        Numbers of the comparisons, as for `compd.compare`.
 
     Raises
     ------
@@ -210,7 +230,8 @@ def examination(
     model_files = machine_files(models, lambda path: read_stored(path).machine, "a model file", problems)
     if problems:
         raise CompdError(problems)
-    return Examination(command, configurations, model_files, tuple(_wherever(effect) for effect in effects))
+    own = tuple(_wherever(effect) for effect in effects)
+    return Examination(command, configurations, model_files, own, criteria=criteria, comparison=comparison)
 
 
 def _wherever(effects: str | Path) -> str:

@@ -33,6 +33,7 @@ class Overview:
     """The results of a fleet with joint conclusions."""
 
     results: Sequence[RecordingResult]
+    criteria: FleetCriteria = FleetCriteria()
 
     @cached_property
     def examined(self) -> list[RecordingResult]:
@@ -63,22 +64,22 @@ class Overview:
     @cached_property
     def drifts(self) -> tuple[Drift, ...]:
         """Every parameter of every machine over its campaigns."""
-        return drifts(self.results)
+        return drifts(self.results, self.criteria)
 
     @cached_property
     def outlying(self) -> tuple[OutlyingMachine, ...]:
         """Machines that differ from the others."""
-        return outlying_machines(self.examined, self.drifts)
+        return outlying_machines(self.examined, self.drifts, self.criteria)
 
     @cached_property
     def lone(self) -> tuple[LoneEffect, ...]:
         """Effects that one machine alone has."""
-        return lone_effects(self.examined)
+        return lone_effects(self.examined, self.criteria)
 
     @cached_property
     def steady(self) -> dict[str, frozenset[str]]:
         """Machine -> the effects that it has on most of its recordings."""
-        return steady_effects(self.examined)
+        return steady_effects(self.examined, self.criteria)
 
     @cached_property
     def unexplained(self) -> Counter[str]:
@@ -88,7 +89,7 @@ class Overview:
     @property
     def unexplained_machines(self) -> list[str]:
         """Machines with such an error on most of their recordings."""
-        share = FleetCriteria().steady_share
+        share = self.criteria.steady_share
         return [machine for machine in self.machines if self.unexplained[machine] > share * len(self.of(machine))]
 
     @cached_property

@@ -8,20 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compd.instruments import FeedAndDwell, Way
-from compd.plan_file import NOT_SET, plan_text, write_text_file
-from compd.planning.plan_formats import DWELL_S, PlanFormat, target_bytes
-from compd.result_tables import Columns, data_frame, html_table
-from compd.text import join_words
+from compd.diagnosis.planning.plan_formats import DWELL_S, PlanFormat, target_bytes
+from compd.diagnosis.search_criteria import PlanningCriteria
+from compd.instruments.writers.gcode import FeedAndDwell
+from compd.instruments.writers.target import Way
+from compd.recording.plan_file import NOT_SET, plan_text, write_text_file
+from compd.tables import Columns, data_frame, html_table
+from compd.text.number_text import join_words
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# Standard deviations of the noise by which two effects have to differ for a measurement to tell them apart: at three
-# the wrong one fits better in 7 of 100 measurements, Phi(-3/2) for Gaussian noise.
-LEAST_SEPARATION = 3.0
-# Standard deviations that the rows have to add to what was measured: the noise itself moves the difference by one.
-LEAST_GAIN = 1.0
 # The way on where nothing tells rivals apart.
 _EITHER = (
     "Within the limits they correct alike: either may be added to the model and used there. Which of the two it is "
@@ -60,6 +57,8 @@ class MeasurementPlan:
     difference_um : tuple of tuples of float
         By how much two of the rivals, the first that the rows are for, differ on each row, along each measured
         coordinate, as they are fitted on the recording; empty where there is one alone.
+    criteria : PlanningCriteria
+        By how much the rivals have to differ.
     """
 
     rivals: tuple[str, ...]
@@ -70,11 +69,20 @@ class MeasurementPlan:
     alike: tuple[tuple[str, str], ...] = ()
     ways: tuple[Way | None, ...] = ()
     difference_um: tuple[tuple[float, ...], ...] = ()
+    criteria: PlanningCriteria = PlanningCriteria()
+
+    @property
+    def is_wide_enough(self) -> bool:
+        """Whether the rivals will differ by `min_separation` of the criteria or more, whatever they did before."""
+        return self.separation >= self.criteria.min_separation
 
     @property
     def tells_apart(self) -> bool:
-        """Whether the rivals will differ by three standard deviations or more, by one more than before."""
-        return self.separation >= LEAST_SEPARATION and self.separation - self.before >= LEAST_GAIN
+        """Whether the rivals will differ by three standard deviations or more, by one more than before.
+
+        The two numbers are those of the criteria.
+        """
+        return self.is_wide_enough and self.separation - self.before >= self.criteria.min_gain
 
     @property
     def summary(self) -> str:
@@ -94,12 +102,12 @@ class MeasurementPlan:
             return text
         if self.separation < LEAST_SHOWN:
             return f"{text} One of them does nothing on such rows that the other, a constant or the model does not do."
-        if self.separation < LEAST_SEPARATION:
-            text += f" That does not tell them apart, which takes {LEAST_SEPARATION:.2g} times."
+        if not self.is_wide_enough:
+            text += f" That does not tell them apart, which takes {self.criteria.min_separation:.2g} times."
         else:
             text += " These rows add little."
         text += f" Widen the limits, or measure otherwise: {self.separated_by}."
-        return text if self.separation >= LEAST_SEPARATION or self.alike else f"{text} {_EITHER}"
+        return text if self.is_wide_enough or self.alike else f"{text} {_EITHER}"
 
     @property
     def instructions(self) -> str:

@@ -8,12 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison import AlignedRecording
-from compd.model.effects import ConstantValues, Effect, FittedEffect
-from compd.planning.measurement_plan import MeasurementPlan
-from compd.planning.programme_rows import ProgrammeRows, at_rows
-from compd.planning.t_optimal import Predictions, RivalRefit, choose_programmes
-from compd.statistics import solve_least_squares
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.statistics.least_squares import solve_least_squares
+from compd.diagnosis.planning.measurement_plan import MeasurementPlan
+from compd.diagnosis.planning.programme_rows import ProgrammeRows, at_rows
+from compd.diagnosis.planning.t_optimal import Predictions, RivalRefit, choose_programmes
+from compd.diagnosis.search_criteria import PlanningCriteria
+from compd.model.effect import ConstantValues, Effect, FittedEffect
 from compd.units import UM_PER_MM
 
 
@@ -54,12 +55,13 @@ class MeasurementPlanner:
         possible: ProgrammeRows,
         *,
         with_nuisance: bool = True,
+        criteria: PlanningCriteria = PlanningCriteria(),
     ) -> None:
         """model : effects that are fitted along.  sigma_um : (m,) noise.
 
         with_nuisance : whether the instrument's frame and the constants are fitted along as well.
         """
-        self._aligned, self._sigma_um, self._possible = aligned, sigma_um, possible
+        self._aligned, self._sigma_um, self._possible, self._criteria = aligned, sigma_um, possible, criteria
         self._planned = at_rows(aligned, possible.observations)
         self._along = [self.contender(effect).columns for effect in model]
         if with_nuisance:
@@ -117,6 +119,7 @@ class MeasurementPlanner:
             before=float(np.sqrt(max(choice.before, 0.0))),
             separated_by=separated_by,
             difference_um=self._difference_um(contests[0], programmes),
+            criteria=self._criteria,
         )
 
     def _difference_um(self, contest: Contest, programmes: Sequence[int]) -> tuple[tuple[float, ...], ...]:

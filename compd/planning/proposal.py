@@ -9,7 +9,14 @@ from itertools import combinations, permutations
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.diagnosis.planning.measurement_plan import MeasurementPlan, NextMeasurement, as_factor
+from compd.diagnosis.planning.measurement_planner import MeasurementPlanner
+from compd.diagnosis.planning.measurement_programmes import ProgrammeLimits, machine_programmes, recorded_limits
+from compd.diagnosis.planning.measurement_settings import SettingLimits
+from compd.diagnosis.planning.programme_rows import ProgrammeRows
+from compd.diagnosis.planning.setting_programmes import setting_programmes
+from compd.diagnosis.search_criteria import PlanningCriteria
 from compd.errors import CompdError, Problem
 from compd.model.effects import ConstantValues, Effect, FittedEffect, needed_quantities, unmet_needs
 from compd.planning.measurement_plan import LEAST_SEPARATION, MeasurementPlan, NextMeasurement, as_factor
@@ -19,11 +26,6 @@ from compd.planning.measurement_settings import SettingLimits
 from compd.planning.programme_rows import ProgrammeRows
 from compd.planning.setting_programmes import setting_programmes
 
-# Rows that a diagnosis proposes of itself; `compd plan` gives as many as are wanted.
-NEXT_ROWS = 12
-# What cannot be tested yet is looked for at this share of its largest plausible size.
-EXPECTED_SIZE = 0.5
-
 
 def plan_measurement(
     aligned: AlignedRecording,
@@ -32,6 +34,7 @@ def plan_measurement(
     sigma_um: FloatArray,
     limits: ProgrammeLimits | SettingLimits,
     rows: int,
+    criteria: PlanningCriteria = PlanningCriteria(),
 ) -> MeasurementPlan:
     """The rows on which fitted rivals differ most, however the other ones are refitted.
 
@@ -54,16 +57,16 @@ def plan_measurement(
     """
     effects = [fitted.effect for fitted in rivals]
     possible = _programmes(aligned, effects, model, limits)
-    planner = MeasurementPlanner(aligned, model, sigma_um, possible)
+    planner = MeasurementPlanner(aligned, model, sigma_um, possible, criteria=criteria)
     contenders = [planner.contender(fitted) for fitted in rivals]
     plan = planner.plan(list(permutations(contenders, 2)), rows, _words(effects))
-    if len(rivals) == 2 or plan.separation >= LEAST_SEPARATION:
+    if len(rivals) == 2 or plan.is_wide_enough:
         return plan
     pairs = list(combinations(contenders, 2))
     apart = [
         (first, second)
         for first, second in pairs
-        if planner.plan([(first, second), (second, first)], rows).separation >= LEAST_SEPARATION
+        if planner.plan([(first, second), (second, first)], rows).is_wide_enough
     ]
     alike = tuple((first.name, second.name) for first, second in pairs if (first, second) not in apart)
     if apart:
@@ -77,8 +80,9 @@ def next_measurement(
     found: FittedEffect,
     rival: Effect,
     sigma_um: FloatArray,
-    rows: int = NEXT_ROWS,
+    rows: int | None = None,
     constants: ConstantValues | None = None,
+    criteria: PlanningCriteria = PlanningCriteria(),
 ) -> NextMeasurement:
     """What tells an effect from its rival: rows within the limits of the recording, or words.
 
@@ -95,10 +99,12 @@ def next_measurement(
         possible = _programmes(aligned, effects, model)
     except CompdError as error:
         return _words_alone(effects, error)
-    planner = MeasurementPlanner(aligned, model, sigma_um, possible)
+    planner = MeasurementPlanner(aligned, model, sigma_um, possible, criteria=criteria)
     first = planner.contender(found)
     second = planner.imitation(first, rival, constants)
-    return _rows_or_words(planner.plan([(first, second), (second, first)], rows, _words(effects)), effects)
+    return _rows_or_words(
+        planner.plan([(first, second), (second, first)], rows or criteria.rows, _words(effects)), effects
+    )
 
 
 def measurement_of_constant(
@@ -107,7 +113,8 @@ def measurement_of_constant(
     causes: Sequence[Effect],
     constant_um: FloatArray,
     sigma_um: FloatArray,
-    rows: int = NEXT_ROWS,
+    rows: int | None = None,
+    criteria: PlanningCriteria = PlanningCriteria(),
 ) -> NextMeasurement:
     """What parts the possible causes of a constant: rows on which they are none or another one, or words.
 
@@ -119,14 +126,15 @@ def measurement_of_constant(
         possible = _programmes(aligned, causes, model)
     except CompdError as error:
         return _words_alone(causes, error)
-    planner = MeasurementPlanner(aligned, model, sigma_um, possible, with_nuisance=False)
+    planner = MeasurementPlanner(aligned, model, sigma_um, possible, with_nuisance=False, criteria=criteria)
+    count = rows or criteria.rows
     constant = planner.constant(constant_um)
     contenders = [constant, *(planner.imitation(constant, cause) for cause in causes)]
-    contests = [pair for pair in permutations(contenders, 2) if planner.plan([pair], rows).tells_apart]
+    contests = [pair for pair in permutations(contenders, 2) if planner.plan([pair], count).tells_apart]
     if not contests:
         why = "on all of them these remain one constant, but for less than the noise"
         return NextMeasurement(_ids(causes), None, _words(causes), why)
-    return _rows_or_words(planner.plan(contests, rows, _words(causes)), causes)
+    return _rows_or_words(planner.plan(contests, count, _words(causes)), causes)
 
 
 def measurement_to_test(
@@ -134,7 +142,8 @@ def measurement_to_test(
     model: Sequence[FittedEffect],
     effect: Effect,
     sigma_um: FloatArray,
-    rows: int = NEXT_ROWS,
+    rows: int | None = None,
+    criteria: PlanningCriteria = PlanningCriteria(),
 ) -> NextMeasurement:
     """What makes an effect testable that is not on this recording.
 
@@ -150,13 +159,16 @@ def measurement_to_test(
         possible = _programmes(aligned, [effect], model)
     except CompdError as error:
         return _words_alone([effect], error)
-    planner = MeasurementPlanner(aligned, model, sigma_um, possible)
+    planner = MeasurementPlanner(aligned, model, sigma_um, possible, criteria=criteria)
     sizes = [
-        EXPECTED_SIZE * max(map(abs, column.parameter.theta_range)) for column in effect.columns(aligned.rows.links)
+        criteria.expected_share * max(map(abs, column.parameter.theta_range))
+        for column in effect.columns(aligned.rows.links)
     ]
     plans = [
         planner.plan(
-            [(planner.contender(FittedEffect(effect, np.array(sizes), constants)), None)], rows, effect.separated_by
+            [(planner.contender(FittedEffect(effect, np.array(sizes), constants)), None)],
+            rows or criteria.rows,
+            effect.separated_by,
         )
         for constants in effect.constant_grid(aligned.rows)
     ]
@@ -245,9 +257,9 @@ def _rows_or_words(plan: MeasurementPlan, effects: Sequence[Effect]) -> NextMeas
     """The plan where it is worth measuring; else what is, and why, in words."""
     if plan.tells_apart:
         return NextMeasurement(_ids(effects), plan)
-    if plan.separation < LEAST_SEPARATION:
+    if not plan.is_wide_enough:
         why = f"the best {len(plan.rows)} rows make a difference of {as_factor(plan.separation)} times the noise"
-        why += f", and it takes {LEAST_SEPARATION:.2g}"
+        why += f", and it takes {plan.criteria.min_separation:.2g}"
     else:
         why = f"the best {len(plan.rows)} rows add little to a difference of {as_factor(plan.before)} times the noise"
     return NextMeasurement(_ids(effects), None, plan.separated_by, why)

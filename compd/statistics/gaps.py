@@ -6,20 +6,18 @@ import numpy as np
 
 from compd.arrays import FloatArray
 
-# Largest share of empty cells for filling gaps: beyond it too little of a residual's covariate would be measured.
-MOST_EMPTY = 0.1
 
-
-def filled(values: FloatArray, time_s: FloatArray) -> FloatArray:
-    """(N,) the values, with empty cells filled from the nearest row in time; unchanged if too many are empty.
+def filled(values: FloatArray, time_s: FloatArray, max_empty_share: float) -> FloatArray:
+    """(N,) the values, empty cells with the value of the nearest row in time; as they are where too many are empty.
 
     values : (N,) of a quantity, nan where the cell is empty.  time_s : (N,) rising.
+    max_empty_share : up to this share of empty cells gaps are filled.
 
     For what only describes a residual, so that one empty cell does not take a quantity out of the search. What an
     effect of the model computes is never made of filled values: a row without them is left out.
     """
     known = np.flatnonzero(np.isfinite(values))
-    if len(known) == len(values) or len(values) - len(known) > MOST_EMPTY * len(values):
+    if len(known) == len(values) or len(values) - len(known) > max_empty_share * len(values):
         return values
     after = np.minimum(np.searchsorted(time_s[known], time_s), len(known) - 1)
     before = np.maximum(after - 1, 0)

@@ -30,26 +30,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray, IntArray
-from compd.statistics.least_squares import solve_least_squares
-from compd.statistics.robust import robust_sigma
+from compd.comparison.criteria import PeriodCriteria
+from compd.comparison.statistics.least_squares import solve_least_squares
+from compd.comparison.statistics.robust import robust_sigma
 
 # Frequencies per 1 / span: the power between two of them is at least 0.95 of a peak's (sinc(1/8)^2).
 OVERSAMPLING = 4
 # A peak has side lobes (4.7 and 1.6 % of it, 1.4 and 2.5 / span away on even rows): so many times 1 / span about a
 # peak, lower ones are not peaks of their own.
 LOBES = 3
-# What is slow along the quantity is another cause's, and is taken away first: a parabola.
-SLOW_DEGREE = 2
 # A quantity that changes less does not change.
 LEAST_SPAN = 1e-300
-# Robust standard deviations from which a value counts no more than one there: it would be noise at every frequency.
-OUTLIER_SIGMAS = 4.0
 # Values of a finer grid about a peak, on which it is refined: the phase at the ends is then right within 3 degrees.
 REFINED = 33
-# A spectral window (rms over the series) from which on frequencies are images of one another: 0.81 of the square.
-IMAGE = 0.9
-# So many multiples of an image's frequency are images too, where values lie on an even grid.
-MULTIPLES = 5
 # A sine and a cosine of which so little is left beside each other and a constant (1 on even rows) explain nothing.
 LEAST_DETERMINANT = 1e-3
 
@@ -66,8 +59,8 @@ class PeriodLimits(NamedTuple):
 
     shortest: float
     longest: float
-    fewest_turns: float = 2.0
-    most_turns: float = 5000.0
+    fewest_turns: float = PeriodCriteria.min_turns
+    most_turns: float = PeriodCriteria.max_turns
 
 
 class PeriodSearch(NamedTuple):
@@ -83,7 +76,13 @@ class PeriodSearch(NamedTuple):
     independent: int
 
 
-def strongest_periods(quantity: FloatArray, series: FloatArray, limits: PeriodLimits, count: int = 5) -> PeriodSearch:
+def strongest_periods(
+    quantity: FloatArray,
+    series: FloatArray,
+    limits: PeriodLimits,
+    count: int = PeriodCriteria.peaks,
+    criteria: PeriodCriteria = PeriodCriteria(),
+) -> PeriodSearch:
     """The periods in `quantity` (N, S), or (N, 1) for all series, that explain most of `series` (N, S).
 
     One period for all series, an amplitude and a phase for each. Only peaks of the spectrum inside the limits count.
@@ -97,9 +96,9 @@ def strongest_periods(quantity: FloatArray, series: FloatArray, limits: PeriodLi
     size = int((last - first) / step) + 1
     if size < 3:
         return PeriodSearch((), (), 0)
-    y = _without_slow(quantity, series)
+    y = _without_slow(quantity, series, criteria)
     explained, window = _spectrum(quantity, y, first, step, size)
-    size = min(size, _frequencies_below_images(window, first, step, span))
+    size = min(size, _frequencies_below_images(window, first, step, span, criteria))
     frequencies = first + step * _peaks(explained[:size], int(LOBES / (span * step)), count)
     refined = sorted((_refined(quantity, y, peak, step) for peak in frequencies.tolist()), key=lambda peak: -peak[1])
     return PeriodSearch(
@@ -109,21 +108,21 @@ def strongest_periods(quantity: FloatArray, series: FloatArray, limits: PeriodLi
     )
 
 
-def _without_slow(quantity: FloatArray, series: FloatArray) -> FloatArray:
+def _without_slow(quantity: FloatArray, series: FloatArray, criteria: PeriodCriteria) -> FloatArray:
     """The series (N, S) without a parabola in their quantity, about their means; outliers held before and after."""
-    y = _outliers_held(series)
+    y = _outliers_held(series, criteria.outlier_sigmas)
     for k in range(y.shape[1]):
         q = quantity[:, min(k, quantity.shape[1] - 1)]
-        powers = np.vander((q - q.mean()) / max(float(np.ptp(q)), LEAST_SPAN), SLOW_DEGREE + 1)
+        powers = np.vander((q - q.mean()) / max(float(np.ptp(q)), LEAST_SPAN), criteria.slow_degree + 1)
         y[:, k] -= powers @ solve_least_squares(powers, y[:, k])
-    y = _outliers_held(y)
+    y = _outliers_held(y, criteria.outlier_sigmas)
     return np.asarray(y - y.mean(axis=0))
 
 
-def _outliers_held(series: FloatArray) -> FloatArray:
-    """The series (N, S) about their medians; a value beyond OUTLIER_SIGMAS counts as one there."""
+def _outliers_held(series: FloatArray, sigmas: float) -> FloatArray:
+    """The series (N, S) about their medians; a value beyond so many standard deviations counts as one there."""
     y = series - np.median(series, axis=0)
-    limit = OUTLIER_SIGMAS * robust_sigma(y)
+    limit = sigmas * robust_sigma(y)
     return np.asarray(np.clip(y, -limit, limit))
 
 
@@ -138,17 +137,19 @@ def _peaks(explained: FloatArray, apart: int, count: int) -> IntArray:
     return np.array(chosen, dtype=np.int64)
 
 
-def _frequencies_below_images(window: FloatArray, first: float, step: float, span: float) -> int:
+def _frequencies_below_images(
+    window: FloatArray, first: float, step: float, span: float, criteria: PeriodCriteria
+) -> int:
     """How many frequencies are below half of the first at which the spectral window shows images.
 
     Below 1 / span, where the window falls from 1, there is none. The images of an even grid come again at every
     multiple; those of a few sessions, far apart, fade.
     """
     frequency = first + step * np.arange(len(window))
-    for image in frequency[(window > IMAGE) & (frequency > 1.0 / span)].tolist():
-        multiples = np.arange(1, MULTIPLES + 1) * image
+    for image in frequency[(window > criteria.image_window) & (frequency > 1.0 / span)].tolist():
+        multiples = np.arange(1, criteria.image_multiples + 1) * image
         places = np.rint((multiples[multiples <= frequency[-1]] - first) / step).astype(np.int64)
-        if (window[places] > IMAGE).all():
+        if (window[places] > criteria.image_window).all():
             return max(int((image / 2 - first) / step) + 1, 0)
     return len(window)
 

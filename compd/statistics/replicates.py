@@ -7,10 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-
-# Rows of one visit of which pairs are made, evenly spread over it: 66 pairs. A point that was watched for an hour
-# would have millions.
-MOST_ROWS = 12
+from compd.comparison.criteria import ComparisonCriteria
 
 
 class ReplicatePairs(NamedTuple):
@@ -35,10 +32,13 @@ class ReplicatePairs(NamedTuple):
         return np.asarray((values[self.first] - values[self.second]) / np.sqrt(2.0))
 
 
-def replicate_pairs(use: BoolArray, visit: IntArray | None) -> ReplicatePairs | None:
+def replicate_pairs(
+    use: BoolArray, visit: IntArray | None, max_rows: int = ComparisonCriteria.max_rows_of_visit
+) -> ReplicatePairs | None:
     """The pairs among the rows `use` (N,); None where no visit has two such rows.
 
     visit : (N,) number of the visit, negative for none; None where it was not recorded.
+    max_rows : of a longer visit so many rows, evenly spread.
     """
     if visit is None:
         return None
@@ -47,7 +47,7 @@ def replicate_pairs(use: BoolArray, visit: IntArray | None) -> ReplicatePairs | 
     _, begin, size = np.unique(visit[rows], return_index=True, return_counts=True)
     first, second, weight = [], [], []
     for n in np.unique(size[size > 1]).tolist():
-        spread = np.linspace(0, n - 1, min(n, MOST_ROWS)).astype(np.int64)
+        spread = np.linspace(0, n - 1, min(n, max_rows)).astype(np.int64)
         of_visit = rows[begin[size == n][:, None] + spread]
         i, j = np.triu_indices(len(spread), 1)
         first.append(of_visit[:, i].ravel())

@@ -1,6 +1,6 @@
 """Robust statistics: standard deviations and a regression that a few per cent of outliers do not move.
 
-The regression is Huber's M-estimate by iteratively reweighted least squares: a row whose residual is up to `HUBER`
+The regression is Huber's M-estimate by iteratively reweighted least squares: a row whose residual is up to `huber`
 standard deviations counts in full, one beyond it counts less the farther it is. Example, a line through fifty points
 of which one is an outlier (G has one row of one coordinate for each)::
 
@@ -20,11 +20,9 @@ from collections.abc import Callable
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.statistics.least_squares import column_norms, solve_least_squares, solve_ridge
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.statistics.least_squares import column_norms, solve_least_squares, solve_ridge
 
-# Huber's constant, in standard deviations. 1.345 would be 95 % efficient on normal noise; at 2.5 nearly nothing of
-# the noise is held back, only what lies between noise and outliers.
-HUBER = 2.5
 # Rounds of reweighting: the weights settle in three to five.
 ROUNDS = 8
 # Residuals are um or standard deviations of the noise: a smaller standard deviation is rounding.
@@ -97,15 +95,19 @@ def _proposal_2(squares: FloatArray, weight: FloatArray) -> float:
 
 
 def huber_weights(
-    residual: FloatArray, exponent: float = 1.0, scale: Callable[[FloatArray], FloatArray] = robust_sigma
+    residual: FloatArray,
+    exponent: float = 1.0,
+    scale: Callable[[FloatArray], FloatArray] = robust_sigma,
+    huber: float = ComparisonCriteria.huber_sigmas,
 ) -> FloatArray:
     """(N,) weight of each row of a residual (N, m) by its worst coordinate.
 
-    With u_i = max_j |r_ij| / sigma_j, sigma by `scale`: w_i = min(1, HUBER / u_i)^exponent. Exponent 1 is Huber's
+    huber : Huber's constant, in standard deviations.
+    With u_i = max_j |r_ij| / sigma_j, sigma by `scale`: w_i = min(1, huber / u_i)^exponent. Exponent 1 is Huber's
     weight, where an outlier keeps a bounded pull; with 2 its pull falls as 1 / u.
     """
     size = (np.abs(residual) / np.maximum(scale(residual), LEAST_SIGMA)).max(axis=1)
-    return np.asarray(np.minimum(1.0, HUBER / np.maximum(size, HUBER)) ** exponent)
+    return np.asarray(np.minimum(1.0, huber / np.maximum(size, huber)) ** exponent)
 
 
 def robust_regression(
@@ -116,14 +118,15 @@ def robust_regression(
     exponent: float = 1.0,
     rounds: int = ROUNDS,
     scale: Callable[[FloatArray], FloatArray] = robust_sigma,
+    huber: float = ComparisonCriteria.huber_sigmas,
 ) -> FloatArray:
     """(P,) parameters theta of y = G theta, by iteratively reweighted least squares.
 
     G : (N, m, P) columns.  y : (N, m), all coordinates with the same standard deviation.
     ridge : None solves with a rank cut. A number holds every parameter near 0 by this share of its column's squared
     norm: for more columns than the rows may determine.
-    exponent, scale : of `huber_weights`.  rounds : of reweighting. `robust_sigma` stands 5 % of outliers and takes no
-    few rows for outliers on which an effect acts; `trimmed_scale` stands 23 %.
+    exponent, scale, huber : of `huber_weights`.  rounds : of reweighting. `robust_sigma` stands 5 % of outliers and
+    takes no few rows for outliers on which an effect acts; `trimmed_scale` stands 23 %.
     """
     N, m, P = G.shape
     A, flat = G.reshape(N * m, P), y.ravel()
@@ -138,5 +141,5 @@ def robust_regression(
         else:
             weighted = A * row_weights[:, None]
             theta = solve_ridge(weighted.T @ A, weighted.T @ flat, np.full(P, ridge))
-        weights = huber_weights((flat - A @ theta).reshape(N, m), exponent, scale)
+        weights = huber_weights((flat - A @ theta).reshape(N, m), exponent, scale, huber)
     return np.asarray(theta / norms)

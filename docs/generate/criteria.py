@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import Field, fields
+from dataclasses import Field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from compd.comparison.criteria import ComparisonCriteria
-from compd.diagnosis import Criteria
+from compd.comparison.criteria import ComparisonCriteria, thresholds
+from compd.diagnosis.criteria import Criteria
 from compd.fleet.criteria import FleetCriteria
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target, term
 
@@ -25,8 +25,11 @@ def counts() -> dict[str, Any]:
 
 
 INTRODUCTION = f"""\
-The result of `compd compare`, the verdict of `compd diagnose`, and what `compd fleet report` names rest on the
-thresholds of this page and on no others.
+The result of `compd compare`, the verdict of `compd diagnose`, and what `compd fleet report` names rest on the numbers
+of this page. What else stands as a number in the program is rounding, the end of an iteration, the definition of a
+published method, memory and time, or the form of sentences and plans; `compd.diagnosis.criteria` states the rule. How
+a recording is joined and read has its own limits, beyond which `compd join` and `compd recording check` ask or refuse.
+
 Each has its default, its unit, its meaning, and the reason for its value; a reason that begins with "A choice" says
 that there is no derivation. [How a verdict is reached](../explanation/how-a-verdict-is-reached.md) shows where each
 enters.
@@ -37,17 +40,35 @@ difference of losses is in squares of the noise floor. Where the unit is 1, the 
 What a number does shows when it is halved and doubled, alone, and simulated machines are diagnosed again
 (`{counts()["command"]}`, {counts()["counted"]}, {counts()["cases"]} machines). The counts are *right, near and
 dangerous*, as [How often it is right](../explanation/how-often-it-is-right.md) explains them; with all numbers as they
-are, {counts()["as it is"]}.
+are, {counts()["as it is"]}. A number that is "not counted" was not varied in this count.
+"""
 
-In Python, hand other thresholds to `compd.diagnose` as `criteria=`.
+EXAMPLE = """\
+In Python, `compd.diagnose` takes other numbers as `criteria=`. Those of the comparison travel with the recording:
+`compd.open_recording` takes them, and `compd.compare` where a recording is compared alone. `with_value` sets a number
+by its name on this page:
+
+```pycon
+>>> import compd
+>>> from compd.comparison.criteria import ComparisonCriteria, with_value
+>>> from compd.diagnosis.criteria import Criteria
+>>> files = compd.simulate_campaign("tripod-cmm", "monday.csv", seed=5, hidden=125)
+>>> monday = compd.open_recording("monday.csv", criteria=ComparisonCriteria(outlier_sigmas=6.0))
+>>> compd.diagnose(monday).verdict
+'identified'
+>>> stricter = with_value(Criteria(least_sigmas=1000.0), "search.max_members", 3)
+>>> compd.diagnose(monday, criteria=stricter).verdict
+'unexplained'
+```
 """
 
 
 def page() -> str:
-    """Markdown, from the fields of both classes and their metadata."""
+    """Markdown, from the fields of the classes and their metadata."""
     return join(
         "# Criteria",
         INTRODUCTION,
+        EXAMPLE,
         _part("Diagnosis", "diagnosis", Criteria),
         _part("Comparison", "comparison", ComparisonCriteria),
         _part("A fleet of machines", "fleet", FleetCriteria),
@@ -55,18 +76,19 @@ def page() -> str:
 
 
 def _part(title: str, name: str, kind: type[Any]) -> str:
-    criteria = [field for field in fields(kind) if isinstance(field.default, int | float)]
-    tried = any(criterion.name in counts()["thresholds"] for criterion in criteria)
+    tried = any(criterion in counts()["thresholds"] for criterion in thresholds(kind))
     header = ["criterion and its default", "meaning, and the reason for the default", *(["half", "twice"] * tried)]
-    return join(heading(2, title, target("criteria", name)), table(header, [_row(field, tried) for field in criteria]))
+    rows = [_row(criterion, field, tried) for criterion, field in thresholds(kind).items()]
+    return join(heading(2, title, target("criteria", name)), table(header, rows))
 
 
-def _row(criterion: Field[Any], tried: bool) -> list[str]:
+def _row(name: str, criterion: Field[Any], tried: bool) -> list[str]:
     unit = criterion.metadata["unit"]
-    default = f"{criterion.default:g}" + ("" if unit == "1" else f" {escape(unit)}")
+    values = criterion.default if isinstance(criterion.default, tuple) else (criterion.default,)
+    default = ", ".join(f"{value:g}" for value in values) + ("" if unit == "1" else f" {escape(unit)}")
     meaning, reason = (escape(sentence(criterion.metadata[key])) for key in ("meaning", "reason"))
-    cells = [f"{code(criterion.name)}<br>{default}", f"{meaning}<br>*Reason:* {reason}"]
+    cells = [f"{code(name)}<br>{default}", f"{meaning}<br>*Reason:* {reason}"]
     if not tried:
         return cells
-    changed = counts()["thresholds"].get(criterion.name, {})
+    changed = counts()["thresholds"].get(name, {})
     return [*cells, *(changed.get(change, "not counted") for change in ("half", "twice"))]

@@ -20,7 +20,9 @@ from compd.diagnosis import Candidate, Diagnosis, DiagnosisProblem, diagnose
 from compd.diagnosis.recording_diagnosis import explain_residual
 from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search.explanation import Explanation
-from compd.diagnosis.search.gross_rows import EXPONENT, RIDGE, ROUNDS
+from compd.diagnosis.search.gross_rows import ROUNDS
+from compd.diagnosis.search.problem import DiagnosisProblem
+from compd.diagnosis.verdict import Diagnosis
 from compd.model.library import load_library
 from compd.statistics import robust_regression, trimmed_scale
 
@@ -78,11 +80,16 @@ def make_example() -> Example:
 
 def _robust_fit(problem: DiagnosisProblem, candidate: Candidate) -> FloatArray:
     """(m + 1,) the fit of a constant and one candidate beside which `weigh_rows` weighs the rows."""
-    known, m = problem.known, problem.residual.shape[1]
+    known, m, gross = problem.known, problem.residual.shape[1], problem.criteria.gross
     constant = np.broadcast_to(np.eye(m), (*problem.residual.shape, m))
     columns = np.concatenate([constant, candidate.columns_um / problem.sigma_um[:, None]], axis=2)[known]
     return robust_regression(
-        columns, problem.residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS, scale=trimmed_scale
+        columns,
+        problem.residual[known],
+        ridge=gross.ridge,
+        exponent=gross.exponent,
+        rounds=ROUNDS,
+        scale=trimmed_scale,
     )
 
 

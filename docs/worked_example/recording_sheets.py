@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 
-from compd.comparison.criteria import ComparisonCriteria
-from compd.diagnosis import Criteria
+from compd.comparison.criteria import ComparisonCriteria, thresholds
+from compd.diagnosis.criteria import Criteria
 from docs.worked_example.sheets import AXES, Sheets
 from docs.worked_example.spreadsheet import Address
 
@@ -39,10 +37,12 @@ def write_criteria(sheets: Sheets) -> None:
     sheets.book.put("Criteria", 1, 1, ["criterion", "value", "unit", "meaning", "reason"], bold=True)
     row = 2
     for kind in (Criteria, ComparisonCriteria):
-        for field in fields(kind):
+        for name, field in thresholds(kind).items():
+            if isinstance(field.default, tuple):
+                continue  # a grid of values is in no formula of the sheets
             texts = [field.metadata[key] for key in ("unit", "meaning", "reason")]
-            sheets.book.put("Criteria", row, 1, [field.name, float(field.default), *texts])
-            sheets.criteria[field.name] = Address("Criteria", row, 2)
+            sheets.book.put("Criteria", row, 1, [name, float(field.default), *texts])
+            sheets.criteria[name] = Address("Criteria", row, 2)
             row += 1
 
 

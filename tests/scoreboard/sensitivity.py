@@ -1,6 +1,6 @@
 """`python -m tests.scoreboard.sensitivity`: what each number of the diagnosis does to its results.
 
-Every threshold of `Criteria` is halved and doubled, one at a time, and the prepared cases are diagnosed with it. The
+Every number of `Criteria` is halved and doubled, one at a time, and the prepared cases are diagnosed with it. The
 table says for each how many are right, near and dangerous then; a number without an effect on these cases can be any.
 With --figures docs/sensitivity.json the reference of the criteria shows them.
 """
@@ -11,12 +11,14 @@ import argparse
 import json
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import Field, fields, replace
+from dataclasses import Field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compd.diagnosis import Criteria
+from compd.comparison.criteria import thresholds as thresholds_of
+from compd.comparison.criteria import with_value
+from compd.diagnosis.criteria import Criteria
 from tests.scoreboard.parallel import append_results, read_results
 from tests.scoreboard.scoring import Result, score
 from tests.scoreboard.trial import prepared, read_answer, run
@@ -70,8 +72,8 @@ def main() -> None:
 
 
 def thresholds() -> dict[str, Field[Any]]:
-    """Every number of `Criteria` by its name."""
-    return {field.name: field for field in fields(Criteria)}
+    """Every number of `Criteria` by its name; what holds several values has no half."""
+    return {name: field for name, field in thresholds_of(Criteria).items() if not isinstance(field.default, tuple)}
 
 
 def variants() -> list[Variant]:
@@ -80,11 +82,12 @@ def variants() -> list[Variant]:
 
 
 def changed(variant: Variant) -> Criteria:
-    """The criteria with this variant."""
+    """The criteria with this variant; a count stays whole."""
     if not variant.name:
         return Criteria()
-    value: float = getattr(Criteria(), variant.name)
-    return replace(Criteria(), **{variant.name: value * FACTORS[variant.change]})
+    value = thresholds()[variant.name].default
+    varied = value * FACTORS[variant.change]
+    return with_value(Criteria(), variant.name, round(varied) if isinstance(value, int) else varied)
 
 
 def run_variant(trial: Trial) -> dict[str, Any]:

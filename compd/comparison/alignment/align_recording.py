@@ -14,7 +14,7 @@ from compd.comparison.alignment.measured_attitude import LABELS as ATTITUDE_LABE
 from compd.comparison.alignment.measured_attitude import attitude_mm, measured_attitude, target_turn
 from compd.comparison.alignment.registration import Registration, register
 from compd.comparison.alignment.velocity import velocities
-from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.criteria import ComparisonCriteria, SpeedCriteria
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.machine_builder import build_model
@@ -35,10 +35,14 @@ def align_recording(
     """
     model = None if configuration is None else build_model(configuration.geometry, configuration.wiring)
     geometry_hash = "" if configuration is None else configuration.geometry_hash
-    return align_observations(recording, model, recorded_observations(recording, model), geometry_hash, criteria)
+    return align_observations(
+        recording, model, recorded_observations(recording, model, criteria), geometry_hash, criteria
+    )
 
 
-def recorded_observations(recording: Recording, model: MachineModel | None) -> Observations:
+def recorded_observations(
+    recording: Recording, model: MachineModel | None, criteria: ComparisonCriteria = ComparisonCriteria()
+) -> Observations:
     """Every row of the recording, as effects take it.  model : None for an external one.
 
     Raises RecordingError as `align_recording` does.
@@ -47,7 +51,9 @@ def recorded_observations(recording: Recording, model: MachineModel | None) -> O
         where = str(recording.path)
         raise RecordingError(Problem(where=where, what="names no reference", next_step="add one with `compd join`"))
     starts = session_starts(recording)
-    return external_observations(recording, starts) if model is None else _observations(recording, model, starts)
+    if model is None:
+        return external_observations(recording, starts, criteria.speeds)
+    return _observations(recording, model, starts, criteria.speeds)
 
 
 def align_observations(
@@ -67,7 +73,15 @@ def align_observations(
         labels = tuple(f"link {i}" for i in recording.reference_links)
         links = tuple(i - 1 for i in recording.reference_links)
         return AlignedRecording(
-            recording, model, observations, labels, links, recording.reference_link_mm, None, geometry_hash
+            recording,
+            model,
+            observations,
+            labels,
+            links,
+            recording.reference_link_mm,
+            None,
+            geometry_hash,
+            criteria=criteria,
         )
     if (end := recording.fixed_end) is not None:
         return _at_fixed_ends(
@@ -81,6 +95,7 @@ def align_observations(
                 None,
                 geometry_hash,
                 part_of=part_of,
+                criteria=criteria,
             ),
             end,
         )
@@ -103,7 +118,16 @@ def align_observations(
         measured_mm = np.concatenate([measured_mm, attitude_mm(attitude, nominal)], axis=1)
         labels = (*labels, *ATTITUDE_LABELS)
     return AlignedRecording(
-        recording, model, observations, labels, axes, measured_mm, registration, geometry_hash, part_of=part_of
+        recording,
+        model,
+        observations,
+        labels,
+        axes,
+        measured_mm,
+        registration,
+        geometry_hash,
+        part_of=part_of,
+        criteria=criteria,
     )
 
 
@@ -122,7 +146,9 @@ def _at_fixed_ends(aligned: AlignedRecording, end: IntArray) -> AlignedRecording
     elif distance_mm is None:
         ends = place_pins(tip_mm, end, recording.end_name, where)
     else:
-        ends = place_balls(tip_mm, distance_mm, end, recording.reference.absolute, recording.end_name, where)
+        ends = place_balls(
+            tip_mm, distance_mm, end, recording.reference.absolute, recording.end_name, where, aligned.criteria
+        )
     if distance_mm is None:
         return replace(aligned, ends=ends, measured_mm=ends.place_of_row_mm)
     measured_mm = np.where(ends.of_row >= 0, distance_mm + ends.added_mm[ends.of_row], np.nan)[:, None]
@@ -151,7 +177,9 @@ def _registered(
     return registration, measured_mm
 
 
-def _observations(recording: Recording, model: MachineModel, starts: BoolArray) -> Observations:
+def _observations(
+    recording: Recording, model: MachineModel, starts: BoolArray, criteria: SpeedCriteria
+) -> Observations:
     """Every row of the recording, as effects take it; comparators that were not recorded count as unmoved.
 
     starts : (N,) rows without a history.
@@ -173,7 +201,7 @@ def _observations(recording: Recording, model: MachineModel, starts: BoolArray) 
     frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
     approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
     at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
-    velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm)
+    velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm, criteria)
     movement = Movement(approach, *np.split(velocity, [scale_mm.shape[1]], axis=1))
     return observe(
         model,

@@ -27,6 +27,7 @@ from compd.comparison.alignment.registration import (
     points_spread_mm,
     registration_columns,
 )
+from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.display_unit import in_place_unit
 from compd.errors import CompdError
 from compd.model import (
@@ -82,6 +83,8 @@ class AlignedRecording:
     part_of : AlignedRecording or None
         Of a block of a long recording the sample of it that places the instrument's frame, or fixed balls and pins;
         None for a whole recording.
+    criteria : ComparisonCriteria
+        The numbers by which it was aligned, and by which it is compared and fitted.
     """
 
     recording: Recording
@@ -94,6 +97,7 @@ class AlignedRecording:
     geometry_hash: str = ""
     ends: FixedEnds | None = None
     part_of: AlignedRecording | None = None
+    criteria: ComparisonCriteria = ComparisonCriteria()
     _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
 
     @property
@@ -237,7 +241,8 @@ class AlignedRecording:
 
         For what describes a residual; what the effects of a model compute is never made of filled values.
         """
-        quantities = {name: filled(values, self.rows.time_s) for name, values in self.rows.quantities.items()}
+        most, time_s = self.criteria.max_filled_share, self.rows.time_s
+        quantities = {name: filled(values, time_s, most) for name, values in self.rows.quantities.items()}
         if all(values is self.rows.quantities[name] for name, values in quantities.items()):
             return self
         return replace(self, rows=replace(self.rows, quantities=quantities))

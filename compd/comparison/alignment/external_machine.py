@@ -15,6 +15,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.columns import is_sensitivity
 from compd.comparison.alignment.velocity import velocities
+from compd.comparison.criteria import SpeedCriteria
 from compd.errors import Problem, RecordingError
 from compd.model import Deltas, observe_external
 from compd.model.effects import Observations
@@ -54,7 +55,9 @@ def external_change(added: Deltas, coordinates: Sequence[int], of_links: bool) -
     return change
 
 
-def external_observations(recording: Recording, starts: BoolArray) -> Observations:
+def external_observations(
+    recording: Recording, starts: BoolArray, criteria: SpeedCriteria = SpeedCriteria()
+) -> Observations:
     """Every row of the recording, as effects take it.
 
     Of links whose length was measured, columns `scale_<i>_mm`, `approach_<i>` and `velocity_<i>_mm_per_s` are the
@@ -70,7 +73,7 @@ def external_observations(recording: Recording, starts: BoolArray) -> Observatio
     )
     if links and recording.has_time and np.isnan(velocity).all():
         at_point = np.zeros(recording.rows, dtype=bool) if recording.point is None else recording.point >= 0
-        velocity = velocities(recording.time_s, starts, at_point, scale_mm, np.zeros((recording.rows, 0)))
+        velocity = velocities(recording.time_s, starts, at_point, scale_mm, np.zeros((recording.rows, 0)), criteria)
         velocity = np.where(np.isfinite(scale_mm), velocity, np.nan)
     readings = {"scale": scale_mm, "direction": direction, "motion": velocity}
     measured = [link - 1 for link in recording.reference_links]

@@ -19,6 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.statistics.least_squares import solve_least_squares
+from compd.comparison.statistics.robust import robust_regression
 from compd.errors import Problem, RecordingError
 from compd.statistics import robust_regression, solve_least_squares
 
@@ -109,7 +112,13 @@ class FixedEnds:
 
 
 def place_balls(
-    tip_mm: FloatArray, distance_mm: FloatArray, end: IntArray, absolute: bool, name: Callable[[int], str], where: str
+    tip_mm: FloatArray,
+    distance_mm: FloatArray,
+    end: IntArray,
+    absolute: bool,
+    name: Callable[[int], str],
+    where: str,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
 ) -> FixedEnds:
     """The fixed balls from which distances (N,) to the predicted tip (N, 3) were measured.
 
@@ -130,7 +139,7 @@ def place_balls(
     places, added = [], []
     for number in numbers:
         rows = known & (end == number)
-        place_mm, added_mm = _ball(tip_mm[rows], distance_mm[rows], absolute)
+        place_mm, added_mm = _ball(tip_mm[rows], distance_mm[rows], absolute, criteria.huber_sigmas)
         if problem := _beside_plane(tip_mm[rows], place_mm, name(int(number)), where):
             problems.append(problem)
         places.append(place_mm)
@@ -193,7 +202,7 @@ def _beside_plane(tip_mm: FloatArray, place_mm: FloatArray, name: str, where: st
     )
 
 
-def _ball(tip_mm: FloatArray, distance_mm: FloatArray, absolute: bool) -> tuple[FloatArray, float]:
+def _ball(tip_mm: FloatArray, distance_mm: FloatArray, absolute: bool, huber: float) -> tuple[FloatArray, float]:
     """Place (3,) and constant of one ball, from the algebraic sphere on by Gauss-Newton with Huber's weights.
 
     Algebraic: |p|^2 - d^2 = 2 c.p + 2 b d + (b^2 - |c|^2), linear in c, b and the bracket.
@@ -212,7 +221,7 @@ def _ball(tip_mm: FloatArray, distance_mm: FloatArray, absolute: bool) -> tuple[
         length_mm = np.linalg.norm(away_mm, axis=1)
         along = -away_mm / length_mm[:, None]
         G = along if absolute else np.concatenate([along, -np.ones((len(p), 1))], axis=1)
-        step = robust_regression(G[:, None], (distance_mm + b - length_mm)[:, None])
+        step = robust_regression(G[:, None], (distance_mm + b - length_mm)[:, None], huber=huber)
         c = c + step[:3]
         b += 0.0 if absolute else float(step[3])
         if np.abs(step).max() < CONVERGED_MM:

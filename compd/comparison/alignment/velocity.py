@@ -9,19 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-
-# Rows farther apart tell nothing of each other's speed: between two dwells lies a whole move.
-NEAR_S = 3.0
-# Rows so close follow any motion of a machine: it takes a few tenths of a second to reach its speed.
-CLOSE_S = 0.25
-# Slower is standing still: a gauge of 50 ms latency would be 0.25 um late.
-STILL_MM_PER_S = 0.005
-# Speeds before and after a row that differ by less than this share are one steady speed.
-STEADY_SHARE = 0.1
+from compd.comparison.criteria import SpeedCriteria
 
 
 def velocities(
-    time_s: FloatArray, starts: BoolArray, at_point: BoolArray, scale_mm: FloatArray, joint_mm: FloatArray
+    time_s: FloatArray,
+    starts: BoolArray,
+    at_point: BoolArray,
+    scale_mm: FloatArray,
+    joint_mm: FloatArray,
+    criteria: SpeedCriteria = SpeedCriteria(),
 ) -> FloatArray:
     """(N, n + k) speed in mm/s of the n scales and k joint comparators in each row; nan where it is not known.
 
@@ -40,7 +37,7 @@ def velocities(
     gap_s[1:-1] = np.where(starts[1:], np.inf, np.diff(time_s))
     change_mm = np.zeros((count + 1, values.shape[1]))
     change_mm[1:-1] = np.diff(values, axis=0)
-    near = (gap_s <= NEAR_S) & (gap_s > 0)
+    near = (gap_s <= criteria.near_s) & (gap_s > 0)
     speed = np.divide(change_mm, gap_s[:, None], out=np.full_like(change_mm, np.nan), where=near[:, None])
     before, after = speed[:-1], speed[1:]
     gap_before_s, gap_after_s = gap_s[:-1, None], gap_s[1:, None]
@@ -50,14 +47,14 @@ def velocities(
         return np.asarray(np.abs(speeds[:, :links]).max(axis=1, keepdims=True))
 
     both = (near[:-1] & near[1:])[:, None]
-    steady = largest(after - before) <= STEADY_SHARE * np.maximum(largest(before), largest(after))
-    close = np.maximum(gap_before_s, gap_after_s) <= CLOSE_S
+    steady = largest(after - before) <= criteria.steady_share * np.maximum(largest(before), largest(after))
+    close = np.maximum(gap_before_s, gap_after_s) <= criteria.close_s
     with np.errstate(invalid="ignore"):
         central = (gap_after_s * before + gap_before_s * after) / (gap_before_s + gap_after_s)
     result = np.full_like(values, np.nan)
     result = np.where(both & (2 * gap_before_s < gap_after_s), before, result)
     result = np.where(both & (2 * gap_after_s < gap_before_s), after, result)
     result = np.where(both & (steady | close), central, result)
-    still = (largest(before) <= STILL_MM_PER_S) | (largest(after) <= STILL_MM_PER_S)
+    still = (largest(before) <= criteria.still_mm_per_s) | (largest(after) <= criteria.still_mm_per_s)
     alone = ~(near[:-1] | near[1:])
     return np.where(still | (alone & at_point)[:, None], 0.0, result)

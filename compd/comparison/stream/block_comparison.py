@@ -10,8 +10,6 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import NO_QUANTITY
 from compd.comparison.contributions import deltas_without
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.recording_comparison import compare
 from compd.comparison.stream.block_queue import HandOver, computed_blocks
 from compd.comparison.stream.carried_effects import NOTHING_CARRIED, CarriedState, advance_effects
 from compd.comparison.stream.fixed_terms import NOTHING, BlockNuisance, FixedTerms, fixed_terms
@@ -30,7 +28,6 @@ def compare_blocks(
     sample: Sample,
     fitted: Sequence[FittedEffect] = (),
     covariance: FloatArray | None = None,
-    criteria: ComparisonCriteria = ComparisonCriteria(),
     progress: Callable[[int], None] = lambda rows: None,
 ) -> StreamedComparison:
     """Compare a recording of any length with the model and its effects, as `compare` does one in memory.
@@ -39,7 +36,7 @@ def compare_blocks(
     `compare`.
     Raises CompdError and RecordingError as `compare` does.
     """
-    comparison = compare(sample.aligned, fitted, covariance, criteria)
+    comparison = compare(sample.aligned, fitted, covariance)
     fixed = fixed_terms(comparison, sample.starts_s)
     coordinates = len(sample.aligned.labels)
     totals = ResidualTotals(coordinates, TimeEnvelope(sample.begin_s, sample.end_s, coordinates))

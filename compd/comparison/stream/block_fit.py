@@ -15,8 +15,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.effect_fit import CONVERGED, LEAST_RMS_UM, STEPS, FitResult
+from compd.comparison.fit import CONVERGED, LEAST_RMS_UM, STEPS, FitResult
 from compd.comparison.initial_states import initial_states
 from compd.comparison.nuisance import nuisance_columns
 from compd.comparison.outliers import OutlierLimits, outlier_limits
@@ -45,7 +44,6 @@ def fit_blocks(
     sample: Sample,
     start: FitResult,
     weight_sigma_um: FloatArray,
-    criteria: ComparisonCriteria = ComparisonCriteria(),
     progress: Callable[[int], None] = lambda rows: None,
 ) -> FitResult:
     """Fit the effects of a fit on the sample to all rows; nonlinear constants stay as they are.
@@ -57,7 +55,7 @@ def fit_blocks(
     sample.
     Raises RecordingError with the problems of the recording.
     """
-    system = _system(sample, start, weight_sigma_um, criteria)
+    system = _system(sample, start, weight_sigma_um)
     theta = np.concatenate([np.zeros(0), *(effect.theta for effect in start.fitted)])
     nuisance = system.start_nuisance
     for _ in range(STEPS):
@@ -96,11 +94,11 @@ class _System:
     start_nuisance: FloatArray
 
 
-def _system(sample: Sample, start: FitResult, sigma_um: FloatArray, criteria: ComparisonCriteria) -> _System:
+def _system(sample: Sample, start: FitResult, sigma_um: FloatArray) -> _System:
     aligned = sample.aligned
     whitened = start.residual_um / sigma_um
     known: BoolArray = np.asarray(np.isfinite(whitened).all(axis=1))
-    limits = outlier_limits(whitened, known, aligned.recording.visit, criteria)
+    limits = outlier_limits(whitened, known, aligned.recording.visit, aligned.criteria)
     columns_um = nuisance_columns(aligned, start.fitted)
     _, total = effect_deltas(start.fitted, aligned.rows)
     taken_um = (aligned.measured_mm - aligned.predicted_mm(total)) * UM_PER_MM - start.residual_um
@@ -192,7 +190,7 @@ def _block_normals(
     usable = aligned.usable.mask & np.isfinite(G_um).all(axis=(1, 2)) & np.isfinite(residual_um).all(axis=1)
     whitened = residual_um / system.sigma_um
     used = usable & ~system.limits.outliers(whitened, usable, aligned.recording.visit)
-    weight = huber_weights(whitened[used], scale=lambda _: system.scale)
+    weight = huber_weights(whitened[used], scale=lambda _: system.scale, huber=aligned.criteria.huber_sigmas)
     normals = ClusterNormals()
     normals.add_rows(G_um[used] / system.sigma_um[:, None], whitened[used], weight, cluster[used])
     return normals, used

@@ -11,7 +11,6 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import IntArray
-from compd.comparison.neighbour_block import BLOCKS
 from compd.comparison.stream.sample import Sample
 from compd.recording import BLOCKS as FOLDS
 from compd.recording import Recording
@@ -21,7 +20,7 @@ class RowClusters:
     """Numbers the clusters of parts of a recording, given in their order."""
 
     def __init__(self, sample: Sample) -> None:
-        rows = sample.rows
+        rows, blocks = sample.rows, sample.aligned.criteria.blocks
         if sample.aligned.recording.session is not None:
             self._lengths = dict(sorted(sample.rows_of_session.items()))
         else:
@@ -29,8 +28,8 @@ class RowClusters:
             ends = [-(-k * rows // FOLDS) for k in range(FOLDS + 1)]
             self._lengths = {k: end - begin for k, (begin, end) in enumerate(pairwise(ends)) if end > begin}
         self._place = {number: k for k, number in enumerate(self._lengths)}
-        self._of_sessions = len(self._lengths) >= BLOCKS
-        self._per_session = 1 if self._of_sessions else -(-BLOCKS // len(self._lengths))
+        self._of_sessions = len(self._lengths) >= blocks
+        self._per_session = 1 if self._of_sessions else -(-blocks // len(self._lengths))
         self._rows_before: Counter[int] = Counter()
         self._rows = rows
         self._row = 0

@@ -95,6 +95,6 @@ def open_stream(path: Path, machine: Machine | None = None) -> RecordingStream:
 
 def align_block(block: Block, sample: AlignedRecording) -> AlignedRecording:
     """The block's own rows on the machine of the sample, and in its frame."""
-    rows = recorded_observations(block.recording, sample.model).select(block.own)
+    rows = recorded_observations(block.recording, sample.model, sample.criteria).select(block.own)
     recording = block.recording.select(block.own)
-    return align_observations(recording, sample.model, rows, sample.geometry_hash, part_of=sample)
+    return align_observations(recording, sample.model, rows, sample.geometry_hash, sample.criteria, part_of=sample)

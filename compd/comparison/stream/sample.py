@@ -21,9 +21,6 @@ from compd.model.effects import Observations
 from compd.recording import Recording
 from compd.statistics import MOST_ROWS as MOST_ROWS_OF_VISIT
 
-# They know a standard deviation within 0.5 %, and the limit of outliers alike; a comparison of them takes 0.2 GB.
-SAMPLE_ROWS = 20_000
-
 
 @dataclass(frozen=True)
 class Sample:
@@ -46,15 +43,17 @@ class Sample:
 
 def draw_sample(
     stream: RecordingStream,
-    most_rows: int = SAMPLE_ROWS,
+    most_rows: int | None = None,
     criteria: ComparisonCriteria = ComparisonCriteria(),
     progress: Callable[[int], None] = lambda rows: None,
 ) -> Sample:
     """Draw the sample: of every so many rows one, and of its visit as many rows as noise is estimated from.
 
+    most_rows : how many rows it has, about; None for `sample_rows` of the criteria.
     progress : called with the number of rows that are done, after each block.
     Raises RecordingError with the problems of the recording.
     """
+    most_rows = criteria.sample_rows if most_rows is None else most_rows
     model = None
     if stream.configuration is not None:
         model = build_model(stream.configuration.geometry, stream.configuration.wiring)
@@ -68,14 +67,14 @@ def draw_sample(
     for block in stream.blocks():
         part = block.recording.select(block.own)
         if drawn is None:
-            drawn = _drawn_rows(stream.rows, most_rows, _drawn_with_one(part))
+            drawn = _drawn_rows(stream.rows, most_rows, _drawn_with_one(part, criteria.max_rows_of_visit))
             begin_s = float(part.time_s[0])
         here = drawn[(drawn >= count) & (drawn < count + part.rows)] - count
         if stream.rows > most_rows:
-            here = _with_visits(here, part)
+            here = _with_visits(here, part, criteria.max_rows_of_visit)
         if len(here):
             recordings.append(part.select(here))
-            observations.append(_observe(block, here, model))
+            observations.append(_observe(block, here, model, criteria))
         left_out.update(part.left_out)
         sessions.update(_rows_of_session(part))
         started = session_starts(block.recording)[block.own]
@@ -93,13 +92,13 @@ def draw_sample(
     return Sample(aligned, count, dict(sessions), dict(left_out), np.array(starts_s), begin_s, end_s)
 
 
-def _drawn_with_one(part: Recording) -> float:
+def _drawn_with_one(part: Recording, max_rows_of_visit: int) -> float:
     """How many rows come with one that is drawn, by the visits of the first block."""
     if part.visit is None:
         return 1.0
     _, counts = np.unique(part.visit[part.visit >= 0], return_counts=True)
     # long visits are drawn more often
-    return float((counts * counts.clip(max=MOST_ROWS_OF_VISIT)).sum() / counts.sum()) if len(counts) else 1.0
+    return float((counts * counts.clip(max=max_rows_of_visit)).sum() / counts.sum()) if len(counts) else 1.0
 
 
 def _drawn_rows(count: int, most_rows: int, drawn_with_one: float) -> IntArray:
@@ -111,7 +110,7 @@ def _drawn_rows(count: int, most_rows: int, drawn_with_one: float) -> IntArray:
     return np.asarray((np.arange(stretches) + within) * count / stretches, dtype=np.int64)
 
 
-def _with_visits(rows: IntArray, part: Recording) -> IntArray:
+def _with_visits(rows: IntArray, part: Recording, max_rows_of_visit: int) -> IntArray:
     """The rows, and with each those of its visit in this part, of many some that are spread evenly."""
     if part.visit is None:
         return rows
@@ -119,16 +118,16 @@ def _with_visits(rows: IntArray, part: Recording) -> IntArray:
     for visit in np.unique(part.visit[rows]):
         if visit >= 0:
             of_visit = np.flatnonzero(part.visit == visit)
-            spread = np.linspace(0, len(of_visit) - 1, min(len(of_visit), MOST_ROWS_OF_VISIT)).astype(np.int64)
+            spread = np.linspace(0, len(of_visit) - 1, min(len(of_visit), max_rows_of_visit)).astype(np.int64)
             chosen.append(of_visit[spread])
     return np.unique(np.concatenate(chosen))
 
 
-def _observe(block: Block, rows: IntArray, model: MachineModel | None) -> Observations:
+def _observe(block: Block, rows: IntArray, model: MachineModel | None, criteria: ComparisonCriteria) -> Observations:
     """The block's own rows of this index, observed between their neighbours."""
     own = rows + block.own.start
     around = np.unique(np.concatenate([own - 1, own, own + 1]).clip(0, block.recording.rows - 1))
-    observed = recorded_observations(block.recording.select(around), model)
+    observed = recorded_observations(block.recording.select(around), model, criteria)
     return observed.select(np.searchsorted(around, own))
 
 

@@ -9,21 +9,14 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison import AlignedRecording, longest_period, promising_constants
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.period_search import longest_period, promising_constants
+from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.model.effects import ConstantValues, Effect, unmet_needs
 from compd.units import UM_PER_MM
 
 Kind: TypeAlias = Literal["effect", "proxy", "constant", "description", "change"]
-
-# Share of the rows in which an effect's quantities may be empty: only rows in which every candidate is known are used,
-# so that an effect that is known in fewer would cost all others those rows.
-MOST_EMPTY = 0.1
-# um; an effect that moves no row by more at the end of its plausible range does nothing: below every reference.
-LEAST_MOTION_UM = 1e-3
-# For how many parameters the search for a constant counts: the best of ten values fits noise about as two parameters do
-# (log 10 = 2.3), the better of two about as one (log 2 = 0.7).
-SEARCHED_CONSTANT, CHOICE = 2, 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +67,12 @@ class CandidatePool:
     proxies: tuple[Candidate, ...] = ()
 
 
-def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str]) -> CandidatePool:
+def library_pool(
+    aligned: AlignedRecording,
+    effects: Sequence[Effect],
+    present: Collection[str],
+    criteria: CandidateCriteria = CandidateCriteria(),
+) -> CandidatePool:
     """Every effect at every choice of its nonlinear constants, except those whose ids are `present` in the model."""
     candidates: list[Candidate] = []
     untestable: dict[str, str] = {}
@@ -87,12 +85,12 @@ def library_pool(aligned: AlignedRecording, effects: Sequence[Effect], present: 
             untestable[effect.id] = reason
             continue
         grid = effect.constant_grid(aligned.rows)
-        searched, seen = searched_parameters(effect, grid), _seen_to_repeat(effect, grid, aligned)
+        searched, seen = searched_parameters(effect, grid, criteria), _seen_to_repeat(effect, grid, aligned)
         if not seen:
             untestable[effect.id] = "the rows cover less than one period of it: measure over a longer way"
             continue
         variants = [variant(effect, constants, aligned, searched) for constants in seen]
-        reason = _reason_for_no_motion(variants, usable)
+        reason = _reason_for_no_motion(variants, usable, criteria)
         if reason:
             untestable[effect.id] = reason
         else:
@@ -128,10 +126,10 @@ def _seen_to_repeat(
     return grid
 
 
-def searched_parameters(effect: Effect, grid: Sequence[ConstantValues]) -> int:
+def searched_parameters(effect: Effect, grid: Sequence[ConstantValues], criteria: CandidateCriteria) -> int:
     """For how many parameters the search of an effect's constants over a grid counts."""
     return sum(
-        CHOICE if constant.choice else SEARCHED_CONSTANT
+        criteria.searched_choice if constant.choice else criteria.searched_constant
         for constant in effect.constants
         if len({constants[constant.name] for constants in grid}) > 1
     )
@@ -156,12 +154,12 @@ def _missing_inputs(effect: Effect, aligned: AlignedRecording) -> str:
     )
 
 
-def _reason_for_no_motion(variants: Sequence[Candidate], usable: BoolArray) -> str:
+def _reason_for_no_motion(variants: Sequence[Candidate], usable: BoolArray, criteria: CandidateCriteria) -> str:
     """Why none of an effect's variants moves the prediction on the usable rows; "" where one does."""
     columns_um = np.concatenate([variant.columns_um[usable] * variant.largest for variant in variants], axis=2)
     empty = float(np.mean(~np.isfinite(columns_um).all(axis=(1, 2))))
-    if empty > MOST_EMPTY:
+    if empty > criteria.max_empty_share:
         return f"what it needs is empty in {100 * empty:.0f} % of the rows"
-    if np.nanmax(np.abs(columns_um), initial=0.0) < LEAST_MOTION_UM:
+    if np.nanmax(np.abs(columns_um), initial=0.0) < criteria.min_motion_um:
         return "what drives it stayed at its reference value: vary it"
     return ""

@@ -8,14 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison import AlignedRecording
-from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate
-
-# Moments that are tried beside the sessions' starts, evenly over the rows; and of the starts so many at most, evenly
-# chosen: what changed between two of them is found when the moment is refined.
-MOMENTS, MOST_STARTS = 8, 24
-# Moments between neighbours that are tried where a change was found: to about a hundredth of the recording.
-BETWEEN = 9
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.diagnosis.candidate_criteria import CandidateCriteria
+from compd.diagnosis.candidates.candidates import Candidate
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -26,24 +21,29 @@ class ChangeCandidate(Candidate):
     whole: Candidate
 
 
-def moments_s(aligned: AlignedRecording) -> list[float]:
+def moments_s(aligned: AlignedRecording, criteria: CandidateCriteria = CandidateCriteria()) -> list[float]:
     """Moments at which something may have changed, s: where sessions but the first start, and quantiles of the rows."""
     time_s = aligned.rows.time_s
     starts = time_s[aligned.rows.session_start][1:]
-    starts = starts[:: max(1, -(-len(starts) // MOST_STARTS))]
-    quantiles = np.quantile(time_s, np.linspace(0, 1, MOMENTS + 2)[1:-1])
+    starts = starts[:: max(1, -(-len(starts) // criteria.max_session_starts))]
+    quantiles = np.quantile(time_s, np.linspace(0, 1, criteria.moments + 2)[1:-1])
     return sorted({*starts.tolist(), *quantiles.tolist()})
 
 
-def moments_between_s(moments: Sequence[float], moment_s: float) -> list[float]:
+def moments_between_s(
+    moments: Sequence[float], moment_s: float, criteria: CandidateCriteria = CandidateCriteria()
+) -> list[float]:
     """Moments between one of those that were tried, s, and its neighbours."""
     place = list(moments).index(moment_s)
     ends = [moments[other] for other in (place - 1, place + 1) if 0 <= other < len(moments)]
-    return [float(new) for end in ends for new in np.linspace(moment_s, end, BETWEEN + 2)[1:-1]]
+    return [float(new) for end in ends for new in np.linspace(moment_s, end, criteria.moments_between + 2)[1:-1]]
 
 
 def change_candidates(
-    candidates: Sequence[Candidate], aligned: AlignedRecording, times_s: Sequence[float]
+    candidates: Sequence[Candidate],
+    aligned: AlignedRecording,
+    times_s: Sequence[float],
+    criteria: CandidateCriteria = CandidateCriteria(),
 ) -> list[ChangeCandidate]:
     """Each of some effects from each moment on; what it did before stays as it is."""
     time_s = aligned.rows.time_s
@@ -53,7 +53,7 @@ def change_candidates(
             effect=candidate.effect,
             columns_um=_after(candidate.columns_um, time_s, moment_s),
             limits=np.ptp(candidate.limits, axis=1)[:, None] * [-1.0, 1.0],
-            searched_parameters=candidate.searched_parameters + SEARCHED_CONSTANT,
+            searched_parameters=candidate.searched_parameters + criteria.searched_constant,
             constants=candidate.constants,
             kind="change",
             time_s=moment_s,

@@ -9,10 +9,6 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import ParameterEstimate
 from compd.model.effects import Effect
 
-# Share of its width by which a plausible range may be exceeded: ranges are from handbooks, and round, and an effect of
-# nearly the right form misses its number by as much.
-RANGE_SLACK = 0.25
-
 
 def estimate_parameters(
     effect: Effect, links: int, theta: FloatArray, covariance: FloatArray, criteria: Criteria
@@ -33,13 +29,13 @@ def estimate_parameters(
 def is_plausible(limits: tuple[float, float], theta: float, std: float, criteria: Criteria) -> bool:
     """Whether a fitted parameter may be inside its range (low, high), given its standard error.
 
-    It may be outside by `range_sigmas` standard errors, or by RANGE_SLACK of the range. A cause may be weaker than is
+    It may be outside by `range_sigmas` standard errors, or by `range_slack` of the range. A cause may be weaker than is
     usual: every range reaches to nought. Where it ends there, beyond it is the wrong sign, and only the standard error
     counts. An unknown standard error (nan) excuses nothing.
     """
     low, high = min(limits[0], 0.0), max(limits[1], 0.0)
     margin = criteria.range_sigmas * float(np.nan_to_num(std))
-    slack = RANGE_SLACK * (high - low)
+    slack = criteria.range_slack * (high - low)
     below, above = (margin if end == 0 else max(margin, slack) for end in (low, high))
     return bool(low - below <= theta <= high + above)
 

@@ -11,9 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compd.comparison import AlignedRecording
-from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate, searched_parameters, variant
-from compd.model.effects import Effect, needed_quantities, unmet_needs
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.diagnosis.candidate_criteria import CandidateCriteria
+from compd.diagnosis.candidates.candidates import Candidate, searched_parameters, variant
+from compd.model.effect import Effect
+from compd.model.effect_needs import needed_quantities, unmet_needs
 
 _PREFIX = "temperature_"
 
@@ -30,7 +32,10 @@ class ProxyCandidate(Candidate):
 
 
 def proxy_candidates(
-    aligned: AlignedRecording, effects: Sequence[Effect], present: Collection[str]
+    aligned: AlignedRecording,
+    effects: Sequence[Effect],
+    present: Collection[str],
+    criteria: CandidateCriteria = CandidateCriteria(),
 ) -> tuple[ProxyCandidate, ...]:
     """Every effect that lacks nothing but thermometers, with each thermometer of the recording in their place.
 
@@ -60,7 +65,7 @@ def proxy_candidates(
                 at_zero = {**at_zero, **dict.fromkeys(missing, at_zero[thermometer])}
             substituted = replace(aligned, rows=replace(rows, quantities=quantities, quantities_at_zero=at_zero))
             grid = effect.constant_grid(rows)
-            searched = searched_parameters(effect, grid) + SEARCHED_CONSTANT
+            searched = searched_parameters(effect, grid, criteria) + criteria.searched_constant
             for constants in grid:
                 candidate = variant(effect, constants, substituted, searched)
                 candidates.append(

@@ -6,15 +6,17 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from compd.comparison import AlignedRecording, neighbouring_periods
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.period_search import neighbouring_periods
+from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.candidates import Candidate, variant
-
-# Values between neighbours that are tried: a grid of time constants a factor of two apart becomes one of 1.15.
-BETWEEN = 4
 
 
 def refined_variants(
-    candidates: Sequence[Candidate], members: Iterable[int], aligned: AlignedRecording
+    candidates: Sequence[Candidate],
+    members: Iterable[int],
+    aligned: AlignedRecording,
+    criteria: CandidateCriteria = CandidateCriteria(),
 ) -> list[Candidate]:
     """For each member of a set, its effect at constants between the chosen one and its neighbours among all candidates.
 
@@ -44,14 +46,14 @@ def refined_variants(
                 grid.update(neighbouring_periods(chosen.effect, constant, aligned, value))
             refined += [
                 variant(chosen.effect, {**others, constant.name: new}, aligned, chosen.searched_parameters)
-                for new in _between(sorted(grid), value)
+                for new in _between(sorted(grid), value, criteria.constants_between)
             ]
     return refined
 
 
-def _between(grid: Sequence[float], value: float) -> list[float]:
-    """Values between one of a rising grid and its neighbours."""
+def _between(grid: Sequence[float], value: float, count: int) -> list[float]:
+    """So many values between one of a rising grid and each of its neighbours."""
     place = grid.index(value)
     ends = [grid[other] for other in (place - 1, place + 1) if 0 <= other < len(grid)]
     space = np.geomspace if grid[0] > 0 else np.linspace
-    return [float(new) for end in ends for new in space(value, end, BETWEEN + 2)[1:-1]]
+    return [float(new) for end in ends for new in space(value, end, count + 2)[1:-1]]

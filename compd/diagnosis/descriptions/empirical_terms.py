@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.criteria import PeriodCriteria
+from compd.diagnosis.candidate_criteria import DescriptionCriteria
 from compd.diagnosis.descriptions.search_covariates import (
     STAYED_THE_SAME,
     Kind,
@@ -21,8 +23,9 @@ from compd.diagnosis.descriptions.search_covariates import (
     untried_quantities,
 )
 from compd.diagnosis.descriptions.term_formula import CONSTANTS, PARAMETERS, formula_text
-from compd.diagnosis.descriptions.term_grids import LAGS_S, ROUNDING, knees, periods, refined_periods, step_times_s
-from compd.model.effects import Effect, Port, evaluate_basis
+from compd.diagnosis.descriptions.term_grids import ROUNDING, knees, periods, refined_periods, step_times_s
+from compd.model.effect import Effect, Port
+from compd.model.effect_basis import evaluate_basis
 from compd.model.library import find_effect
 from compd.units import UM_PER_MM, unit_of
 
@@ -170,10 +173,12 @@ class EmpiricalTerm:
         low, high = min(self.grid), max(self.grid)
         return (low - self.span, high + self.span) if self.form in ("step", "knee") else (low / 2, 2 * high)
 
-    def refined_grid(self, value: float, count: int) -> Sequence[float]:
+    def refined_grid(
+        self, value: float, count: int, criteria: DescriptionCriteria = DescriptionCriteria()
+    ) -> Sequence[float]:
         """`count` values of the constant about one of the grid: between its neighbours; of a period, near it."""
         if self.form == "periodic":
-            return refined_periods(value, self.unit, self.span, count)
+            return refined_periods(value, self.unit, self.span, count, criteria)
         grid = sorted(self.grid)
         place = grid.index(value)
         low, high = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
@@ -182,7 +187,9 @@ class EmpiricalTerm:
         return [round_within(refined, ROUNDING * self.span) for refined in np.linspace(low, high, count).tolist()]
 
 
-def empirical_terms(aligned: AlignedRecording, residual_um: FloatArray) -> Iterator[EmpiricalTerm]:
+def empirical_terms(
+    aligned: AlignedRecording, residual_um: FloatArray, criteria: DescriptionCriteria = DescriptionCriteria()
+) -> Iterator[EmpiricalTerm]:
     """Every term that can be tried on a recording; without times none but a step, which needs only the rows' order.
 
     residual_um : (N, m) what is to be described; periods are looked for in it. nan where a row does not count.
@@ -190,12 +197,13 @@ def empirical_terms(aligned: AlignedRecording, residual_um: FloatArray) -> Itera
     rows = aligned.usable.mask & np.isfinite(residual_um).all(axis=1)
     ports = list(_ports(aligned))
     timed = aligned.recording.has_time
+    grid_of = _Grids(residual_um[rows], criteria, aligned.criteria.periods)
     for covariate in search_covariates(aligned, rows):
-        yield from _terms_of(covariate, ports, residual_um[rows], timed=timed, known=aligned.model is not None)
+        yield from _terms_of(covariate, ports, grid_of, timed=timed, known=aligned.model is not None)
     time = SearchCovariate("time_s", "other", aligned.rows.time_s[rows])
-    grids = {"step": step_times_s(time.values)}
+    grids = {"step": step_times_s(time.values, criteria)}
     if timed:
-        grids |= {"linear": (), "periodic": periods(time, residual_um[rows])}
+        grids |= {"linear": (), "periodic": grid_of("periodic", time)}
     for form, grid in grids.items():
         for port in ports:
             if _repeats_along(port, form) and (grid or form not in CONSTANTS):
@@ -209,7 +217,7 @@ def empirical_terms(aligned: AlignedRecording, residual_um: FloatArray) -> Itera
 
 
 def _terms_of(
-    covariate: SearchCovariate, ports: Sequence[EmpiricalTerm], residual_um: FloatArray, *, timed: bool, known: bool
+    covariate: SearchCovariate, ports: Sequence[EmpiricalTerm], grid_of: _Grids, *, timed: bool, known: bool
 ) -> Iterator[EmpiricalTerm]:
     """Every form of one covariate at every port.
 
@@ -219,7 +227,7 @@ def _terms_of(
     grids: dict[str, tuple[float, ...]] = {"linear": ()}
     for form in FORMS_BY_KIND[covariate.kind]:
         if covariate.distinct >= FEWEST_VALUES.get(form, 2):
-            grids[form] = _grid(form, covariate, residual_um)
+            grids[form] = grid_of(form, covariate)
     for form, grid in grids.items():
         for port in ports:
             if _repeats_along(port, form) and (grid or form not in CONSTANTS) and (timed or form != "lagged"):
@@ -228,12 +236,23 @@ def _terms_of(
                 yield _term(port, covariate, "strain", ())
 
 
-def _grid(form: str, covariate: SearchCovariate, residual_um: FloatArray) -> tuple[float, ...]:
-    if form == "knee":
-        return knees(covariate)
-    if form == "periodic":
-        return periods(covariate, residual_um)
-    return LAGS_S if form == "lagged" else ()
+class _Grids(NamedTuple):
+    """The values of a form's constant that are tried.
+
+    residual_um : (R, m), in which periods are looked for.  spectrum : of that search.
+    """
+
+    residual_um: FloatArray
+    criteria: DescriptionCriteria
+    spectrum: PeriodCriteria
+
+    def __call__(self, form: str, covariate: SearchCovariate) -> tuple[float, ...]:
+        """Of a form of a covariate; empty for one without a constant."""
+        if form == "knee":
+            return knees(covariate, self.criteria)
+        if form == "periodic":
+            return periods(covariate, self.residual_um, self.criteria, self.spectrum)
+        return self.criteria.lags_s if form == "lagged" else ()
 
 
 def _term(port: EmpiricalTerm, covariate: SearchCovariate, form: str, grid: tuple[float, ...]) -> EmpiricalTerm:

@@ -9,24 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.diagnosis.search_criteria import FoldCriteria
 from compd.errors import Problem, RecordingError
-from compd.recording import BLOCKS, PLACE, TIME
-
-# A column with more different values than this is a quantity, and divided into BLOCKS classes of equally many rows.
-MOST_VALUES = 12
-# Share of an axis's extent: places nearer to each other are one place, and an axis along which the tip moves less than
-# this share of the longest one does not count as an axis of the workspace.
-SAME_PLACE = 0.01
-# With fewer sessions blocks of time are left out in their place: of two, one would have to predict the other.
-FEWEST_SESSIONS = 3
-# Of more sessions neighbours are left out together: memory grows with the folds, and what is learned hardly changes.
-MOST_FOLDS = 24
-# Sectors into which the workspace is divided: a fifth left out leaves four fifths to learn from.
-SECTORS = 5
+from compd.recording.sidecar import PLACE, TIME
 
 
-def row_splits(aligned: AlignedRecording) -> tuple[IntArray, ...]:
+def row_splits(aligned: AlignedRecording, criteria: FoldCriteria = FoldCriteria()) -> tuple[IntArray, ...]:
     """Splits of the N rows, each (N,) the fold of each row, numbered from 0.
 
     By what the sidecar's `folds:` names; without it by time, and by place where it is known:
@@ -43,20 +32,20 @@ def row_splits(aligned: AlignedRecording) -> tuple[IntArray, ...]:
     """
     recording = aligned.recording
     if not recording.sidecar.folds:
-        by_place = _split_by_place(aligned)
-        by_time = _split_by_time(aligned)
+        by_place = _split_by_place(aligned, criteria)
+        by_time = _split_by_time(aligned, criteria)
         return (by_time,) if by_place is None else (by_time, by_place)
     splits: list[IntArray] = []
     problems: list[Problem] = []
     for name in recording.sidecar.folds:
         if name == TIME:
-            split: IntArray | None = _split_by_time(aligned)
+            split: IntArray | None = _split_by_time(aligned, criteria)
         elif name == PLACE:
-            split = _split_by_place(aligned)
+            split = _split_by_place(aligned, criteria)
         else:
-            split = _split_by_values(aligned, recording.columns[name])
+            split = _split_by_values(aligned, recording.columns[name], criteria)
         if split is None or split.max() == 0:
-            problems.append(_undivided(aligned, name))
+            problems.append(_undivided(aligned, name, criteria))
         else:
             splits.append(split)
     if problems:
@@ -64,8 +53,8 @@ def row_splits(aligned: AlignedRecording) -> tuple[IntArray, ...]:
     return tuple(splits)
 
 
-def _undivided(aligned: AlignedRecording, name: str) -> Problem:
-    by_place = f"the tip moves along two axes, and {2 * SECTORS} places were measured"
+def _undivided(aligned: AlignedRecording, name: str, criteria: FoldCriteria) -> Problem:
+    by_place = f"the tip moves along two axes, and {2 * criteria.sectors} places were measured"
     return Problem(
         where=f"{aligned.recording.sidecar.path} folds",
         what="does not divide the rows",
@@ -75,45 +64,46 @@ def _undivided(aligned: AlignedRecording, name: str) -> Problem:
     )
 
 
-def _split_by_time(aligned: AlignedRecording) -> IntArray:
+def _split_by_time(aligned: AlignedRecording, criteria: FoldCriteria) -> IntArray:
     """(N,) sessions; with too few of them blocks of time, with many of them neighbouring sessions together."""
     recording = aligned.recording
-    fold = recording.fold
-    if len(np.unique(fold[fold >= 0])) < FEWEST_SESSIONS:
-        fold = recording.first_of_visit(np.arange(recording.rows, dtype=np.int64) * BLOCKS // recording.rows)
+    fold = recording.session
+    if fold is None or len(np.unique(fold[fold >= 0])) < criteria.min_sessions:
+        fold = recording.first_of_visit(np.arange(recording.rows, dtype=np.int64) * criteria.blocks // recording.rows)
     number = _numbered(fold)
     count = int(number.max()) + 1
-    return number * MOST_FOLDS // count if count > MOST_FOLDS else number
+    return number * criteria.max_folds // count if count > criteria.max_folds else number
 
 
-def _split_by_values(aligned: AlignedRecording, values: FloatArray) -> IntArray:
+def _split_by_values(aligned: AlignedRecording, values: FloatArray, criteria: FoldCriteria) -> IntArray:
     """(N,) each value of a column, or classes of about equally many rows; empty cells are a fold of their own."""
     known = values[np.isfinite(values)]
-    if len(np.unique(known)) > MOST_VALUES:
-        edges = np.unique(np.quantile(known, np.arange(1, BLOCKS) / BLOCKS))
+    if len(np.unique(known)) > criteria.max_values:
+        edges = np.unique(np.quantile(known, np.arange(1, criteria.blocks) / criteria.blocks))
         values = np.where(np.isfinite(values), np.searchsorted(edges, values), np.nan)
     # nan sorts behind every number, and all of them are one value
     return _numbered(aligned.recording.first_of_visit(np.unique(values, return_inverse=True)[1]))
 
 
-def _split_by_place(aligned: AlignedRecording) -> IntArray | None:
+def _split_by_place(aligned: AlignedRecording, criteria: FoldCriteria) -> IntArray | None:
     """(N,) sectors with equally many places each; None with fewer than two axes, or two places per sector."""
     tip_mm = aligned.rows.tip_M_mm
     extent_mm = np.array([np.ptp(axis[np.isfinite(axis)]) if np.isfinite(axis).any() else 0.0 for axis in tip_mm.T])
-    axes = np.flatnonzero(extent_mm > SAME_PLACE * extent_mm.max())[:2]
+    axes = np.flatnonzero(extent_mm > criteria.same_place_share * extent_mm.max())[:2]
     if len(axes) < 2:
         return None
     at_mm, extent_mm = tip_mm[:, axes], extent_mm[axes]
     known: BoolArray = np.asarray(np.isfinite(at_mm).all(axis=1))
+    cell = np.rint(at_mm / (criteria.same_place_share * extent_mm))
     # rows without a prediction count nowhere, and are one place
-    place = _places(aligned, np.where(known[:, None], np.rint(at_mm / (SAME_PLACE * extent_mm)), np.inf))
+    place = _places(aligned, np.where(known[:, None], cell, np.inf))
     count = int(place.max()) + 1
-    if count < 2 * SECTORS:
+    if count < 2 * criteria.sectors:
         return None
     middle_mm = at_mm[known].mean(axis=0)
     azimuth_rad = np.array([_azimuth_rad(at_mm[known & (place == k)] - middle_mm) for k in range(count)])
     sector = np.empty(count, dtype=np.int64)
-    sector[np.argsort(azimuth_rad, kind="stable")] = np.arange(count) * SECTORS // count
+    sector[np.argsort(azimuth_rad, kind="stable")] = np.arange(count) * criteria.sectors // count
     return sector[place]
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison import AlignedRecording
-from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, Candidate
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.diagnosis.candidates.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.descriptions.empirical_terms import EmpiricalTerm, empirical_terms
 from compd.diagnosis.search.problem import DiagnosisProblem
@@ -18,16 +18,7 @@ from compd.diagnosis.search.regression import Regressors
 from compd.diagnosis.search.significance import OrthogonalComplement
 from compd.model.effects import Effect
 
-# Values between neighbours of a grid that are tried for a step, a knee or a period.
-REFINED_VALUES = 9
 REFINED_FORMS = ("step", "knee", "periodic")
-# Terms that compete with the library's effects, of those that explain most where they were fitted; so many of them of
-# one covariate.
-PROMISING, PER_COVARIATE = 14, 3
-# What a number explains of pure noise, in variances, twice: terms are compared after its deduction (Akaike).
-SQUARES_PER_NUMBER = 2.0
-# Rows on which all terms are compared, about: which are promising shows on few.
-SCREENED_ROWS = 1500
 # Terms that are computed at once: a balance of memory and overhead.
 BATCH = 64
 
@@ -83,23 +74,24 @@ class EmpiricalSearch:
     """Every empirical term on the rows of a problem, at every value of its nonlinear constant."""
 
     def __init__(self, problem: DiagnosisProblem) -> None:
-        self._problem = problem
+        self._problem, self._criteria = problem, problem.criteria.descriptions
+        searched_constant = problem.criteria.candidates.searched_constant
         # which term is worth a contest shows on few rows
-        self._screened = slice(None, None, max(1, len(problem.data.y) // SCREENED_ROWS))
+        self._screened = slice(None, None, max(1, len(problem.data.y) // self._criteria.screened_rows))
         self._fits: list[EmpiricalFit] = []
-        for term in empirical_terms(problem.aligned, problem.comparison.residual_um):
+        for term in empirical_terms(problem.aligned, problem.comparison.residual_um, self._criteria):
             effect = term.effect()
-            searched = SEARCHED_CONSTANT if term.constant else 0
+            searched = searched_constant if term.constant else 0
             for constant in term.grid or (None,):
                 values = self._columns(term, effect, constant)
                 if np.isfinite(values).all() and values.any():
                     self._fits.append(EmpiricalFit(term, effect, constant, values[self._screened], searched))
 
     def best_fits(self, nuisance: FloatArray) -> list[EmpiricalFit]:
-        """The PROMISING terms that explain most of the residual beside nuisance columns (R, m, Q), the best first.
+        """The `promising` terms that explain most of the residual beside nuisance columns (R, m, Q), the best first.
 
         Each is at its best constant; steps, knees and periods are then refined between the values of the grid. Not
-        more than PER_COVARIATE are of one covariate: else forms of the first would leave no place for the second.
+        more than `max_per_covariate` are of one covariate: else forms of the first would leave no place for the second.
         """
         complement = OrthogonalComplement(nuisance[self._screened])
         residual = complement(self._problem.data.y[self._screened])
@@ -110,9 +102,13 @@ class EmpiricalSearch:
                 best[fit.term] = explained, fit
         taken: Counter[str] = Counter()
         promising: list[EmpiricalFit] = []
-        for _, fit in sorted(best.values(), key=lambda pair: SQUARES_PER_NUMBER * pair[1].parameter_count - pair[0]):
+        deducted = self._criteria.squares_per_number
+        for _, fit in sorted(best.values(), key=lambda pair: deducted * pair[1].parameter_count - pair[0]):
             taken[fit.term.covariate] += 1
-            if taken[fit.term.covariate] <= PER_COVARIATE and len(promising) < PROMISING:
+            if (
+                taken[fit.term.covariate] <= self._criteria.max_per_covariate
+                and len(promising) < self._criteria.promising
+            ):
                 refined = self._refined(fit, residual, complement)
                 promising.append(replace(refined, values=self._columns(fit.term, fit.effect, refined.constant)))
         return promising
@@ -121,7 +117,7 @@ class EmpiricalSearch:
         if fit.constant is None or fit.term.form not in REFINED_FORMS:
             return fit
         fits = [fit]
-        for constant in fit.term.refined_grid(fit.constant, REFINED_VALUES):
+        for constant in fit.term.refined_grid(fit.constant, self._criteria.refined_values, self._criteria):
             values = self._columns(fit.term, fit.effect, constant)[self._screened]
             fits.append(replace(fit, constant=constant, values=values))
         return fits[int(np.argmax(explained_squares([fit.values for fit in fits], residual, complement)))]

@@ -18,11 +18,6 @@ from compd.diagnosis.search.significance import OrthogonalComplement
 from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
 from compd.diagnosis.search.warm_start import find_warm_start, with_states_of
 
-# Changes in time that compete, of those that explain most where they were fitted.
-PROMISING_CHANGES = 6
-# Rounds of values between those of a grid: a factor of two becomes 1.15, then 1.03.
-REFINEMENTS = 2
-
 Progress = Callable[[str], None]
 
 
@@ -183,8 +178,8 @@ def _refined(
     losses = problem.losses(candidates)
     extend(losses)
     best = forward_search(losses, start)
-    for _ in range(REFINEMENTS):
-        refined = refined_variants(losses.candidates, best.members, problem.aligned)
+    for _ in range(problem.criteria.search.refinements):
+        refined = refined_variants(losses.candidates, best.members, problem.aligned, problem.criteria.candidates)
         if not refined:
             break
         losses = problem.losses([*losses.candidates, *refined])
@@ -202,8 +197,8 @@ class _Competitors:
         self._taken: set[object] = set()
         best = [library.candidates[subset.members[0]] for subset in library.best_variants.values()]
         effects = [candidate for candidate in best if candidate.kind == "effect"]
-        self._moments_s = moments_s(problem.aligned)
-        self._changes = change_candidates(effects, problem.aligned, self._moments_s)
+        self._moments_s = moments_s(problem.aligned, problem.criteria.candidates)
+        self._changes = change_candidates(effects, problem.aligned, self._moments_s, problem.criteria.candidates)
         self._change_values = [problem.whiten(change.columns_um) for change in self._changes]
 
     def screen_beside(self, losses: SubsetLosses, basis: tuple[int, ...]) -> tuple[EmpiricalFit, ...]:
@@ -219,7 +214,7 @@ class _Competitors:
                 self.candidates.append(fit.candidate(fit.columns_um(self._problem.aligned)))
         complement = OrthogonalComplement(nuisance)
         squares = explained_squares(self._change_values, complement(self._problem.data.y), complement)
-        for k in np.argsort(-squares)[:PROMISING_CHANGES]:
+        for k in np.argsort(-squares)[: self._problem.criteria.search.promising_changes]:
             change = self._changes[k]
             if self._is_new((change.name, change.time_s)):
                 self.candidates.append(change)
@@ -227,10 +222,11 @@ class _Competitors:
 
     def refine_changes(self, members: Sequence[int]) -> None:
         """Add the changes among some members at moments between those that were tried."""
+        criteria = self._problem.criteria.candidates
         for change in [self.candidates[k] for k in members]:
             if isinstance(change, ChangeCandidate):
-                times_s = moments_between_s(self._moments_s, change.time_s)
-                self.candidates += change_candidates([change.whole], self._problem.aligned, times_s)
+                times_s = moments_between_s(self._moments_s, change.time_s, criteria)
+                self.candidates += change_candidates([change.whole], self._problem.aligned, times_s, criteria)
 
     def _is_new(self, key: object) -> bool:
         if key in self._taken:

@@ -6,13 +6,6 @@ from collections.abc import Collection, Iterable
 
 from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
 
-# Members of a set: more causes at once than this no recording can prove.
-MOST_MEMBERS = 7
-# The search goes on while the score falls, and for so many members more: two effects may gain only together.
-FURTHER = 2
-# Sets that are looked at, the best first, for one that is plausible.
-MOST_RANKED = 400
-
 
 def forward_search(losses: SubsetLosses, start: Collection[int] = ()) -> Subset:
     """The set with the best score of which every member is needed and every number plausible.
@@ -37,8 +30,9 @@ def extend(losses: SubsetLosses, start: Collection[int] = (), among: Collection[
     """
     allowed = range(len(losses.candidates)) if among is None else among
     current = best = _best(losses, [tuple(start)]) or Subset((), losses.baseline)
+    criteria = losses.criteria.search
     stale = 0
-    while len(current.members) < MOST_MEMBERS and stale < FURTHER:
+    while len(current.members) < criteria.max_members and stale < criteria.further_members:
         grown = _best(losses, ((*current.members, k) for k in _others(losses, current.members, allowed)))
         if grown is None:
             break
@@ -61,7 +55,7 @@ def best_acceptable(losses: SubsetLosses) -> Subset:
     ranked: dict[frozenset[str], Subset] = {}
     for subset in losses.scored:
         ranked.setdefault(frozenset(losses.name(k) for k in subset.members), subset)
-        if len(ranked) >= MOST_RANKED:
+        if len(ranked) >= losses.criteria.search.max_ranked:
             break
     for subset in ranked.values():
         if losses.score(subset) > least_score + losses.criteria.effect_price:

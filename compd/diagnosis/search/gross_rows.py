@@ -10,19 +10,14 @@ import numpy as np
 from scipy.special import chdtr, chdtrc, gammaln
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import GrossRows
-from compd.statistics import LEAST_SIGMA, robust_regression, trimmed_scale
+from compd.diagnosis.search_criteria import GrossCriteria
 
-# Ridge of the robust fit, as a share of each column's squared norm: there may be more columns than rows determine.
-RIDGE = 1e-4
-# A larger exponent of Huber's weight than 1 and more rounds: many columns at once can follow gross rows.
-EXPONENT = 2.0
+# Rounds of reweighting: with the exponent of the criteria the weights settle in about ten.
 ROUNDS = 12
-# With more columns than this share of the measured numbers a fit of them says nothing of single rows.
-MOST_COLUMNS = 0.4
-# A stretch with so many gross rows, at most so far apart, is a run: something happened there.
-FEWEST_IN_RUN, WIDEST_GAP = 4, 3
 
 
 class RowWeights(NamedTuple):
@@ -43,6 +38,7 @@ def weigh_rows(
     visit: IntArray | None,
     noise: float,
     criteria: Criteria,
+    huber: float = ComparisonCriteria.huber_sigmas,
 ) -> RowWeights:
     """Weigh rows by what a robust fit of some columns and a constant leaves of them.
 
@@ -51,6 +47,7 @@ def weigh_rows(
     visit : (N,) number of the visit, negative for none.
     noise : standard deviation of the noise, 1 of a whitened residual; 0 where it is not known. A row that another one
         of its visit confirms within 5 sqrt(2) of it is not gross: the machine really was there.
+    huber : of the robust fit, as of `huber_weights`.
 
     With d the rms over the coordinates of a row's residual in robust standard deviations, its weight is
     min(1, 2 / d) (Huber, Robust Statistics (1981), chapter 7), over the mean of min(d^2, 2 d) for normal noise.
@@ -58,10 +55,16 @@ def weigh_rows(
     m = residual.shape[1]
     constant = np.broadcast_to(np.eye(m), (*residual.shape, m))
     G = np.concatenate([constant, *columns], axis=2)
-    if G.shape[2] > MOST_COLUMNS * known.sum() * m:
+    if G.shape[2] > criteria.gross.max_columns_share * known.sum() * m:
         G = G[:, :, :m]
     theta = robust_regression(
-        G[known], residual[known], ridge=RIDGE, exponent=EXPONENT, rounds=ROUNDS, scale=trimmed_scale
+        G[known],
+        residual[known],
+        ridge=criteria.gross.ridge,
+        exponent=criteria.gross.exponent,
+        rounds=ROUNDS,
+        scale=trimmed_scale,
+        huber=huber,
     )
     left = residual - G @ theta
     judged: BoolArray = np.asarray(np.isfinite(left).all(axis=1))
@@ -108,11 +111,11 @@ def _confirmed(left: FloatArray, known: BoolArray, visit: IntArray | None, limit
     return confirmed
 
 
-def gross_rows(gross: BoolArray, row: IntArray) -> GrossRows:
+def gross_rows(gross: BoolArray, row: IntArray, criteria: GrossCriteria = GrossCriteria()) -> GrossRows:
     """The gross rows as a person finds them; row : (N,) their numbers in a spreadsheet."""
     places = np.flatnonzero(gross)
     if not len(places):
         return GrossRows()
-    stretches = np.split(places, np.flatnonzero(np.diff(places) > WIDEST_GAP) + 1)
-    runs = [(int(row[s[0]]), int(row[s[-1]])) for s in stretches if len(s) >= FEWEST_IN_RUN]
+    stretches = np.split(places, np.flatnonzero(np.diff(places) > criteria.max_gap) + 1)
+    runs = [(int(row[s[0]]), int(row[s[-1]])) for s in stretches if len(s) >= criteria.min_in_run]
     return GrossRows(tuple(int(number) for number in row[places]), tuple(runs))

@@ -144,7 +144,9 @@ class DiagnosisProblem:
         """What each row counts beside some candidates alone."""
         columns = [self.nuisance, *(candidate.columns_um / self.sigma_um[:, None] for candidate in candidates)]
         visit, noise = self.aligned.recording.visit, 1.0 if self.floor_known else 0.0
-        return weigh_rows(columns, self.residual, self.known, visit, noise, self.criteria)
+        return weigh_rows(
+            columns, self.residual, self.known, visit, noise, self.criteria, self.aligned.criteria.huber_sigmas
+        )
 
 
 def build_problem(
@@ -172,13 +174,15 @@ def build_problem(
     if weights is None:
         everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
         noise = 1.0 if comparison.floor.known else 0.0
-        weights = weigh_rows(everything, residual, known, aligned.recording.visit, noise, criteria)
+        weights = weigh_rows(
+            everything, residual, known, aligned.recording.visit, noise, criteria, aligned.criteria.huber_sigmas
+        )
     rows = known & ~weights.gross
     root = np.sqrt(weights.weight[rows])
     data = RegressionData(
         residual[rows] * root[:, None],
-        tuple(_renumbered(fold[rows]) for fold in row_splits(aligned)),
-        _renumbered(neighbour_blocks(aligned.recording)[rows]),
+        tuple(_renumbered(fold[rows]) for fold in row_splits(aligned, criteria.folds)),
+        _renumbered(neighbour_blocks(aligned.recording, aligned.criteria.blocks)[rows]),
         Regressors(nuisance[rows] * root[:, None, None], np.full(nuisance.shape[2], np.inf)),
     )
     return DiagnosisProblem(
@@ -219,7 +223,7 @@ def _everything(
     columns = [candidate.columns_um / sigma_um[:, None] for candidate in first_variants.values()]
     time_s = aligned.rows.time_s
     for values in (time_s, time_s**2, *aligned.gaps_filled.rows.quantities.values()):
-        without_gaps = filled(values, time_s)
+        without_gaps = filled(values, time_s, aligned.criteria.max_filled_share)
         column = without_gaps[known]
         if len(column) and np.isfinite(column).all() and np.ptp(column) > 0:
             scaled = np.nan_to_num(without_gaps - column.mean()) / np.ptp(column)

@@ -9,9 +9,8 @@ import numpy as np
 from scipy.special import fdtrc, fdtri
 
 from compd.arrays import FloatArray, IntArray
+from compd.diagnosis.search_criteria import SearchCriteria
 
-# Resamples: 1 / (SIGN_FLIPS + 1) is the smallest p-value that can be stated.
-SIGN_FLIPS = 999
 SEED = 20260
 # Scores that differ by less are equal: the same signs of all blocks, turned round.
 ROUNDING = 1e-9
@@ -45,7 +44,7 @@ class Family(NamedTuple):
     best_of: Sequence[int] | None = None
 
 
-def p_values(families: Sequence[Family], block: IntArray) -> FloatArray:
+def p_values(families: Sequence[Family], block: IntArray, sign_flips: int = SearchCriteria.sign_flips) -> FloatArray:
     """(K,) probability that noise alone lets the best of all K families score as high as each family does.
 
     With Q orthonormal columns of a variant, z_b = Q_b^T y_b its scores in each block b of rows, s = sum_b z_b, and
@@ -61,7 +60,7 @@ def p_values(families: Sequence[Family], block: IntArray) -> FloatArray:
     distribution, and each is compared with the maximum over all families in the same resample::
 
         t_k = (t_k - mean_i t_ki) / std_i t_ki
-        p_k = (1 + #{i : max_j t_ji >= t_k}) / (SIGN_FLIPS + 1)
+        p_k = (1 + #{i : max_j t_ji >= t_k}) / (sign_flips + 1)
 
     which controls the probability of even one false finding among all that were tried, nonlinear constants included
     (max-T: Westfall and Young, Resampling-Based Multiple Testing (1993); Romano and Wolf, Econometrica 73 (2005)
@@ -69,7 +68,7 @@ def p_values(families: Sequence[Family], block: IntArray) -> FloatArray:
     place counts what the best of as many variants would have (`_as_best_of`). What acts in n blocks alone cannot have a
     p-value below 2^(1 - n): in so few, noise does the same.
 
-    block : (R,) block of each row, numbered from 0.
+    block : (R,) block of each row, numbered from 0.  sign_flips : resamples.
 
     For example, of two candidates of which the first is in the residual::
 
@@ -78,9 +77,9 @@ def p_values(families: Sequence[Family], block: IntArray) -> FloatArray:
     if not families:
         return np.zeros(0)
     rng = np.random.default_rng(SEED)
-    signs = np.ones((SIGN_FLIPS + 1, int(block.max()) + 1))
-    signs[1:] = rng.choice((-1.0, 1.0), (SIGN_FLIPS, signs.shape[1]))
-    scores = np.empty((SIGN_FLIPS + 1, len(families)))
+    signs = np.ones((sign_flips + 1, int(block.max()) + 1))
+    signs[1:] = rng.choice((-1.0, 1.0), (sign_flips, signs.shape[1]))
+    scores = np.empty((sign_flips + 1, len(families)))
     for k, family in enumerate(families):
         by_variant = []
         for columns, count in zip(family.variants, family.best_of or [1] * len(family.variants), strict=True):
@@ -92,7 +91,7 @@ def p_values(families: Sequence[Family], block: IntArray) -> FloatArray:
     spread = np.maximum(by_noise.std(axis=0), ROUNDING)
     standardized = (scores - by_noise.mean(axis=0)) / spread
     largest = standardized[1:].max(axis=1)
-    return np.asarray((1 + (largest[:, None] >= standardized[0] - ROUNDING).sum(axis=0)) / (SIGN_FLIPS + 1))
+    return np.asarray((1 + (largest[:, None] >= standardized[0] - ROUNDING).sum(axis=0)) / (sign_flips + 1))
 
 
 def _scores(columns: FloatArray, y: FloatArray, block: IntArray, signs: FloatArray) -> FloatArray:

@@ -42,7 +42,7 @@ def find_warm_start(problem: DiagnosisProblem, losses: SubsetLosses, best: Subse
         return None
     first = min((_try(problem, losses, best, losses.candidates[k]) for k in lags), key=lambda trial: trial.score)
     place = next(k for k in lags if losses.candidates[k] is first.lag)
-    between = refined_variants(losses.candidates, [place], problem.aligned)
+    between = refined_variants(losses.candidates, [place], problem.aligned, problem.criteria.candidates)
     trial = min([first, *(_try(problem, losses, best, lag) for lag in between)], key=lambda trial: trial.score)
     return trial if trial.score < losses.score(best) else None
 

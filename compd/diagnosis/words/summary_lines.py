@@ -31,8 +31,6 @@ MOST_LINES = 12
 WIDTH = 80
 # Effects, rivals and untested effects that are said here.
 MOST_NAMED = 3
-# A mean square up to so many times that of the noise is called noise.
-NOISE_RATIO = 1.25
 NO_RIVAL = "no other effect that was tried does as well"
 # A probability above this is said before the numbers.
 DOUBTFUL = 0.01
@@ -159,7 +157,8 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     text = number_text(left, fall.unit) + (" with it" if described else "")
     if not fall.noise_known:
         return [f"{text}; {CANNOT_KNOW}", *remarks]
-    if diagnosis.verdict in ("adequate", "identified", "ambiguous") or left**2 <= NOISE_RATIO * fall.noise**2:
+    at_floor = left**2 <= diagnosis.criteria.most_at_floor * fall.noise**2
+    if diagnosis.verdict in ("adequate", "identified", "ambiguous") or at_floor:
         meaning = "only noise is left"
     elif diagnosis.steps and is_best_a_change(diagnosis):
         meaning = "some of it goes with the change"

@@ -9,23 +9,19 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison import Comparison, compare, thinned
-from compd.diagnosis import (
-    MOST_ROWS,
-    Candidate,
-    CandidateResult,
-    Criteria,
-    DiagnosisProblem,
-    DiagnosisStep,
-    RowWeights,
-    SubsetLosses,
-    build_problem,
-    candidate_pool,
-    candidate_results,
-    collinearity,
-    fitted_along_columns,
-)
-from compd.model.effects import Effect
+from compd.comparison.compare import compare
+from compd.comparison.comparison import Comparison
+from compd.comparison.thinning import thinned
+from compd.diagnosis.candidate_results import candidate_results
+from compd.diagnosis.candidates.candidates import Candidate
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.diagnose import candidate_pool
+from compd.diagnosis.findings import CandidateResult, DiagnosisStep
+from compd.diagnosis.search.gross_rows import RowWeights
+from compd.diagnosis.search.problem import DiagnosisProblem, build_problem, fitted_along_columns
+from compd.diagnosis.search.rivals import collinearity
+from compd.diagnosis.search.subset_losses import SubsetLosses
+from compd.model.effect import Effect
 from compd.page.workbench.trial import Trial, trial
 from compd.text import nan_to_null
 from compd.units import UM_PER_MM
@@ -44,22 +40,23 @@ class Candidates:
         """weighed : row weights of the same comparison; None to compute them anew."""
         self._comparison = comparison
         self._weighed = weighed
+        self._criteria = Criteria() if weighed is None else weighed.criteria
         self.library = {effect.id: effect for effect in library}
 
     @cached_property
     def _searched(self) -> Comparison:
         """The rows that effects are ranked on: evenly thinned if very many, as for a diagnosis."""
         full = self._comparison
-        thin = thinned(full.aligned, MOST_ROWS)
+        thin = thinned(full.aligned, self._criteria.search.max_rows)
         return full if thin is full.aligned else compare(thin, full.fitted)
 
     @cached_property
     def problem(self) -> DiagnosisProblem:
         """The residual and the columns of every effect."""
         searched = self._searched
-        pool = candidate_pool(searched, list(self.library.values()))
+        pool = candidate_pool(searched, list(self.library.values()), self._criteria.candidates)
         weights = None if self._weighed is None else _weights(self._weighed)
-        return build_problem(searched, pool, Criteria(), weights)
+        return build_problem(searched, pool, self._criteria, weights)
 
     @cached_property
     def losses(self) -> SubsetLosses:

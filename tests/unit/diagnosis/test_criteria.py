@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import Field, fields, replace
+from dataclasses import Field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,29 +11,45 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison import AlignedRecording
-from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.criteria import ComparisonCriteria, thresholds, with_value
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.verdict import Diagnosis
+from compd.fleet.criteria import FleetCriteria
 from tests.support.external_recordings import along, record_external
 
-ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis")]
-THRESHOLDS = [*fields(Criteria), *fields(ComparisonCriteria)]
+ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis", "fleet")]
+KINDS = (Criteria, ComparisonCriteria, FleetCriteria)
+THRESHOLDS = {name: field for kind in KINDS for name, field in thresholds(kind).items()}
 ROWS = 240
 PLAY = along("x", "play", "k * moved_1", parameters={"k": {"unit": "um", "plausible": [1, 4], "source": "a test"}})
 WINDUP = along("x", "windup", "k * moved_1 * (1 + position_mm / 4000)")
 
 
-@pytest.mark.parametrize("threshold", THRESHOLDS, ids=lambda threshold: threshold.name)
+@pytest.mark.parametrize("threshold", THRESHOLDS.values(), ids=THRESHOLDS)
 def test_every_threshold_says_what_it_means_in_which_unit_and_why(threshold: Field[Any]) -> None:
     assert set(threshold.metadata) == {"unit", "meaning", "reason"}
     assert all(text.strip() for text in threshold.metadata.values())
 
 
 def test_every_threshold_is_used() -> None:
+    """As an attribute of criteria, or of its section: `criteria.p_value`, `criteria.search.max_members`."""
     trees = [ast.parse(path.read_text(encoding="utf-8")) for room in ROOMS for path in room.rglob("*.py")]
-    used = {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-    assert {threshold.name for threshold in THRESHOLDS} - used == set()
+    used = {
+        (owner(node.value), node.attr) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)
+    }
+    unused = [
+        name
+        for name, field in THRESHOLDS.items()
+        if not {(part, field.name) for part in ("criteria", "_criteria", name.partition(".")[0])} & used
+    ]
+    assert unused == []
+
+
+def owner(node: ast.expr) -> str:
+    """The last name of an expression: "criteria" of self.criteria."""
+    return node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +67,10 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> AlignedRecording:
 
 def criteria(stage: AlignedRecording, **changed: float) -> dict[str, Any]:
     """What a diagnosis with a changed threshold says."""
-    diagnosis = diagnose(stage, (), None, [PLAY], criteria=replace(Criteria(), **changed))
+    return what_is_said(diagnose(stage, (), None, [PLAY], criteria=replace(Criteria(), **changed)))
+
+
+def what_is_said(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": diagnosis.verdict,
         "steps": [step.effect.id for step in diagnosis.steps],
@@ -86,6 +105,57 @@ def test_a_changed_threshold_changes_what_is_said(
 ) -> None:
     result = criteria(stage, **changed)
     assert {key: result[key] for key in said} == said
+
+
+@pytest.mark.parametrize(("slack", "said"), [(0.0, "unexplained"), (0.25, "identified")])
+def test_a_number_slightly_out_of_its_range_is_a_cause_within_the_slack(
+    tmp_path: Path, slack: float, said: str
+) -> None:
+    """4.4 um of play, where 1 to 4 um are plausible: a tenth of the range too much."""
+    rng = np.random.default_rng(2)
+    columns = {"moved_1": rng.choice([-1.0, 1.0], ROWS), "position_mm": rng.uniform(0, 100, ROWS)}
+    error_um = 4.4 * columns["moved_1"]
+    path = record_external(
+        tmp_path / "run.csv", columns, {"x": error_um}, model_mm={"x": columns["position_mm"]}
+    ).recording.path
+    diagnosis = compd.diagnose(path, effects=PLAY, criteria=Criteria(range_slack=slack))
+    assert diagnosis.verdict == said
+    assert [step.effect.id for step in diagnosis.steps] == (["play"] if said == "identified" else [])
+    assert diagnosis.criteria.range_slack == slack
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("search.max_members", 0, {"steps": []}),
+        ("search.further_members", 0, {"steps": []}),
+        ("candidates.min_motion_um", 1e3, {"steps": [], "verdict": "unexplained"}),
+        ("descriptions.promising", 0, {"follows": []}),
+        ("gross.max_columns_share", 0.0, {"gross": ()}),
+    ],
+)
+def test_a_changed_number_of_a_section_changes_what_is_said(
+    stage: AlignedRecording, name: str, value: float, said: dict[str, Any]
+) -> None:
+    result = what_is_said(diagnose(stage, (), None, [PLAY], criteria=with_value(Criteria(), name, value)))
+    assert {key: result[key] for key in said} == said
+
+
+def test_a_comparison_rests_on_the_criteria_of_its_recording(stage: AlignedRecording) -> None:
+    path = stage.recording.path
+    lenient = ComparisonCriteria(outlier_sigmas=1e3, trend_share=2.0)
+    opened = compd.open_recording(path, criteria=lenient)
+    for comparison in (
+        compd.compare(path, criteria=lenient),
+        compd.compare(opened),
+        compd.compare(stage, criteria=lenient),
+    ):
+        assert comparison.criteria == lenient
+        assert comparison.trends == ()
+    assert compd.compare(stage).trends
+    assert compd.compare(stage).criteria == ComparisonCriteria()
+    assert compd.diagnose(opened, effects=PLAY).before.trends == ()
+    assert compd.compare_stream(path, criteria=lenient).trends == ()
 
 
 def test_more_disturbance_widens_the_standard_errors(stage: AlignedRecording) -> None:

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from compd.arrays import FloatArray
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.diagnosis.criteria import Criteria
+from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.search_criteria import SearchCriteria
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effects import Effect
 from tests.support.external_recordings import SIGMA_UM, along, record_external
@@ -49,12 +51,13 @@ def verdict(
     error_um: FloatArray,
     columns: dict[str, FloatArray] = COLUMNS,
     effects: Sequence[Effect] = EFFECTS,
+    criteria: Criteria = Criteria(),
     **options: Any,
 ) -> Diagnosis:
     """The diagnosis of a recording of the stage with this error."""
     model_mm = {"x": columns["position_mm"]}
     aligned = record_external(path / "run.csv", columns, {"x": error_um}, model_mm=model_mm, **options)
-    return diagnose(aligned, (), None, effects)
+    return diagnose(aligned, (), None, effects, criteria=criteria)
 
 
 def ids(diagnosis: Diagnosis) -> list[str]:
@@ -238,8 +241,7 @@ def test_an_instruments_frame_with_two_axes_is_turned_along(tmp_path: Path) -> N
     assert diagnosis.before.rms_um == pytest.approx(SIGMA_UM, rel=0.1)
 
 
-def test_a_long_recording_is_thinned_and_gets_the_same_verdict(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compd.diagnosis.recording_diagnosis.MOST_ROWS", 120)
-    diagnosis = verdict(tmp_path, 3 * MOVED)
+def test_a_long_recording_is_thinned_and_gets_the_same_verdict(tmp_path: Path) -> None:
+    diagnosis = verdict(tmp_path, 3 * MOVED, criteria=Criteria(search=SearchCriteria(max_rows=120)))
     assert (diagnosis.verdict, ids(diagnosis)) == ("identified", ["play"])
     assert len(diagnosis.before.used) == 120

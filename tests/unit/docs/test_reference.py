@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import doctest
 import re
 import struct
-from dataclasses import Field, fields
+from dataclasses import Field
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from compd.columns import COLUMN_KINDS, parse_name
-from compd.comparison.criteria import ComparisonCriteria
-from compd.configuration import SECTIONS, json_schema
-from compd.diagnosis import Criteria
+from compd.comparison.criteria import ComparisonCriteria, thresholds
+from compd.configuration.machine_configuration import SECTIONS
+from compd.configuration.schema import json_schema
+from compd.diagnosis.criteria import Criteria
 from compd.fleet.criteria import FleetCriteria
 from compd.gauge import Quality
 from compd.live.loop import Setpoint
@@ -43,10 +45,7 @@ LARGEST_TABLE = 4
 MESSAGES = [*REQUESTS.values(), *SENT_MESSAGES.values()]
 FILES = [ModelDocument, EffectEntry, ParameterEntry, ModelStep, FormulaDeclaration, FormulaParameter]
 THRESHOLDS = [
-    field
-    for kind in (Criteria, ComparisonCriteria, FleetCriteria)
-    for field in fields(kind)
-    if field.name != "comparison"
+    (name, field) for kind in (Criteria, ComparisonCriteria, FleetCriteria) for name, field in thresholds(kind).items()
 ]
 
 
@@ -212,10 +211,21 @@ def test_every_command_with_its_options(entry: CommandEntry) -> None:
             assert shown.strip("[]").upper() in text.upper()
 
 
-@pytest.mark.parametrize("threshold", THRESHOLDS, ids=lambda threshold: threshold.name)
-def test_every_criterion(threshold: Field[Any]) -> None:
-    row = next(line for line in page("criteria").split("\n") if line.startswith(f"| `{threshold.name}`<br>"))
-    assert f"<br>{threshold.default:g}" in row
+@pytest.mark.parametrize(("name", "threshold"), THRESHOLDS, ids=[name for name, _ in THRESHOLDS])
+def test_every_criterion(name: str, threshold: Field[Any]) -> None:
+    row = next(line for line in page("criteria").split("\n") if line.startswith(f"| `{name}`<br>"))
+    values = threshold.default if isinstance(threshold.default, tuple) else (threshold.default,)
+    assert "<br>" + ", ".join(f"{value:g}" for value in values) in row
+
+
+def test_the_code_of_the_criteria_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It runs as it stands, and other criteria change the verdict as it says."""
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"```pycon\n(.*?)```", page("criteria"), re.DOTALL)
+    examples = doctest.DocTestParser().get_doctest(code, {}, "criteria", None, None)
+    failed, tried = doctest.DocTestRunner().run(examples)
+    assert (failed, tried) == (0, len(examples.examples))
+    assert tried > 6
 
 
 @pytest.mark.parametrize("kind", COLUMN_KINDS, ids=lambda kind: kind.names)

@@ -11,6 +11,8 @@ import pytest
 import yaml
 
 import compd
+from compd.comparison.criteria import ComparisonCriteria
+from compd.diagnosis.criteria import Criteria
 from compd.errors import CompdError
 from compd.fleet import machine_examination as module
 from compd.fleet.fleet_recording import FleetRecording
@@ -106,6 +108,15 @@ def test_machines_that_are_built_alike_have_a_model_each(recording: Path, tmp_pa
         examination("compare", [machine], [f"{tmp_path}/models/*.yaml"])
 
 
+def test_other_criteria_are_handed_on(recording: Path, tmp_path: Path) -> None:
+    machine = [tmp_path / "tripod-07.yaml"]
+    blind = examination("diagnose", machine, criteria=Criteria(least_sigmas=1e3))
+    assert blind(of(recording)).effects == ()
+    strict = examination("compare", machine, comparison=ComparisonCriteria(fewest_rows=10**6))
+    with pytest.raises(CompdError, match="too few rows can be compared"):
+        strict(of(recording))
+
+
 def test_what_a_result_follows_from_changes_its_basis(recording: Path, tmp_path: Path) -> None:
     machine, effects = tmp_path / "tripod-07.yaml", tmp_path / "effects.yaml"
     effects.write_text("[]")
@@ -117,11 +128,14 @@ def test_what_a_result_follows_from_changes_its_basis(recording: Path, tmp_path:
 
     seen = {basis(), basis(), basis(command="compare"), basis(effects=[])}
     assert len(seen) == 3
+    assert basis(criteria=Criteria(), comparison=ComparisonCriteria()) in seen
+    seen |= {basis(criteria=Criteria(least_sigmas=3.0)), basis(comparison=ComparisonCriteria(outlier_sigmas=6.0))}
+    assert len(seen) == 5
     for file in (machine, effects, recording, recording.with_suffix(".yaml")):
         with file.open("a") as opened:
             opened.write("\n")
         seen.add(basis())
-    assert len(seen) == 7
+    assert len(seen) == 9
     recording.unlink()
     assert examination("diagnose").basis(FleetRecording(recording, "tripod-07")) == ""
 

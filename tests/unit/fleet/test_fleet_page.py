@@ -6,6 +6,7 @@ from pathlib import Path
 
 from plotly.graph_objects import Figure
 
+from compd.fleet.criteria import FleetCriteria
 from compd.fleet.effect_matrix import SELDOM, plot_effect_matrix
 from compd.fleet.fleet_figures import plot_drifts
 from compd.fleet.fleet_page import write_fleet_page
@@ -109,6 +110,15 @@ def test_the_page_has_it_all(tmp_path: Path) -> None:
     assert "lost.csv: &lt;cannot&gt; be read" in text
     assert "tripod-08: link_expansion.a changes by" in text
     assert "https://" not in text.partition("<body>")[2]
+
+
+def test_other_criteria_are_handed_on(tmp_path: Path) -> None:
+    strict = FleetCriteria(drift_p_value=1e-300, outlying_score=1e6, steady_share=1.0, fewest_machines=100)
+    assert Overview(FLEET).sentences()
+    assert Overview(FLEET, strict).drift_sentences() == Overview(FLEET, strict).outlying_sentences() == []
+    path = tmp_path / "fleet.html"
+    write_fleet_page(path, FLEET, strict)
+    assert "it takes 100 machines" in path.read_text(encoding="utf-8")
 
 
 def test_a_fleet_of_problems_is_a_page_too(tmp_path: Path) -> None:

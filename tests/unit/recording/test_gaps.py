@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.comparison import compare, open_recording
+from compd.comparison.compare import compare
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.open import open_recording
 from compd.comparison.residual_trends import Trend
-from compd.statistics import filled
-from compd.statistics.gaps import MOST_EMPTY
+from compd.recording.gaps import filled
 from tests.support.external import measured_places, write_external
 
 NAN = np.nan
@@ -19,7 +20,7 @@ def test_an_empty_cell_has_the_value_of_the_nearest_row_in_time() -> None:
     time_s = np.array([0.0, 1.0, 5.0, 6.0, *np.arange(10.0, 60.0)])
     values = np.array([NAN, 1.0, NAN, 3.0, *np.arange(50.0)])
     values[-1] = NAN
-    found = filled(values, time_s)
+    found = filled(values, time_s, ComparisonCriteria.max_filled_share)
     assert found[:4].tolist() == [1.0, 1.0, 3.0, 3.0]
     assert found[-1] == 48.0
     np.testing.assert_array_equal(found[4:-1], values[4:-1])
@@ -28,9 +29,9 @@ def test_an_empty_cell_has_the_value_of_the_nearest_row_in_time() -> None:
 def test_many_gaps_or_nothing_at_all_stay() -> None:
     values, time_s = np.arange(50.0), np.arange(50.0)
     values[:6] = NAN
-    assert MOST_EMPTY * 50 < 6
-    assert np.isnan(filled(values, time_s)).sum() == 6
-    assert np.isnan(filled(np.full(50, NAN), time_s)).all()
+    assert ComparisonCriteria.max_filled_share * 50 < 6
+    assert np.isnan(filled(values, time_s, ComparisonCriteria.max_filled_share)).sum() == 6
+    assert np.isnan(filled(np.full(50, NAN), time_s, ComparisonCriteria.max_filled_share)).all()
 
 
 def trends(directory: Path, empty: list[int]) -> tuple[Trend, ...]:

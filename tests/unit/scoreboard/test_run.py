@@ -7,8 +7,9 @@ import json
 import pytest
 import yaml
 
-from compd.diagnosis import Criteria
-from compd.model.library import load_effects
+from compd.comparison.criteria import value_of
+from compd.diagnosis.criteria import Criteria
+from compd.model.library.effects_file import load_effects
 from tests.scoreboard.cases import Case
 from tests.scoreboard.page import write_page
 from tests.scoreboard.prepare import prepare
@@ -84,7 +85,7 @@ def test_a_variant_changes_one_threshold():
     assert changed(Variant("", UNCHANGED)) == Criteria()
     assert len(variants()) == 1 + len(FACTORS) * len(thresholds())
     for variant in variants()[1:]:
-        different = [name for name in thresholds() if getattr(changed(variant), name) != getattr(Criteria(), name)]
+        different = [name for name in thresholds() if value_of(changed(variant), name) != value_of(Criteria(), name)]
         assert different == [variant.name]
 
 

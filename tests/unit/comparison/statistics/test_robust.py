@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from compd.comparison.alignment.registration import register
-from compd.statistics import SCALE_EFFICIENCY, huber_weights, robust_regression, robust_sigma, trimmed_scale
-from compd.statistics.robust import HUBER
+from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.statistics.robust import (
+    SCALE_EFFICIENCY,
+    huber_weights,
+    robust_regression,
+    robust_sigma,
+    trimmed_scale,
+)
 
 RNG = np.random.default_rng(12)
 
@@ -67,7 +73,7 @@ def test_weights_hold_back_the_worst_coordinate() -> None:
     residual = RNG.normal(0, 1.0, (2000, 2))
     residual[0] = [0.0, 25.0 * robust_sigma(residual)[1]]
     once, twice = huber_weights(residual), huber_weights(residual, exponent=2.0)
-    np.testing.assert_allclose(once[0], HUBER / 25.0, rtol=0.01)
+    np.testing.assert_allclose(once[0], ComparisonCriteria.huber_sigmas / 25.0, rtol=0.01)
     np.testing.assert_allclose(twice, once**2)
     assert (once[np.abs(residual).max(axis=1) < 2.0] == 1.0).all()
 

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison import AlignedRecording, open_recording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.open import open_recording
+from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.candidates import (
-    CHOICE,
-    LEAST_MOTION_UM,
-    SEARCHED_CONSTANT,
     CandidatePool,
     library_pool,
 )
@@ -50,11 +49,13 @@ def test_every_value_of_a_searched_constant_competes_and_the_search_has_its_pric
     aligned = record_with_effects(tmp_path / "run.csv", 1, {}, visits=40)
     lags = library_pool(aligned, [LIBRARY["link_expansion_lag"]], ()).candidates
     assert len({each.constants["tau"] for each in lags}) == len(lags) > 3
-    assert {each.parameter_count for each in lags} == {lags[0].columns_um.shape[2] + SEARCHED_CONSTANT}
+    assert {each.parameter_count for each in lags} == {
+        lags[0].columns_um.shape[2] + CandidateCriteria.searched_constant
+    }
     chosen = library_pool(aligned, [LIBRARY["joint_runout"]], ()).candidates
     constants = {constant.name for constant in LIBRARY["joint_runout"].constants if constant.choice}
     assert constants
-    assert {each.searched_parameters for each in chosen} == {CHOICE * len(constants)}
+    assert {each.searched_parameters for each in chosen} == {CandidateCriteria.searched_choice * len(constants)}
 
 
 def test_the_price_of_an_effect_is_that_of_its_kind_and_of_its_numbers() -> None:
@@ -75,7 +76,7 @@ def test_what_never_changed_is_to_be_varied(tmp_path: Path) -> None:
     pool = library_pool(recording(tmp_path, np.full(ROWS, 20.0)), [BED, PLAY], ())
     assert [each.name for each in pool.candidates] == ["play"]
     assert pool.untestable == {"bed": "what drives it stayed at its reference value: vary it"}
-    least = LEAST_MOTION_UM / 10  # k = 100 makes 10 um / K
+    least = CandidateCriteria.min_motion_um / 10  # k = 100 makes 10 um / K
     pool = library_pool(recording(tmp_path, np.full(ROWS, 20.0 + 1.1 * least)), [BED], ())
     assert [each.name for each in pool.candidates] == ["bed"]
 
@@ -108,7 +109,7 @@ def test_a_searched_period_has_to_be_seen_to_repeat(tmp_path: Path) -> None:
     pool = over(tmp_path / "run.csv", 1.0)
     assert pool.candidates
     assert max(each.constants["p"] for each in pool.candidates) < 40
-    assert {each.searched_parameters for each in pool.candidates} == {SEARCHED_CONSTANT}
+    assert {each.searched_parameters for each in pool.candidates} == {CandidateCriteria.searched_constant}
     pool = over(tmp_path / "short.csv", 1e-3)
     assert not pool.candidates
     assert "less than one period" in pool.untestable["cycle"]

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison import AlignedRecording
-from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT, library_pool
-from compd.diagnosis.candidates.changes import MOMENTS, MOST_STARTS, change_candidates, moments_s
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.diagnosis.candidate_criteria import CandidateCriteria
+from compd.diagnosis.candidates.candidates import library_pool
+from compd.diagnosis.candidates.changes import change_candidates, moments_s
+from compd.diagnosis.diagnose import diagnose
 from compd.diagnosis.words.summary_lines import summary_lines
 from tests.support.external_recordings import along, record_external
 from tests.support.hidden_effects import LIBRARY, record_with_effects
@@ -35,7 +36,7 @@ def test_moments_are_starts_of_sessions_and_quantiles_of_the_rows(tmp_path: Path
     times_s = moments_s(aligned)
     assert times_s == sorted(times_s)
     assert 1200.0 in times_s
-    assert len(times_s) == MOMENTS + 1
+    assert len(times_s) == CandidateCriteria.moments + 1
     assert 0.0 < times_s[0] < times_s[-1] < aligned.rows.time_s[-1]
 
 
@@ -44,8 +45,8 @@ def test_of_many_sessions_not_every_start_is_tried(tmp_path: Path) -> None:
     columns = {"session": 1.0 + np.arange(ROWS) // 2}
     aligned = record_external(tmp_path / "run.csv", columns, {"x": np.zeros(ROWS)})
     times_s = moments_s(aligned)
-    assert MOMENTS < len(times_s) <= MOMENTS + MOST_STARTS
-    assert np.diff(times_s).max() < aligned.rows.time_s[-1] / MOMENTS
+    assert CandidateCriteria.moments < len(times_s) <= CandidateCriteria.moments + CandidateCriteria.max_session_starts
+    assert np.diff(times_s).max() < aligned.rows.time_s[-1] / CandidateCriteria.moments
 
 
 def test_a_change_acts_from_its_moment_on_and_may_have_either_sign(tmp_path: Path) -> None:
@@ -56,7 +57,7 @@ def test_a_change_acts_from_its_moment_on_and_may_have_either_sign(tmp_path: Pat
     np.testing.assert_array_equal(late.columns_um[120:], play.columns_um[120:])
     assert early.limits.tolist() == [[-20.0, 20.0]]  # play may shrink, its own range is 0 to 20
     assert (late.name, late.kind, late.time_s) == ("play change", "change", 1200.0)
-    assert late.parameter_count == 1 + SEARCHED_CONSTANT
+    assert late.parameter_count == 1 + CandidateCriteria.searched_constant
 
 
 def test_play_that_grows_is_found_with_its_time_beside_the_play_that_was_there(tmp_path: Path) -> None:
@@ -102,7 +103,7 @@ def test_a_change_between_two_moments_is_dated_within_one_of_them(tmp_path: Path
     diagnosis = diagnose(stage(tmp_path / "run.csv", 2.0, 5.0, at=165), (), None, [PLAY, GAIN])
     change = diagnosis.depends_on[0]
     assert change.effect == "play"
-    assert change.time_s == pytest.approx(1650.0, abs=10.0 * ROWS / MOMENTS)
+    assert change.time_s == pytest.approx(1650.0, abs=10.0 * ROWS / CandidateCriteria.moments)
 
 
 @pytest.mark.long

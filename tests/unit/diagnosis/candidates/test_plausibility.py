@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.diagnosis.candidates.plausibility import RANGE_SLACK, estimate_parameters, is_plausible, is_undetermined
+from compd.diagnosis.candidates.plausibility import estimate_parameters, is_plausible, is_undetermined
 from compd.diagnosis.criteria import Criteria
 from compd.model.library import load_library
 
@@ -22,11 +22,11 @@ def test_a_range_on_one_side_of_zero_gives_the_sign(sign: float) -> None:
 
 
 def test_a_range_may_be_exceeded_by_a_share_of_it_or_by_three_standard_errors() -> None:
-    assert is_plausible((0.0, 1.0), 0.99 + RANGE_SLACK, 0.0, CRITERIA)
-    assert not is_plausible((0.0, 1.0), 1.01 + RANGE_SLACK, 0.0, CRITERIA)
+    assert is_plausible((0.0, 1.0), 0.99 + CRITERIA.range_slack, 0.0, CRITERIA)
+    assert not is_plausible((0.0, 1.0), 1.01 + CRITERIA.range_slack, 0.0, CRITERIA)
     assert is_plausible((0.0, 1.0), 1.5, 0.2, CRITERIA)
     assert not is_plausible((0.0, 1.0), 1.5, 0.1, CRITERIA)
-    assert is_plausible((-1.0, 1.0), -0.99 - 2 * RANGE_SLACK, float("nan"), CRITERIA)
+    assert is_plausible((-1.0, 1.0), -0.99 - 2 * CRITERIA.range_slack, float("nan"), CRITERIA)
 
 
 def test_parameters_are_undetermined_unless_one_is_known_better_than_its_range() -> None:

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison import AlignedRecording, open_recording
-from compd.diagnosis.candidates.candidates import SEARCHED_CONSTANT
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.open import open_recording
+from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.proxies import proxy_candidates
 from compd.diagnosis.recording_diagnosis import diagnose
 from compd.units import UM_PER_MM
@@ -62,10 +63,10 @@ def test_every_thermometer_that_moved_stands_in_for_the_missing_one(tmp_path: Pa
 def test_the_choice_of_a_thermometer_is_a_search_and_has_its_price(tmp_path: Path) -> None:
     aligned = machining(tmp_path / "run.csv", 5.0)
     (plain,) = proxy_candidates(aligned, [SPINDLE], ())
-    assert plain.parameter_count == 1 + SEARCHED_CONSTANT
+    assert plain.parameter_count == 1 + CandidateCriteria.searched_constant
     lagged = proxy_candidates(aligned, [LAGGED], ())
     assert len(lagged) == len({each.constants["tau"] for each in lagged}) > 1
-    assert {each.parameter_count for each in lagged} == {1 + 2 * SEARCHED_CONSTANT}
+    assert {each.parameter_count for each in lagged} == {1 + 2 * CandidateCriteria.searched_constant}
 
 
 def test_an_effect_with_its_thermometer_or_of_the_model_or_that_lacks_more_has_no_proxy(tmp_path: Path) -> None:

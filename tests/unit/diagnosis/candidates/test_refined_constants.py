@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison import AlignedRecording
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.candidates import library_pool, variant
-from compd.diagnosis.candidates.refined_constants import BETWEEN, refined_variants
-from compd.diagnosis.recording_diagnosis import diagnose
+from compd.diagnosis.candidates.refined_constants import refined_variants
+from compd.diagnosis.diagnose import diagnose
 from tests.support.external_recordings import along, record_external
 from tests.support.hidden_effects import LIBRARY, record_with_effects
 
@@ -40,7 +41,7 @@ def test_values_lie_between_the_chosen_one_and_its_neighbours(aligned: AlignedRe
     chosen = next(k for k, each in enumerate(candidates) if each.constants.get("tau") == grid[2])
     refined = refined_variants(candidates, [chosen], aligned)
     values = [each.constants["tau"] for each in refined]
-    assert len(values) == 2 * BETWEEN
+    assert len(values) == 2 * CandidateCriteria.constants_between
     assert all(grid[1] < value < grid[3] and value != grid[2] for value in values)
     ratios = np.diff(np.log(sorted([grid[1], *values, grid[2], grid[3]])))
     np.testing.assert_allclose(ratios, ratios[0])  # evenly by factors, for times are
@@ -50,7 +51,7 @@ def test_values_lie_between_the_chosen_one_and_its_neighbours(aligned: AlignedRe
 
 def test_at_the_end_of_a_grid_values_lie_on_one_side(aligned: AlignedRecording) -> None:
     candidates = library_pool(aligned, [LAG], ()).candidates
-    assert len(refined_variants(candidates, [0], aligned)) == BETWEEN
+    assert len(refined_variants(candidates, [0], aligned)) == CandidateCriteria.constants_between
 
 
 def test_a_second_round_goes_between_refined_values(aligned: AlignedRecording) -> None:
@@ -79,7 +80,7 @@ def test_a_period_is_refined_within_a_quarter_of_a_turn(tmp_path: Path) -> None:
     (chosen,) = [variant(CYCLE, {"p": 75.0}, aligned, 3)]
     first = refined_variants([chosen], [0], aligned)
     turns = [300 / each.constants["p"] for each in first]
-    assert len(turns) == 2 * BETWEEN
+    assert len(turns) == 2 * CandidateCriteria.constants_between
     assert all(abs(turn - 4.0) < 0.25 for turn in turns)
     assert {each.searched_parameters for each in first} == {3}
 

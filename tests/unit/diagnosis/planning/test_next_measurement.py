@@ -15,19 +15,20 @@ from typer.testing import CliRunner
 import compd
 from compd.cli.measurements.diagnose import diagnose as diagnose_command
 from compd.cli.measurements.plan import plan as plan_command
-from compd.comparison import AlignedRecording, search_constants
-from compd.errors import CompdError, RecordingError
-from compd.model.effects import FittedEffect
-from compd.planning import (
-    MeasurementPlan,
-    ProgrammeLimits,
+from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.shape_search import search_constants
+from compd.diagnosis.planning.measurement_plan import MeasurementPlan, NextMeasurement
+from compd.diagnosis.planning.measurement_programmes import ProgrammeLimits, recorded_limits
+from compd.diagnosis.planning.next_measurement import (
     measurement_of_constant,
     measurement_to_test,
     next_measurement,
     plan_measurement,
     recorded_limits,
 )
-from compd.planning.measurement_plan import LEAST_SEPARATION, NextMeasurement
+from compd.diagnosis.search_criteria import PlanningCriteria
+from compd.errors import CompdError, RecordingError
+from compd.model.effect import FittedEffect
 from tests.support.hidden_effects import LIBRARY, NOISE_UM, record_with_effects
 
 SIGMA_UM = np.full(3, NOISE_UM)
@@ -120,7 +121,7 @@ def test_rivals_get_rows_and_what_they_will_do(tmp_path: Path) -> None:
     answer = next_measurement(aligned, (), found, LIBRARY["joint_contact"], SIGMA_UM, rows=20)
     assert answer.effects == ("link_elasticity", "joint_contact")
     assert answer.plan is not None
-    assert answer.plan.separation >= max(LEAST_SEPARATION, answer.plan.before + 1)
+    assert answer.plan.separation >= max(PlanningCriteria.min_separation, answer.plan.before + 1)
     assert len(answer.as_json()) == len(answer.plan.rows) <= 20
     assert answer.promise.startswith("The rows under 'next' can")
 
@@ -214,7 +215,7 @@ def test_of_three_rivals_the_rows_part_those_that_can_be_and_the_others_are_name
     plan = plan_measurement(aligned, (), (spring, contact, twin), SIGMA_UM, limits, 20)
     assert plan.rivals == ("link_elasticity", "joint_contact", "twin")
     assert plan.alike == (("link_elasticity", "twin"),)
-    assert plan.separation >= LEAST_SEPARATION
+    assert plan.separation >= PlanningCriteria.min_separation
     words = "No rows within the limits tell link_elasticity from twin. Within the limits they correct alike"
     assert words in plan.summary
 
@@ -224,7 +225,7 @@ def test_three_rivals_that_rows_tell_apart_are_planned_for_together(tmp_path: Pa
     names = ["link_elasticity", "joint_contact", "link_zero"]
     plan = compd.plan_measurement(tmp_path / "run.csv", names, rows=20, force_N=100.0)
     assert plan.alike == ()
-    assert plan.separation >= LEAST_SEPARATION
+    assert plan.separation >= PlanningCriteria.min_separation
     assert plan.summary.startswith("link_elasticity, joint_contact and link_zero differ by at least ")
 
 

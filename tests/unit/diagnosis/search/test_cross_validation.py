@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison import open_recording
-from compd.diagnosis.search.cross_validation import MOST_FOLDS, SECTORS, row_splits
+from compd.comparison.open import open_recording
+from compd.diagnosis.search.cross_validation import row_splits
+from compd.diagnosis.search_criteria import FoldCriteria
 from compd.errors import RecordingError
 from tests.support.external import Floats, measured_places, write_external
 from tests.support.hidden_effects import record_with_effects
@@ -22,7 +23,7 @@ def test_folds_keep_points_and_sessions_whole(tmp_path: Path) -> None:
     aligned = record_with_effects(tmp_path / "run.csv", 1, {})
     by_session, by_sector = row_splits(aligned)
     assert len(np.unique(by_session)) == 4
-    assert len(np.unique(by_sector)) == SECTORS
+    assert len(np.unique(by_sector)) == FoldCriteria.sectors
     point, session = aligned.recording.point, aligned.recording.session
     assert point is not None
     assert session is not None
@@ -34,7 +35,7 @@ def test_of_many_sessions_neighbours_are_left_out_together(tmp_path: Path) -> No
     """Memory grows with the folds: a thousand sessions would take gigabytes."""
     session = np.arange(120) // 2
     by_time = splits(tmp_path, {**measured_places(), "session": session.astype(float)})[0]
-    assert len(np.unique(by_time)) == MOST_FOLDS
+    assert len(np.unique(by_time)) == FoldCriteria.max_folds
     assert (np.diff(by_time) >= 0).all()
     assert all(len(np.unique(by_time[session == label])) == 1 for label in np.unique(session))
 

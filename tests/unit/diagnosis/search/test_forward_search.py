@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.search.forward_search import MOST_MEMBERS, best_acceptable, extend, forward_search
+from compd.diagnosis.search.forward_search import best_acceptable, extend, forward_search
 from compd.diagnosis.search.subset_losses import Subset
 from tests.support.candidate_sets import candidate, columns, description, names, noise, subset_losses
 
@@ -106,7 +106,7 @@ def test_an_undetermined_member_does_not_hide_the_set_without_it() -> None:
 def test_no_more_members_than_a_recording_can_prove() -> None:
     values = {str(k): columns(k) for k in range(10, 20)}
     losses = subset_losses(noise(4) + sum(2.0 * column[:, :, 0] for column in values.values()), values)
-    assert len(forward_search(losses).members) == MOST_MEMBERS
+    assert len(forward_search(losses).members) == Criteria().search.max_members
 
 
 def test_effects_that_do_nearly_as_well_are_preferred_to_a_description() -> None:

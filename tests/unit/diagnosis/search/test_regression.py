@@ -7,7 +7,8 @@ import pytest
 
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.search.regression import RegressionData, Regressors, normal_equations
-from compd.diagnosis.search.significance import SIGN_FLIPS, Family, OrthogonalComplement, p_values
+from compd.diagnosis.search.significance import Family, OrthogonalComplement, p_values
+from compd.diagnosis.search_criteria import SearchCriteria
 
 
 def random_data(seed: int, rows: int = 120) -> RegressionData:
@@ -85,7 +86,7 @@ def test_p_values_of_noise_are_uniform_and_of_an_effect_the_smallest() -> None:
     assert np.mean(np.array(smallest) < 0.05) <= 0.15  # 5 % is expected: 2 of 40
     y = columns[2] @ np.array([0.5, -0.5]) + rng.standard_normal((240, 3))
     with_effect = p_values([Family([variant], y) for variant in columns], block)
-    assert with_effect[2] == pytest.approx(1 / (SIGN_FLIPS + 1))
+    assert with_effect[2] == pytest.approx(1 / (SearchCriteria.sign_flips + 1))
     assert int(np.argmin(with_effect)) == 2
 
 

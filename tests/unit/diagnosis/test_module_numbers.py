@@ -1,0 +1,209 @@
+"""Numbers at the level of a module: each that can change a verdict is a criterion; these others stand where they are
+used, for a reason that `compd.diagnosis.criteria` allows."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import compd
+
+ROOT = Path(compd.__file__).parent
+PACKAGES = ("comparison", "diagnosis", "fleet")
+
+ROUNDING = "numerics: what rounding may do"
+CONDITIONING = "numerics: conditioning of equations"
+ITERATION = "numerics: step or end of an iteration that settles before"
+SEED = "numerics: seed of a draw"
+DEFINITION = "definition of a method or a unit, or what follows from one"
+MEMORY = "memory or time"
+WORDS = "words: what a sentence, a table or a picture shows"
+PLAN = "form of a proposed measurement"
+
+# Module and name -> why it is no criterion.
+NUMBERS = {
+    "comparison/alignment/fixed_ends.py": {
+        "STEPS": ITERATION,
+        "CONVERGED_MM": ITERATION,
+        "PLACE_NUMBERS": DEFINITION,
+        "PLANE_SHARE": CONDITIONING,
+    },
+    "comparison/alignment/measured_attitude.py": {"MM_PER_RAD": DEFINITION},
+    "comparison/alignment/registration.py": {
+        "ROUNDS": ITERATION,
+        "FEWEST_POINTS": DEFINITION,
+        "LEAST_SPREAD_MM": ROUNDING,
+    },
+    "comparison/compare.py": {"NUISANCE_ROUNDS": ITERATION},
+    "comparison/comparison.py": {"MOST_TRENDS": WORDS},
+    "comparison/fit.py": {"STEPS": ITERATION, "ROUNDS": ITERATION, "CONVERGED": ITERATION, "LEAST_RMS_UM": ROUNDING},
+    "comparison/noise_floor.py": {"DIFFERENCE_VARIANCE": DEFINITION},
+    "comparison/nuisance.py": {"LEAST_SHARE": CONDITIONING},
+    "comparison/shape_search.py": {"FINE": ITERATION},
+    "comparison/statistics/last_digit.py": {"PER_STEP": DEFINITION, "STEPS_UM": DEFINITION},
+    "comparison/statistics/least_squares.py": {
+        "RANK_CUT": CONDITIONING,
+        "DIAGONAL_GUARD": CONDITIONING,
+        "SHARE_OF_COMBINATION": CONDITIONING,
+    },
+    "comparison/statistics/periodogram.py": {
+        "OVERSAMPLING": ITERATION,
+        "LOBES": DEFINITION,
+        "LEAST_SPAN": ROUNDING,
+        "REFINED": ITERATION,
+        "LEAST_DETERMINANT": CONDITIONING,
+    },
+    "comparison/statistics/robust.py": {
+        "ROUNDS": ITERATION,
+        "LEAST_SIGMA": ROUNDING,
+        "MEDIAN_OF_NORMAL": DEFINITION,
+        "P95_OF_NORMAL": DEFINITION,
+        "WINSORIZED": DEFINITION,
+        "TRIMMED": DEFINITION,
+        "WINSORIZED_MEAN_SQUARE": DEFINITION,
+        "SCALE_EFFICIENCY": DEFINITION,
+    },
+    "comparison/stream/magnitude_histogram.py": {
+        "FRACTION_BITS": MEMORY,
+        "_SHIFT": MEMORY,
+        "SMALLEST": MEMORY,
+        "LARGEST": MEMORY,
+        "_FIRST": MEMORY,
+        "_LAST": MEMORY,
+    },
+    "comparison/stream/recording_stream.py": {"LONG_ROWS": MEMORY, "BLOCK_ROWS": MEMORY},
+    "comparison/stream/residual_totals.py": {"MOST_OUTLIERS_LISTED": WORDS},
+    "comparison/stream/time_envelope.py": {"TIMES": WORDS},
+    "comparison/thinning.py": {"SEED": SEED},
+    "diagnosis/candidates/constant.py": {"MM_PER_UM": DEFINITION, "LEAST_OUTSIDE": ROUNDING},
+    "diagnosis/descriptions/empirical_terms.py": {
+        "FEWEST_VALUES": DEFINITION,
+        "UNKNOWN_RANGE": WORDS,
+        "RANGE_PER_SIZE": WORDS,
+    },
+    "diagnosis/descriptions/search_covariates.py": {"LEAST_CHANGE": ROUNDING, "MIDDLE_SHARE": WORDS},
+    "diagnosis/descriptions/term_grids.py": {"TURN": DEFINITION, "ROUNDING": WORDS},
+    "diagnosis/planning/measurement_plan.py": {"LEAST_SHOWN": WORDS, "MOST_VALUES": WORDS},
+    "diagnosis/planning/measurement_programmes.py": {
+        "PLACES_PER_EDGE": PLAN,
+        "LOADS": PLAN,
+        "SPEEDS": PLAN,
+        "ROW_EVERY_S": PLAN,
+        "WORKSPACE_QUANTILES": PLAN,
+    },
+    "diagnosis/planning/measurement_settings.py": {
+        "MOST_STEPS": PLAN,
+        "DIRECTIONS": PLAN,
+        "MOST_COMBINATIONS": PLAN,
+        "FEWEST_LEVELS": PLAN,
+        "MOST_LEVELS": PLAN,
+        "TIED": PLAN,
+        "DIGITS_OF_RANGE": PLAN,
+    },
+    "diagnosis/planning/plan_formats.py": {"DWELL_S": PLAN, "_NAME_DIGITS": WORDS},
+    "diagnosis/planning/programme_rows.py": {"WAITS": PLAN, "STEP_S": PLAN, "REVERSALS_MM": PLAN},
+    "diagnosis/planning/setting_programmes.py": {"WATCHED_S": PLAN, "PROBED_ROWS": PLAN},
+    "diagnosis/planning/t_optimal.py": {"RIDGE": CONDITIONING, "LEAST_RIDGE": CONDITIONING},
+    "diagnosis/planning/tip_ways.py": {"TRAVEL_MM": PLAN, "LONGEST_MM": PLAN, "STEADY_S": PLAN, "_STEP_MM": ITERATION},
+    "diagnosis/proposed_measurement.py": {"MOST_COVARIATES": WORDS},
+    "diagnosis/search/empirical_search.py": {"BATCH": MEMORY},
+    "diagnosis/search/gross_rows.py": {"ROUNDS": ITERATION},
+    "diagnosis/search/regression.py": {"LEAST_RIDGE": CONDITIONING, "BATCH": MEMORY},
+    "diagnosis/search/significance.py": {"SEED": SEED, "ROUNDING": ROUNDING},
+    "diagnosis/search/subset_losses.py": {"LEAST_LOSS": ROUNDING},
+    "diagnosis/unmodelled.py": {"RANK_CUT": CONDITIONING},
+    "diagnosis/verdict.py": {"VERDICT_VERSION": WORDS},
+    "diagnosis/words/phrases.py": {"MOST_VALUES": WORDS, "MOST_RIVALS": WORDS, "MOST_ROWS": WORDS},
+    "diagnosis/words/summary_lines.py": {
+        "MOST_LINES": WORDS,
+        "WIDTH": WORDS,
+        "MOST_NAMED": WORDS,
+        "DOUBTFUL": WORDS,
+        "CROWDED": WORDS,
+    },
+    "fleet/checkpoint.py": {"WRITE_EVERY_S": MEMORY},
+    "fleet/cluster.py": {"CONNECT_S": MEMORY},
+    "fleet/drift.py": {"_SECONDS_PER_DAY": DEFINITION},
+    "fleet/effect_matrix.py": {
+        "ROW_PX": WORDS,
+        "_DRIFTS": WORDS,
+        "_DIFFERS": WORDS,
+        "_UNEXPLAINED": WORDS,
+        "_MOST": WORDS,
+        "_PALE": WORDS,
+    },
+    "fleet/engine.py": {"LONGEST_WITHOUT_WORKERS_S": MEMORY, "_FEWEST_BATCHES": MEMORY, "LOOK_EVERY_S": MEMORY},
+    "fleet/examination.py": {"MOST_KEPT": MEMORY},
+    "fleet/examine.py": {"BATCH": MEMORY},
+    "fleet/fleet_figures.py": {"MOST_PANELS": WORDS, "PANEL_PX": WORDS},
+    "fleet/outlying.py": {"_SIGMA_OF_MAD": DEFINITION, "_OF_MEDIAN": DEFINITION},
+    "fleet/recordings.py": {"_HEADER_BYTES": MEMORY},
+}
+
+# Inside functions these count, halve, square, index axes and convert units, or guard against a division by nought.
+PLAIN = {-1, 0, 0.5, 1, 2, 3, 100, 1000}
+GUARDS = {1e9, 1e-3, 1e-6, 1e-9, 1e-12, 1e-300}
+# Anything else needs a name, and so a place above or among the criteria; but for the following.
+IN_FUNCTIONS = {
+    "comparison/alignment/align_recording.py": {9: "numbers of the frame"},
+    "comparison/alignment/aligned_recording.py": {3600: DEFINITION},
+    "comparison/alignment/fixed_ends.py": {5: WORDS},
+    "comparison/alignment/measured_attitude.py": {6: "columns of a rigid motion"},
+    "comparison/comparison.py": {0.95: "P95, a quantile that is reported"},
+    "comparison/covariates.py": {3600: DEFINITION},
+    "comparison/statistics/cluster_covariance.py": {0.95: DEFINITION},
+    "comparison/statistics/robust.py": {0.95: DEFINITION},
+    "comparison/stream/residual_totals.py": {0.95: "P95, a quantile that is reported"},
+    "diagnosis/candidates/constant.py": {4: "axes of an attitude", 5: "axes of an attitude", 6: "axes of a motion"},
+    "diagnosis/descriptions/search_covariates.py": {17: "digits of a double"},
+    "diagnosis/planning/measurement_plan.py": {10: WORDS},
+    "diagnosis/planning/measurement_programmes.py": {4: PLAN, 9: "numbers of the frame"},
+    "diagnosis/planning/measurement_settings.py": {10: "decimals"},
+}
+PICTURES = ("fleet/effect_matrix.py", "fleet/fleet_figures.py")
+
+
+def is_number(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool)
+
+
+def module_numbers(tree: ast.Module) -> set[str]:
+    """Names that a module gives to a value with a number in it."""
+    found: set[str] = set()
+    for node in tree.body:
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            if any(map(is_number, ast.walk(node.value))):
+                found |= {part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name)}
+    return found
+
+
+def magic_numbers(tree: ast.Module) -> set[float]:
+    """Numbers inside functions that are neither plain nor a guard."""
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    numbers = {part.value for node in functions for part in ast.walk(node) if is_number(part)}  # type: ignore[attr-defined]
+    return numbers - PLAIN - GUARDS
+
+
+MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_number_is_a_criterion_or_has_a_reason(path: Path) -> None:
+    tree, module = ast.parse(path.read_text(encoding="utf-8")), str(path.relative_to(ROOT))
+    allowed = set(NUMBERS.get(module, {}))
+    assert module_numbers(tree) == allowed, "a number that can change a verdict belongs in the criteria"
+    if module not in PICTURES:
+        assert magic_numbers(tree) == set(IN_FUNCTIONS.get(module, {})), "give it a name"
+
+
+def test_every_listed_module_is_there() -> None:
+    assert {*NUMBERS, *IN_FUNCTIONS, *PICTURES} <= {str(path.relative_to(ROOT)) for path in MODULES}
+
+
+def test_a_new_number_is_found() -> None:
+    tree = ast.parse("LIMIT = 0.25\nLOW, HIGH = 1, 2.5\nNAME = 'x'\ndef f(x):\n    return x > 7.5 or x < 1e-9\n")
+    assert module_numbers(tree) == {"LIMIT", "LOW", "HIGH"}
+    assert magic_numbers(tree) == {7.5}
