@@ -54,7 +54,7 @@ def add_to_model(
     return _changed(extended, model, refine(result, before.floor.by_axis_um), before, "add", effect.id, criteria)
 
 
-def remove(
+def remove_effect(
     model: ModelFile,
     effect_id: str,
     aligned: AlignedRecording,
@@ -82,7 +82,7 @@ def remove(
     return _changed(reduced, model, refine(result, before.floor.by_axis_um), before, "remove", effect_id, criteria)
 
 
-def refit(
+def refit_model(
     model: ModelFile,
     aligned: AlignedRecording,
     refine: Refinement = unrefined,

@@ -7,9 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.open import open_recording
+from compd.comparison import AlignedRecording, ComparisonCriteria, open_recording
 from compd.errors import Problem, StateError
 from compd.model.effects import Effect
 from compd.model_file import ModelFile, read_model_file

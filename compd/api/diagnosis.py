@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.comparison.compare import compare as compare_aligned
-from compd.comparison.comparison import Comparison
-from compd.comparison.criteria import ComparisonCriteria
-from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.diagnose import diagnose as diagnose_aligned
-from compd.diagnosis.verdict import Diagnosis
-from compd.model.effect_needs import can_concern
-from compd.model.library import load_library
-from compd.model.library.effects_file import gather_effects
+from compd.comparison import Comparison, ComparisonCriteria
+from compd.comparison import compare as compare_aligned
+from compd.diagnosis import Criteria, Diagnosis
+from compd.diagnosis import diagnose as diagnose_aligned
+from compd.model.effects import can_concern
+from compd.model.library import gather_effects, load_library
 
 
 def compare(recording: Recorded, model: Model = None, *, criteria: ComparisonCriteria | None = None) -> Comparison:

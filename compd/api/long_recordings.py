@@ -9,18 +9,23 @@ from typing import NamedTuple
 
 from compd.api.arguments import Model, opened_model
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.fit import FitResult
-from compd.comparison.open import open_recording
-from compd.comparison.stream.block_comparison import compare_blocks
-from compd.comparison.stream.block_fit import fit_blocks
-from compd.comparison.stream.recording_stream import RecordingStream, is_long, open_stream
-from compd.comparison.stream.sample import Sample, draw_sample
-from compd.comparison.stream.streamed_comparison import StreamedComparison
-from compd.configuration.shipped import Machine
-from compd.diagnosis import model_changes
-from compd.model_file.model_file import ModelFile
+from compd.comparison import (
+    AlignedRecording,
+    ComparisonCriteria,
+    FitResult,
+    RecordingStream,
+    Sample,
+    StreamedComparison,
+    compare_blocks,
+    draw_sample,
+    fit_blocks,
+    is_long,
+    open_recording,
+    open_stream,
+)
+from compd.configuration import Machine
+from compd.model_changes import refit_model
+from compd.model_file import ModelFile
 
 # Called with the number of finished rows, block after block.
 Progress = Callable[[int], None]

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
-from compd.configuration.shipped import Machine, load_machine, shipped_names
-from compd.diagnosis import model_changes
-from compd.diagnosis.criteria import Criteria
+from compd.configuration import Machine, load_machine, shipped_names
+from compd.diagnosis import Criteria
 from compd.errors import CompdError, Problem, StateError
 from compd.model.effects import Effect
 from compd.model.library import find_effect, gather_effects, load_library, named_effect
@@ -64,7 +63,7 @@ def add_effect(
     recording: Recorded,
     *,
     effects: Effects = (),
-    refine: model_changes.Refinement = model_changes.unrefined,
+    refine: Refinement = unrefined,
     criteria: Criteria = Criteria(),
 ) -> ModelFile:
     """Add an effect to a model: all its effects are fitted together on a recording, and the ledger gets a line.
@@ -112,7 +111,7 @@ def add_effect(
     resolved = _resolve_effect(effect, gather_effects(effects))
     declared = resolved.declared if isinstance(resolved.declared, str) else dict(resolved.declared)
     aligned = opened_recording(recording)
-    return model_changes.add(opened_model(model, aligned), declared or resolved.id, resolved, aligned, refine, criteria)
+    return add_to_model(opened_model(model, aligned), declared or resolved.id, resolved, aligned, refine, criteria)
 
 
 def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapping[str, Effect]) -> Effect:

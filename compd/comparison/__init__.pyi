@@ -6,7 +6,7 @@ from .comparison import Comparison as Comparison
 from .covariate import Covariate as Covariate
 from .covariate import covariates as covariates
 from .covariate import why_no_covariate as why_no_covariate
-from .criteria import threshold as threshold
+from .criteria import ComparisonCriteria as ComparisonCriteria
 from .display_unit import format_error as format_error
 from .display_unit import in_place_unit as in_place_unit
 from .display_unit import place_unit as place_unit
@@ -29,7 +29,6 @@ from .stream.block_fit import fit_blocks as fit_blocks
 from .stream.recording_stream import RecordingStream as RecordingStream
 from .stream.recording_stream import is_long as is_long
 from .stream.recording_stream import open_stream as open_stream
-from .stream.sample import SAMPLE_ROWS as SAMPLE_ROWS
 from .stream.sample import Sample as Sample
 from .stream.sample import draw_sample as draw_sample
 from .stream.streamed_comparison import StreamedComparison as StreamedComparison

@@ -29,7 +29,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.neighbour_blocks import neighbour_blocks
+from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.nuisance import nuisance_beside
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.quantity_ranges import Ranges, quantity_ranges

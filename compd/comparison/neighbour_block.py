@@ -6,7 +6,7 @@ import numpy as np
 
 from compd.arrays import IntArray
 from compd.comparison.criteria import ComparisonCriteria
-from compd.recording.recording import Recording
+from compd.recording import Recording
 
 
 def neighbour_blocks(recording: Recording, blocks: int = ComparisonCriteria.blocks) -> IntArray:

@@ -16,8 +16,7 @@ from pathlib import Path
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
-from compd.configuration import Configuration
-from compd.configuration.shipped import Machine, load_machine, shipped_names
+from compd.configuration import Configuration, Machine, load_machine, shipped_names
 from compd.errors import Problem, RecordingError
 from compd.recording import EXTERNAL, Recording, read_recording, read_sidecar
 

@@ -19,7 +19,7 @@ from scipy.optimize import minimize_scalar
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.fit import FitResult, fit, initial_effect
+from compd.comparison.effect_fit import FitResult, fit, initial_effect
 from compd.comparison.period_search import neighbouring_periods, promising_constants
 from compd.model.effects import ConstantValues, Effect, FittedEffect
 

@@ -7,7 +7,6 @@ from .findings import DiagnosisStep as DiagnosisStep
 from .findings import EmpiricalFinding as EmpiricalFinding
 from .holdout import Holdout as Holdout
 from .holdout import evaluate_holdout as evaluate_holdout
-from .recording_diagnosis import MOST_ROWS as MOST_ROWS
 from .recording_diagnosis import candidate_pool as candidate_pool
 from .recording_diagnosis import diagnose as diagnose
 from .search.gross_rows import RowWeights as RowWeights

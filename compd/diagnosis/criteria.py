@@ -20,9 +20,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from compd.comparison.criteria import threshold
 from compd.diagnosis.candidate_criteria import CandidateCriteria, DescriptionCriteria
-from compd.diagnosis.search_criteria import FoldCriteria, GrossCriteria, PlanningCriteria, SearchCriteria
+from compd.diagnosis.search_criteria import FoldCriteria, GrossCriteria, SearchCriteria
+from compd.planning import PlanningCriteria
+from compd.threshold import threshold
 
 _LOG = "natural logarithm of the mean square"
 

@@ -11,7 +11,7 @@ from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording, Comparison, compare, fit, initial_effect, thinned
 from compd.diagnosis import stages
 from compd.diagnosis.candidate_criteria import CandidateCriteria
-from compd.diagnosis.candidate_results import candidate_results, explained_fraction, why_nothing_else
+from compd.diagnosis.candidate_result import candidate_results, explained_fraction, why_nothing_else
 from compd.diagnosis.candidates.candidates import CandidatePool, library_pool, periodic_candidates
 from compd.diagnosis.candidates.plausibility import estimate_parameters
 from compd.diagnosis.candidates.proxies import proxy_candidates

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from compd.comparison.comparison import Comparison
+from compd.comparison import Comparison
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import (
     CandidateResult,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from compd.comparison import threshold
+from compd.threshold import threshold
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,10 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from compd.api.diagnosis import compare, diagnose
-from compd.api.long_recordings import LongRecording, open_long
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.comparison import Comparison
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.open import open_recording
-from compd.comparison.stream.block_comparison import compare_blocks
-from compd.comparison.stream.recording_stream import is_long
-from compd.configuration import Configuration, load
-from compd.configuration.geometry import LINKS
-from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.model_changes import refit, unrefined
+from compd.api import LongRecording, compare, diagnose, open_long
+from compd.comparison import AlignedRecording, Comparison, ComparisonCriteria, compare_blocks, is_long, open_recording
+from compd.configuration import LINKS, Configuration, load
+from compd.diagnosis import Criteria
 from compd.errors import CompdError, Problem
 from compd.files import file_stamp
 from compd.fleet.fleet_recording import FleetRecording, content_hash
@@ -33,7 +25,7 @@ from compd.fleet.recording_result import (
     FleetEstimate,
     RecordingResult,
 )
-from compd.model_changes import refit_model
+from compd.model_changes import refit_model, unrefined
 from compd.model_file import ModelFile, read_model_file, read_stored
 from compd.recording import EXTERNAL
 from compd.release import __version__
@@ -135,7 +127,7 @@ class Examination:
         after_um = math.nan
         if model is not None and model.fitted:
             refine = unrefined if long is None else long.refine
-            refitted = refit(model, aligned, refine, self.criteria)
+            refitted = refit_model(model, aligned, refine, self.criteria)
             after_um = refitted.steps[-1].rms_after_um
             estimates = [
                 FleetEstimate(number.effect, number.parameter, number.value, number.standard_error, number.unit)

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compd.diagnosis.planning.plan_formats import DWELL_S, PlanFormat, target_bytes
-from compd.diagnosis.search_criteria import PlanningCriteria
-from compd.instruments.writers.gcode import FeedAndDwell
-from compd.instruments.writers.target import Way
-from compd.recording.plan_file import NOT_SET, plan_text, write_text_file
-from compd.tables import Columns, data_frame, html_table
-from compd.text.number_text import join_words
+from compd.instruments import FeedAndDwell, Way
+from compd.plan_file import NOT_SET, plan_text, write_text_file
+from compd.planning.plan_formats import DWELL_S, PlanFormat, target_bytes
+from compd.planning.planning_criteria import PlanningCriteria
+from compd.result_tables import Columns, data_frame, html_table
+from compd.text import join_words
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.statistics.least_squares import solve_least_squares
-from compd.diagnosis.planning.measurement_plan import MeasurementPlan
-from compd.diagnosis.planning.programme_rows import ProgrammeRows, at_rows
-from compd.diagnosis.planning.t_optimal import Predictions, RivalRefit, choose_programmes
-from compd.diagnosis.search_criteria import PlanningCriteria
-from compd.model.effect import ConstantValues, Effect, FittedEffect
+from compd.comparison import AlignedRecording
+from compd.model.effects import ConstantValues, Effect, FittedEffect
+from compd.planning.measurement_plan import MeasurementPlan
+from compd.planning.planning_criteria import PlanningCriteria
+from compd.planning.programme_rows import ProgrammeRows, at_rows
+from compd.planning.t_optimal import Predictions, RivalRefit, choose_programmes
+from compd.statistics import solve_least_squares
 from compd.units import UM_PER_MM
 
 

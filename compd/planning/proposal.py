@@ -9,20 +9,14 @@ from itertools import combinations, permutations
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.diagnosis.planning.measurement_plan import MeasurementPlan, NextMeasurement, as_factor
-from compd.diagnosis.planning.measurement_planner import MeasurementPlanner
-from compd.diagnosis.planning.measurement_programmes import ProgrammeLimits, machine_programmes, recorded_limits
-from compd.diagnosis.planning.measurement_settings import SettingLimits
-from compd.diagnosis.planning.programme_rows import ProgrammeRows
-from compd.diagnosis.planning.setting_programmes import setting_programmes
-from compd.diagnosis.search_criteria import PlanningCriteria
+from compd.comparison import AlignedRecording
 from compd.errors import CompdError, Problem
 from compd.model.effects import ConstantValues, Effect, FittedEffect, needed_quantities, unmet_needs
-from compd.planning.measurement_plan import LEAST_SEPARATION, MeasurementPlan, NextMeasurement, as_factor
+from compd.planning.measurement_plan import MeasurementPlan, NextMeasurement, as_factor
 from compd.planning.measurement_planner import MeasurementPlanner
 from compd.planning.measurement_programmes import ProgrammeLimits, machine_programmes, recorded_limits
 from compd.planning.measurement_settings import SettingLimits
+from compd.planning.planning_criteria import PlanningCriteria
 from compd.planning.programme_rows import ProgrammeRows
 from compd.planning.setting_programmes import setting_programmes
 

@@ -10,9 +10,9 @@ from .least_squares import ridge_inverse as ridge_inverse
 from .least_squares import solve_least_squares as solve_least_squares
 from .least_squares import solve_normal as solve_normal
 from .least_squares import solve_ridge as solve_ridge
+from .period_criteria import PeriodCriteria as PeriodCriteria
 from .periodogram import PeriodLimits as PeriodLimits
 from .periodogram import strongest_periods as strongest_periods
-from .replicates import MOST_ROWS as MOST_ROWS
 from .replicates import replicate_pairs as replicate_pairs
 from .robust import LEAST_SIGMA as LEAST_SIGMA
 from .robust import SCALE_EFFICIENCY as SCALE_EFFICIENCY

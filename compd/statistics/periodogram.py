@@ -30,9 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.criteria import PeriodCriteria
-from compd.comparison.statistics.least_squares import solve_least_squares
-from compd.comparison.statistics.robust import robust_sigma
+from compd.statistics.least_squares import solve_least_squares
+from compd.statistics.period_criteria import PeriodCriteria
+from compd.statistics.robust import robust_sigma
 
 # Frequencies per 1 / span: the power between two of them is at least 0.95 of a peak's (sinc(1/8)^2).
 OVERSAMPLING = 4

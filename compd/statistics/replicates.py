@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.criteria import ComparisonCriteria
 
 
 class ReplicatePairs(NamedTuple):
@@ -33,7 +32,7 @@ class ReplicatePairs(NamedTuple):
 
 
 def replicate_pairs(
-    use: BoolArray, visit: IntArray | None, max_rows: int = ComparisonCriteria.max_rows_of_visit
+    use: BoolArray, visit: IntArray | None, max_rows: int
 ) -> ReplicatePairs | None:
     """The pairs among the rows `use` (N,); None where no visit has two such rows.
 

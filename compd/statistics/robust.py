@@ -20,8 +20,7 @@ from collections.abc import Callable
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.statistics.least_squares import column_norms, solve_least_squares, solve_ridge
+from compd.statistics.least_squares import column_norms, solve_least_squares, solve_ridge
 
 # Rounds of reweighting: the weights settle in three to five.
 ROUNDS = 8
@@ -98,7 +97,8 @@ def huber_weights(
     residual: FloatArray,
     exponent: float = 1.0,
     scale: Callable[[FloatArray], FloatArray] = robust_sigma,
-    huber: float = ComparisonCriteria.huber_sigmas,
+    *,
+    huber: float,
 ) -> FloatArray:
     """(N,) weight of each row of a residual (N, m) by its worst coordinate.
 
@@ -118,7 +118,7 @@ def robust_regression(
     exponent: float = 1.0,
     rounds: int = ROUNDS,
     scale: Callable[[FloatArray], FloatArray] = robust_sigma,
-    huber: float = ComparisonCriteria.huber_sigmas,
+    huber: float,
 ) -> FloatArray:
     """(P,) parameters theta of y = G theta, by iteratively reweighted least squares.
 
@@ -141,5 +141,5 @@ def robust_regression(
         else:
             weighted = A * row_weights[:, None]
             theta = solve_ridge(weighted.T @ A, weighted.T @ flat, np.full(P, ridge))
-        weights = huber_weights((flat - A @ theta).reshape(N, m), exponent, scale, huber)
+        weights = huber_weights((flat - A @ theta).reshape(N, m), exponent, scale, huber=huber)
     return np.asarray(theta / norms)

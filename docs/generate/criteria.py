@@ -8,9 +8,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from compd.comparison.criteria import ComparisonCriteria, thresholds
-from compd.diagnosis.criteria import Criteria
+from compd.comparison import ComparisonCriteria
+from compd.diagnosis import Criteria
 from compd.fleet.criteria import FleetCriteria
+from compd.threshold import thresholds
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target, term
 
 # Written by `python -m tests.scoreboard.sensitivity --figures`.

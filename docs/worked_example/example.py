@@ -21,8 +21,6 @@ from compd.diagnosis.recording_diagnosis import explain_residual
 from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.gross_rows import ROUNDS
-from compd.diagnosis.search.problem import DiagnosisProblem
-from compd.diagnosis.verdict import Diagnosis
 from compd.model.library import load_library
 from compd.statistics import robust_regression, trimmed_scale
 
@@ -90,6 +88,7 @@ def _robust_fit(problem: DiagnosisProblem, candidate: Candidate) -> FloatArray:
         exponent=gross.exponent,
         rounds=ROUNDS,
         scale=trimmed_scale,
+        huber=problem.aligned.criteria.huber_sigmas,
     )
 
 

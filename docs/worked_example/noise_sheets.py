@@ -17,7 +17,7 @@ STEPS, PASSES = 40, 3
 def write_noise(sheets: Sheets) -> None:
     """Differences of repeats, their robust scale by iteration, and the declaration."""
     comparison = sheets.example.problem.comparison
-    pairs = replicate_pairs(comparison.used, comparison.aligned.recording.visit)
+    pairs = replicate_pairs(comparison.used, comparison.aligned.recording.visit, comparison.criteria.max_rows_of_visit)
     assert pairs is not None
     numbers = comparison.aligned.recording.row
     row = sheets.column("Rows", "row")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from compd.comparison.criteria import ComparisonCriteria, thresholds
-from compd.diagnosis.criteria import Criteria
+from compd.comparison import ComparisonCriteria
+from compd.diagnosis import Criteria
+from compd.threshold import thresholds
 from docs.worked_example.sheets import AXES, Sheets
 from docs.worked_example.spreadsheet import Address
 

@@ -16,9 +16,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compd.comparison.criteria import thresholds as thresholds_of
-from compd.comparison.criteria import with_value
-from compd.diagnosis.criteria import Criteria
+from compd.diagnosis import Criteria
+from compd.threshold import thresholds as thresholds_of
+from compd.threshold import with_value
 from tests.scoreboard.parallel import append_results, read_results
 from tests.scoreboard.scoring import Result, score
 from tests.scoreboard.trial import prepared, read_answer, run

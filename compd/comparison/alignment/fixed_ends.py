@@ -20,8 +20,6 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.statistics.least_squares import solve_least_squares
-from compd.comparison.statistics.robust import robust_regression
 from compd.errors import Problem, RecordingError
 from compd.statistics import robust_regression, solve_least_squares
 

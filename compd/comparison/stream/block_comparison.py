@@ -10,6 +10,7 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import NO_QUANTITY
 from compd.comparison.contributions import deltas_without
+from compd.comparison.recording_comparison import compare
 from compd.comparison.stream.block_queue import HandOver, computed_blocks
 from compd.comparison.stream.carried_effects import NOTHING_CARRIED, CarriedState, advance_effects
 from compd.comparison.stream.fixed_terms import NOTHING, BlockNuisance, FixedTerms, fixed_terms

@@ -15,7 +15,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.fit import CONVERGED, LEAST_RMS_UM, STEPS, FitResult
+from compd.comparison.effect_fit import CONVERGED, LEAST_RMS_UM, STEPS, FitResult
 from compd.comparison.initial_states import initial_states
 from compd.comparison.nuisance import nuisance_columns
 from compd.comparison.outliers import OutlierLimits, outlier_limits

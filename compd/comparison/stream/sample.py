@@ -19,7 +19,6 @@ from compd.machine_builder import build_model
 from compd.model import MachineModel
 from compd.model.effects import Observations
 from compd.recording import Recording
-from compd.statistics import MOST_ROWS as MOST_ROWS_OF_VISIT
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.period_search import longest_period, promising_constants
+from compd.comparison import AlignedRecording, longest_period, promising_constants
 from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.model.effects import ConstantValues, Effect, unmet_needs

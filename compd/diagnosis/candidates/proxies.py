@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.candidates import Candidate, searched_parameters, variant
-from compd.model.effect import Effect
-from compd.model.effect_needs import needed_quantities, unmet_needs
+from compd.model.effects import Effect, needed_quantities, unmet_needs
 
 _PREFIX = "temperature_"
 

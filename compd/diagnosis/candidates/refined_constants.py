@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.period_search import neighbouring_periods
+from compd.comparison import AlignedRecording, neighbouring_periods
 from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.candidates import Candidate, variant
 

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.criteria import PeriodCriteria
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidate_criteria import DescriptionCriteria
 from compd.diagnosis.descriptions.search_covariates import (
     STAYED_THE_SAME,
@@ -24,9 +23,9 @@ from compd.diagnosis.descriptions.search_covariates import (
 )
 from compd.diagnosis.descriptions.term_formula import CONSTANTS, PARAMETERS, formula_text
 from compd.diagnosis.descriptions.term_grids import ROUNDING, knees, periods, refined_periods, step_times_s
-from compd.model.effect import Effect, Port
-from compd.model.effect_basis import evaluate_basis
+from compd.model.effects import Effect, Port, evaluate_basis
 from compd.model.library import find_effect
+from compd.statistics import PeriodCriteria
 from compd.units import UM_PER_MM, unit_of
 
 _LINK = re.compile(r"^(?P<what>[a-z][a-z0-9_]*)_link_(?P<link>\d+)_(?P<unit>[A-Za-z]\w*)$")

@@ -7,11 +7,9 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.criteria import PeriodCriteria
-from compd.comparison.statistics.periodogram import PeriodLimits, strongest_periods
 from compd.diagnosis.candidate_criteria import DescriptionCriteria
 from compd.diagnosis.descriptions.search_covariates import SearchCovariate, round_within
-from compd.statistics import PeriodLimits, strongest_periods
+from compd.statistics import PeriodCriteria, PeriodLimits, strongest_periods
 from compd.units import unit_of
 
 TURN = {"deg": 360.0, "rad": 2 * math.pi}

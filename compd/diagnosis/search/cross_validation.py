@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.search_criteria import FoldCriteria
 from compd.errors import Problem, RecordingError
-from compd.recording.sidecar import PLACE, TIME
+from compd.recording import PLACE, TIME
 
 
 def row_splits(aligned: AlignedRecording, criteria: FoldCriteria = FoldCriteria()) -> tuple[IntArray, ...]:

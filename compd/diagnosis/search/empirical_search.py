@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.descriptions.empirical_terms import EmpiricalTerm, empirical_terms

@@ -10,11 +10,11 @@ import numpy as np
 from scipy.special import chdtr, chdtrc, gammaln
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.statistics.robust import LEAST_SIGMA, robust_regression, trimmed_scale
+from compd.comparison import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import GrossRows
 from compd.diagnosis.search_criteria import GrossCriteria
+from compd.statistics import LEAST_SIGMA, robust_regression, trimmed_scale
 
 # Rounds of reweighting: with the exponent of the criteria the weights settle in about ten.
 ROUNDS = 12

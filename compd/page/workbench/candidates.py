@@ -9,19 +9,22 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison.compare import compare
-from compd.comparison.comparison import Comparison
-from compd.comparison.thinning import thinned
-from compd.diagnosis.candidate_results import candidate_results
-from compd.diagnosis.candidates.candidates import Candidate
-from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.diagnose import candidate_pool
-from compd.diagnosis.findings import CandidateResult, DiagnosisStep
-from compd.diagnosis.search.gross_rows import RowWeights
-from compd.diagnosis.search.problem import DiagnosisProblem, build_problem, fitted_along_columns
-from compd.diagnosis.search.rivals import collinearity
-from compd.diagnosis.search.subset_losses import SubsetLosses
-from compd.model.effect import Effect
+from compd.comparison import Comparison, compare, thinned
+from compd.diagnosis import (
+    Candidate,
+    CandidateResult,
+    Criteria,
+    DiagnosisProblem,
+    DiagnosisStep,
+    RowWeights,
+    SubsetLosses,
+    build_problem,
+    candidate_pool,
+    candidate_results,
+    collinearity,
+    fitted_along_columns,
+)
+from compd.model.effects import Effect
 from compd.page.workbench.trial import Trial, trial
 from compd.text import nan_to_null
 from compd.units import UM_PER_MM

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.criteria import ComparisonCriteria, thresholds, with_value
+from compd.comparison import AlignedRecording, ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
 from compd.fleet.criteria import FleetCriteria
+from compd.threshold import thresholds, with_value
 from tests.support.external_recordings import along, record_external
 
 ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis", "fleet")]

@@ -105,7 +105,7 @@ def test_no_call_leaves_criteria_to_their_defaults(package: str) -> None:
 def test_a_call_that_leaves_them_is_found(tmp_path: Path) -> None:
     path = tmp_path / "module.py"
     path.write_text(
-        "from compd.comparison.neighbour_blocks import neighbour_blocks as cut\n"
+        "from compd.comparison.neighbour_block import neighbour_blocks as cut\n"
         "cut(recording)\n"
         "cut(recording, 3)\n"
         "cut(recording, blocks=3)\n",

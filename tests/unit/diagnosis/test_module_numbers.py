@@ -11,7 +11,7 @@ import pytest
 import compd
 
 ROOT = Path(compd.__file__).parent
-PACKAGES = ("comparison", "diagnosis", "fleet")
+PACKAGES = ("comparison", "diagnosis", "fleet", "planning", "statistics")
 
 ROUNDING = "numerics: what rounding may do"
 CONDITIONING = "numerics: conditioning of equations"
@@ -36,26 +36,26 @@ NUMBERS = {
         "FEWEST_POINTS": DEFINITION,
         "LEAST_SPREAD_MM": ROUNDING,
     },
-    "comparison/compare.py": {"NUISANCE_ROUNDS": ITERATION},
+    "comparison/recording_comparison.py": {"NUISANCE_ROUNDS": ITERATION},
     "comparison/comparison.py": {"MOST_TRENDS": WORDS},
-    "comparison/fit.py": {"STEPS": ITERATION, "ROUNDS": ITERATION, "CONVERGED": ITERATION, "LEAST_RMS_UM": ROUNDING},
+    "comparison/effect_fit.py": {"STEPS": ITERATION, "ROUNDS": ITERATION, "CONVERGED": ITERATION, "LEAST_RMS_UM": ROUNDING},
     "comparison/noise_floor.py": {"DIFFERENCE_VARIANCE": DEFINITION},
     "comparison/nuisance.py": {"LEAST_SHARE": CONDITIONING},
     "comparison/shape_search.py": {"FINE": ITERATION},
-    "comparison/statistics/last_digit.py": {"PER_STEP": DEFINITION, "STEPS_UM": DEFINITION},
-    "comparison/statistics/least_squares.py": {
+    "statistics/last_digit.py": {"PER_STEP": DEFINITION, "STEPS_UM": DEFINITION},
+    "statistics/least_squares.py": {
         "RANK_CUT": CONDITIONING,
         "DIAGONAL_GUARD": CONDITIONING,
         "SHARE_OF_COMBINATION": CONDITIONING,
     },
-    "comparison/statistics/periodogram.py": {
+    "statistics/periodogram.py": {
         "OVERSAMPLING": ITERATION,
         "LOBES": DEFINITION,
         "LEAST_SPAN": ROUNDING,
         "REFINED": ITERATION,
         "LEAST_DETERMINANT": CONDITIONING,
     },
-    "comparison/statistics/robust.py": {
+    "statistics/robust.py": {
         "ROUNDS": ITERATION,
         "LEAST_SIGMA": ROUNDING,
         "MEDIAN_OF_NORMAL": DEFINITION,
@@ -85,15 +85,15 @@ NUMBERS = {
     },
     "diagnosis/descriptions/search_covariates.py": {"LEAST_CHANGE": ROUNDING, "MIDDLE_SHARE": WORDS},
     "diagnosis/descriptions/term_grids.py": {"TURN": DEFINITION, "ROUNDING": WORDS},
-    "diagnosis/planning/measurement_plan.py": {"LEAST_SHOWN": WORDS, "MOST_VALUES": WORDS},
-    "diagnosis/planning/measurement_programmes.py": {
+    "planning/measurement_plan.py": {"LEAST_SHOWN": WORDS, "MOST_VALUES": WORDS},
+    "planning/measurement_programmes.py": {
         "PLACES_PER_EDGE": PLAN,
         "LOADS": PLAN,
         "SPEEDS": PLAN,
         "ROW_EVERY_S": PLAN,
         "WORKSPACE_QUANTILES": PLAN,
     },
-    "diagnosis/planning/measurement_settings.py": {
+    "planning/measurement_settings.py": {
         "MOST_STEPS": PLAN,
         "DIRECTIONS": PLAN,
         "MOST_COMBINATIONS": PLAN,
@@ -102,11 +102,11 @@ NUMBERS = {
         "TIED": PLAN,
         "DIGITS_OF_RANGE": PLAN,
     },
-    "diagnosis/planning/plan_formats.py": {"DWELL_S": PLAN, "_NAME_DIGITS": WORDS},
-    "diagnosis/planning/programme_rows.py": {"WAITS": PLAN, "STEP_S": PLAN, "REVERSALS_MM": PLAN},
-    "diagnosis/planning/setting_programmes.py": {"WATCHED_S": PLAN, "PROBED_ROWS": PLAN},
-    "diagnosis/planning/t_optimal.py": {"RIDGE": CONDITIONING, "LEAST_RIDGE": CONDITIONING},
-    "diagnosis/planning/tip_ways.py": {"TRAVEL_MM": PLAN, "LONGEST_MM": PLAN, "STEADY_S": PLAN, "_STEP_MM": ITERATION},
+    "planning/plan_formats.py": {"DWELL_S": PLAN, "_NAME_DIGITS": WORDS},
+    "planning/programme_rows.py": {"WAITS": PLAN, "STEP_S": PLAN, "REVERSALS_MM": PLAN},
+    "planning/setting_programmes.py": {"WATCHED_S": PLAN, "PROBED_ROWS": PLAN},
+    "planning/t_optimal.py": {"RIDGE": CONDITIONING, "LEAST_RIDGE": CONDITIONING},
+    "planning/tip_ways.py": {"TRAVEL_MM": PLAN, "LONGEST_MM": PLAN, "STEADY_S": PLAN, "_STEP_MM": ITERATION},
     "diagnosis/proposed_measurement.py": {"MOST_COVARIATES": WORDS},
     "diagnosis/search/empirical_search.py": {"BATCH": MEMORY},
     "diagnosis/search/gross_rows.py": {"ROUNDS": ITERATION},
@@ -135,7 +135,7 @@ NUMBERS = {
         "_PALE": WORDS,
     },
     "fleet/engine.py": {"LONGEST_WITHOUT_WORKERS_S": MEMORY, "_FEWEST_BATCHES": MEMORY, "LOOK_EVERY_S": MEMORY},
-    "fleet/examination.py": {"MOST_KEPT": MEMORY},
+    "fleet/machine_examination.py": {"MOST_KEPT": MEMORY},
     "fleet/examine.py": {"BATCH": MEMORY},
     "fleet/fleet_figures.py": {"MOST_PANELS": WORDS, "PANEL_PX": WORDS},
     "fleet/outlying.py": {"_SIGMA_OF_MAD": DEFINITION, "_OF_MEDIAN": DEFINITION},
@@ -152,15 +152,15 @@ IN_FUNCTIONS = {
     "comparison/alignment/fixed_ends.py": {5: WORDS},
     "comparison/alignment/measured_attitude.py": {6: "columns of a rigid motion"},
     "comparison/comparison.py": {0.95: "P95, a quantile that is reported"},
-    "comparison/covariates.py": {3600: DEFINITION},
-    "comparison/statistics/cluster_covariance.py": {0.95: DEFINITION},
-    "comparison/statistics/robust.py": {0.95: DEFINITION},
+    "comparison/covariate.py": {3600: DEFINITION},
+    "statistics/covariance.py": {0.95: DEFINITION},
+    "statistics/robust.py": {0.95: DEFINITION},
     "comparison/stream/residual_totals.py": {0.95: "P95, a quantile that is reported"},
     "diagnosis/candidates/constant.py": {4: "axes of an attitude", 5: "axes of an attitude", 6: "axes of a motion"},
     "diagnosis/descriptions/search_covariates.py": {17: "digits of a double"},
-    "diagnosis/planning/measurement_plan.py": {10: WORDS},
-    "diagnosis/planning/measurement_programmes.py": {4: PLAN, 9: "numbers of the frame"},
-    "diagnosis/planning/measurement_settings.py": {10: "decimals"},
+    "planning/measurement_plan.py": {10: WORDS},
+    "planning/measurement_programmes.py": {4: PLAN, 9: "numbers of the frame"},
+    "planning/measurement_settings.py": {10: "decimals"},
 }
 PICTURES = ("fleet/effect_matrix.py", "fleet/fleet_figures.py")
 

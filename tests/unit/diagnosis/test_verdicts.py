@@ -11,7 +11,7 @@ import pytest
 
 from compd.arrays import FloatArray
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.search_criteria import SearchCriteria
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effects import Effect

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from compd.comparison.criteria import ComparisonCriteria, thresholds
-from compd.configuration.machine_configuration import SECTIONS
-from compd.configuration.schema import json_schema
-from compd.diagnosis.criteria import Criteria
+from compd.columns import COLUMN_KINDS, parse_name
+from compd.comparison import ComparisonCriteria
+from compd.configuration import SECTIONS, json_schema
+from compd.diagnosis import Criteria
 from compd.fleet.criteria import FleetCriteria
 from compd.gauge import Quality
 from compd.live.loop import Setpoint
@@ -34,6 +34,7 @@ from compd.recording.checks import LIMITS
 from compd.recording.reference import Reference
 from compd.recording.sidecar import Exclusion
 from compd.setpoint_states import Mode, State
+from compd.threshold import thresholds
 from docs.generate import __main__ as generate
 from docs.generate.commands import CommandEntry, entries
 from docs.generate.live_examples import Exchange

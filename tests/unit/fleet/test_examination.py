@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 import compd
-from compd.comparison.criteria import ComparisonCriteria
-from compd.diagnosis.criteria import Criteria
+from compd.comparison import ComparisonCriteria
+from compd.diagnosis import Criteria
 from compd.errors import CompdError
 from compd.fleet import machine_examination as module
 from compd.fleet.fleet_recording import FleetRecording

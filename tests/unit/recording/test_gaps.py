@@ -6,11 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.comparison.compare import compare
-from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.open import open_recording
+from compd.comparison import ComparisonCriteria, compare, open_recording
 from compd.comparison.residual_trends import Trend
-from compd.recording.gaps import filled
+from compd.statistics import filled
 from tests.support.external import measured_places, write_external
 
 NAN = np.nan

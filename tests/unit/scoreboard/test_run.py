@@ -7,9 +7,9 @@ import json
 import pytest
 import yaml
 
-from compd.comparison.criteria import value_of
-from compd.diagnosis.criteria import Criteria
-from compd.model.library.effects_file import load_effects
+from compd.diagnosis import Criteria
+from compd.model.library import load_effects
+from compd.threshold import value_of
 from tests.scoreboard.cases import Case
 from tests.scoreboard.page import write_page
 from tests.scoreboard.prepare import prepare

@@ -7,13 +7,7 @@ import pytest
 
 from compd.comparison.alignment.registration import register
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.statistics.robust import (
-    SCALE_EFFICIENCY,
-    huber_weights,
-    robust_regression,
-    robust_sigma,
-    trimmed_scale,
-)
+from compd.statistics import SCALE_EFFICIENCY, huber_weights, robust_regression, robust_sigma, trimmed_scale
 
 RNG = np.random.default_rng(12)
 
@@ -72,7 +66,7 @@ def test_trimmed_scale_by_weight_and_of_nothing_but_zeros() -> None:
 def test_weights_hold_back_the_worst_coordinate() -> None:
     residual = RNG.normal(0, 1.0, (2000, 2))
     residual[0] = [0.0, 25.0 * robust_sigma(residual)[1]]
-    once, twice = huber_weights(residual), huber_weights(residual, exponent=2.0)
+    once, twice = huber_weights(residual, huber=2.5), huber_weights(residual, exponent=2.0, huber=2.5)
     np.testing.assert_allclose(once[0], ComparisonCriteria.huber_sigmas / 25.0, rtol=0.01)
     np.testing.assert_allclose(twice, once**2)
     assert (once[np.abs(residual).max(axis=1) < 2.0] == 1.0).all()
@@ -83,10 +77,10 @@ def test_regression_with_outliers_and_with_ridge() -> None:
     theta = np.array([1.0, 0.0, -3.0, 20.0])
     y = G @ theta + RNG.normal(0, 0.01, (300, 3))
     y[::30] += 100.0
-    np.testing.assert_allclose(robust_regression(G, y, rounds=12, exponent=2.0), theta, atol=0.02)
+    np.testing.assert_allclose(robust_regression(G, y, rounds=12, exponent=2.0, huber=2.5), theta, atol=0.02)
     copied = np.concatenate([G, G], axis=2)
     np.testing.assert_allclose(
-        robust_regression(copied, y, ridge=1e-6, exponent=2.0, rounds=12), np.tile(theta / 2, 2), atol=0.02
+        robust_regression(copied, y, ridge=1e-6, exponent=2.0, rounds=12, huber=2.5), np.tile(theta / 2, 2), atol=0.02
     )
 
 

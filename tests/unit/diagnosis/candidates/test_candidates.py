@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.open import open_recording
+from compd.comparison import AlignedRecording, open_recording
 from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.candidates import (
     CandidatePool,

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.candidates import library_pool
 from compd.diagnosis.candidates.changes import change_candidates, moments_s
-from compd.diagnosis.diagnose import diagnose
+from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.words.summary_lines import summary_lines
 from tests.support.external_recordings import along, record_external
 from tests.support.hidden_effects import LIBRARY, record_with_effects

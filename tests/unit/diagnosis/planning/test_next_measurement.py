@@ -15,20 +15,20 @@ from typer.testing import CliRunner
 import compd
 from compd.cli.measurements.diagnose import diagnose as diagnose_command
 from compd.cli.measurements.plan import plan as plan_command
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.shape_search import search_constants
-from compd.diagnosis.planning.measurement_plan import MeasurementPlan, NextMeasurement
-from compd.diagnosis.planning.measurement_programmes import ProgrammeLimits, recorded_limits
-from compd.diagnosis.planning.next_measurement import (
+from compd.comparison import AlignedRecording, search_constants
+from compd.errors import CompdError, RecordingError
+from compd.model.effects import FittedEffect
+from compd.planning import (
+    MeasurementPlan,
+    PlanningCriteria,
+    ProgrammeLimits,
     measurement_of_constant,
     measurement_to_test,
     next_measurement,
     plan_measurement,
     recorded_limits,
 )
-from compd.diagnosis.search_criteria import PlanningCriteria
-from compd.errors import CompdError, RecordingError
-from compd.model.effect import FittedEffect
+from compd.planning.measurement_plan import NextMeasurement
 from tests.support.hidden_effects import LIBRARY, NOISE_UM, record_with_effects
 
 SIGMA_UM = np.full(3, NOISE_UM)

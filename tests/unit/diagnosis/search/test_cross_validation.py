@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison.open import open_recording
+from compd.comparison import open_recording
 from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search_criteria import FoldCriteria
 from compd.errors import RecordingError
