@@ -91,7 +91,7 @@ class QuantityTrust:
         memory, i = self._memory, self._i
         memory.show(i, reading.value, reading.time_s)
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
-            return self._accepted(reading, first)
+            return self._judge_after_acceptance(reading, first)
         if memory.voted[i] != memory.handled[i]:
             memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
@@ -124,7 +124,7 @@ class QuantityTrust:
             self._expected, self._expected_s = float(memory.value[i]), float(memory.time_s[i])
         return not math.isnan(self._expected)
 
-    def _accepted(self, reading: Reading, first: Reading) -> Reading:
+    def _judge_after_acceptance(self, reading: Reading, first: Reading) -> Reading:
         """The readings after a person's acceptance: two plausible ones must agree, whatever came before."""
         memory, i = self._memory, self._i
         self._expected, self._implausible_s = math.nan, 0.0
