@@ -145,7 +145,7 @@ def _not_given(count: int, links: int) -> FloatArray:
 
 
 def _uninitialised(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:
-    """So many structures, not filled; `np.empty` takes 5 us for nested ones."""
+    """`count` uninitialised structures; `np.empty` takes 5 us for nested ones."""
     return np.ndarray(count, structure, np.empty(count * structure.itemsize, dtype=np.uint8))
 
 

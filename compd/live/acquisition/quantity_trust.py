@@ -91,7 +91,7 @@ class QuantityTrust:
         memory, i = self._memory, self._i
         memory.show(i, reading.value, reading.time_s)
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
-            return self._accepted(reading, first)
+            return self._judge_after_acceptance(reading, first)
         if memory.voted[i] != memory.handled[i]:
             memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
@@ -107,12 +107,12 @@ class QuantityTrust:
                     self._implausible_s = max(0.0, self._implausible_s - share_s)
                 if not known:
                     return self._begin(each, candidates)
-                return self._held(each) if any(faults) or self._implausible_s > 0.0 else self._believed(each)
+                return self._hold(each) if any(faults) or self._implausible_s > 0.0 else self._accept(each)
         assert faults[0] is not None
         self._implausible_s += share_s
         if self._implausible_s < LASTING_S:
             return bad(reading.time_s, Quality.MISMATCH, faults[0].text)
-        return self._distrusted(reading, faults[0])
+        return self._distrust(reading, faults[0])
 
     def _recall(self) -> bool:
         """Whether a reading is known that the next one follows; that of another process counts, too."""
@@ -124,7 +124,7 @@ class QuantityTrust:
             self._expected, self._expected_s = float(memory.value[i]), float(memory.time_s[i])
         return not math.isnan(self._expected)
 
-    def _accepted(self, reading: Reading, first: Reading) -> Reading:
+    def _judge_after_acceptance(self, reading: Reading, first: Reading) -> Reading:
         """The readings after a person's acceptance: two plausible ones must agree, whatever came before."""
         memory, i = self._memory, self._i
         self._expected, self._implausible_s = math.nan, 0.0
@@ -133,7 +133,7 @@ class QuantityTrust:
             return unconfirmed
         memory.end_order(i)
         memory.handled[i] = memory.voted[i]
-        return self._distrusted(reading, fault) if fault else self._from(reading.value, reading)
+        return self._distrust(reading, fault) if fault else self._from(reading.value, reading)
 
     def _begin(self, reading: Reading, answers: tuple[Reading, ...]) -> Reading:
         """The first readings: two answers agree, and the neighbours, if there are any, have been read."""
@@ -159,7 +159,7 @@ class QuantityTrust:
         """Readings that scatter from the start: a later agreement is chance."""
         self._implausible_s += min(reading.time_s - self._first[-2].time_s, _LONGEST_SHARE_S)
         if self._implausible_s >= LASTING_S:
-            return self._distrusted(reading, _Fault(Doubt.JUMPED, scatter, ""))
+            return self._distrust(reading, _Fault(Doubt.JUMPED, scatter, ""))
         return bad(reading.time_s, Quality.MISMATCH, f"its first readings scatter by {scatter:.3g} {self._unit}")
 
     def _unconfirmed(self, answers: tuple[Reading, ...]) -> Reading | None:
@@ -176,22 +176,22 @@ class QuantityTrust:
         """Follow the readings from this value on."""
         self._first.clear()
         self._expected, self._expected_s = value, reading.time_s
-        return self._believed(reading)
+        return self._accept(reading)
 
-    def _believed(self, reading: Reading) -> Reading:
+    def _accept(self, reading: Reading) -> Reading:
         change = self._possible_change(reading.time_s, self._expected_s)
         self._expected = min(max(reading.value, self._expected - change), self._expected + change)
         self._expected_s = reading.time_s
         self._memory.believe(self._i, self._expected, reading.time_s)
         return reading._replace(value=self._expected)
 
-    def _held(self, reading: Reading) -> Reading:
+    def _hold(self, reading: Reading) -> Reading:
         """A plausible reading among implausible ones: chance, for a noisy quantity or one that runs away."""
         self._expected_s = reading.time_s
         self._memory.believe(self._i, self._expected, reading.time_s)
         return reading._replace(value=self._expected)
 
-    def _distrusted(self, reading: Reading, fault: _Fault) -> Reading:
+    def _distrust(self, reading: Reading, fault: _Fault) -> Reading:
         self._implausible_s = 0.0
         self._memory.distrust(self._i, fault.doubt, fault.amount)
         return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i))

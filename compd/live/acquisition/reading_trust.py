@@ -148,12 +148,12 @@ class ReadingTrust:
             memory.lose(i, sample.time_s)
         doubt = Doubt(int(memory.doubt[i]))
         if doubt.until_accepted:
-            return self._refused(reading)
+            return self._reject(reading)
         if doubt is Doubt.LOST:
-            return self._returned(reading, sample, first)
+            return self._judge_after_absence(reading, sample, first)
         if not self._recall():
             return self._begin(reading, sample, first)
-        return self._continued(reading, sample, first)
+        return self._judge_continuing(reading, sample, first)
 
     def _recall(self) -> bool:
         """Whether the next reading has a predecessor, in this process or another one."""
@@ -177,9 +177,9 @@ class ReadingTrust:
             )
         self._history.clear()
         self._memory.begin(self._i)
-        return self._believed(reading, sample)
+        return self._accept(reading, sample)
 
-    def _believed(self, reading: Reading, sample: GaugeSample) -> Reading:
+    def _accept(self, reading: Reading, sample: GaugeSample) -> Reading:
         self._missed = False
         self._after.clear()
         self._latest.note(sample.value, self._unexplained_mm(sample))
@@ -214,11 +214,11 @@ class ReadingTrust:
             memory.stepped_s[i] = step.time_s
             memory.stepped[i] += 1  # last: it marks the others as complete
 
-    def _refused(self, reading: Reading) -> Reading:
+    def _reject(self, reading: Reading) -> Reading:
         limits = self._limits_text() if self._memory.doubt[self._i] == Doubt.JUMPED else ""
         return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i) + limits)
 
-    def _returned(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
+    def _judge_after_absence(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
         """The first readings of a gauge that was away."""
         memory, i = self._memory, self._i
         if not self._back_s >= memory.lost_s[i]:
@@ -234,19 +234,19 @@ class ReadingTrust:
             )
         if abs(away_mm) > self._tolerance_mm:
             memory.distrust(i, Doubt.RETURNED, away_mm)
-            return self._refused(reading)
+            return self._reject(reading)
         moved, compared = moved_while_away(memory, i, self._back_s, sample.time_s)
         if not compared:
             return bad(reading.time_s, Quality.STALE, "is back; the other gauges are not yet")
         if moved is not None:
             memory.distrust(i, Doubt.MOVED_MEANWHILE, moved)
-            return self._refused(reading)
+            return self._reject(reading)
         if memory.power_lost[i] and i < memory.scales and abs(sample.value) <= self._tolerance_mm:
             memory.distrust(i, Doubt.AT_ZERO, 0.0)
-            return self._refused(reading)
+            return self._reject(reading)
         return self._begin(reading, sample, first)
 
-    def _continued(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
+    def _judge_continuing(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
         """A reading with predecessors, of a gauge without an absence.
 
         The second answer of a gauge that was latched is the same sample once more: it says whether the first one was
@@ -255,11 +255,11 @@ class ReadingTrust:
         earlier = None if first is None else GaugeSample(first.value, first.time_s, sample.window_s)
         needs_evidence = self._needs_evidence(sample)
         if self._is_expected(sample) and not needs_evidence:
-            return self._believed(reading, sample)
+            return self._accept(reading, sample)
         if first is None or earlier is None:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
         if self._is_expected(earlier) and not self._needs_evidence(earlier):
-            return self._believed(first, earlier)
+            return self._accept(first, earlier)
         if abs(sample.value - earlier.value) > self._tolerance_mm:  # one answer may be damaged; two are not
             self._latest.note(earlier.value)
         last = self._history[-1]
@@ -277,10 +277,10 @@ class ReadingTrust:
                 return self._compared(reading, earlier, sample)
             if not latched:
                 self._remember(earlier)
-            return self._believed(reading, sample)
+            return self._accept(reading, sample)
         if stays:
             self._memory.distrust(self._i, Doubt.JUMPED, sample.value - last.value)
-            return self._refused(reading)
+            return self._reject(reading)
         self._latest.note(sample.value)
         values = ", ".join(f"{value:.4f}" for value in (last.value, earlier.value, sample.value))
         return bad(reading.time_s, Quality.MISMATCH, f"no two of three values agree: {values} mm{self._limits_text()}")
@@ -332,14 +332,14 @@ class ReadingTrust:
             return waits
         expected = by_links or by_itself
         memory.distrust(i, Doubt.RETURNED, way_mm - (expected.way_mm if expected else 0.0))
-        return self._refused(reading)
+        return self._reject(reading)
 
     def _accounted_for(self, reading: Reading, sample: GaugeSample) -> Reading:
         """A value after a gap, with the readings since."""
         for later in self._after:
             if later.time_s < sample.time_s:
                 self._remember(later)
-        return self._believed(reading, sample)
+        return self._accept(reading, sample)
 
     def _is_from_rest_to_rest(self, before: Interval, first: GaugeSample, second: GaugeSample) -> bool:
         """Whether the part was at rest before and two answers show it at rest again."""
