@@ -7,7 +7,7 @@ of which one is an outlier (G has one row of one coordinate for each)::
     >>> x = np.arange(50.0)
     >>> y = 2.0 * x + 0.1 * (-1.0) ** x
     >>> y[49] += 1000.0  # plain least squares gives a slope of 3.21
-    >>> robust_regression(x[:, None, None], y[:, None]).round(3)
+    >>> robust_regression(x[:, None, None], y[:, None], huber=2.5).round(3)
     array([2.001])
 
 Source: P. J. Huber, Robust Statistics, Wiley 1981, chapters 5 (scale) and 7 (regression).

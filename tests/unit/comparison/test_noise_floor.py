@@ -69,7 +69,7 @@ def test_rows_that_are_not_used_are_no_repeats() -> None:
 
 def test_all_pairs_have_the_degrees_of_freedom_of_their_visits() -> None:
     visit = np.repeat([3, -1, 7, 8], [4, 5, 2, 100])
-    found = replicate_pairs(np.ones(len(visit), dtype=bool), visit, 40)
+    found = replicate_pairs(np.ones(len(visit), dtype=bool), visit, 12)
     assert found is not None
     assert found.dof == pytest.approx(3 + 1 + 11)
     assert (visit[found.first] == visit[found.second]).all()

@@ -19,7 +19,7 @@ from compd.fleet.criteria import FleetCriteria
 from compd.threshold import thresholds, with_value
 from tests.support.external_recordings import along, record_external
 
-ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis", "fleet")]
+ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis", "fleet", "planning", "statistics")]
 KINDS = (Criteria, ComparisonCriteria, FleetCriteria)
 THRESHOLDS = {name: field for kind in KINDS for name, field in thresholds(kind).items()}
 ROWS = 240

@@ -38,7 +38,12 @@ NUMBERS = {
     },
     "comparison/recording_comparison.py": {"NUISANCE_ROUNDS": ITERATION},
     "comparison/comparison.py": {"MOST_TRENDS": WORDS},
-    "comparison/effect_fit.py": {"STEPS": ITERATION, "ROUNDS": ITERATION, "CONVERGED": ITERATION, "LEAST_RMS_UM": ROUNDING},
+    "comparison/effect_fit.py": {
+        "STEPS": ITERATION,
+        "ROUNDS": ITERATION,
+        "CONVERGED": ITERATION,
+        "LEAST_RMS_UM": ROUNDING,
+    },
     "comparison/noise_floor.py": {"DIFFERENCE_VARIANCE": DEFINITION},
     "comparison/nuisance.py": {"LEAST_SHARE": CONDITIONING},
     "comparison/shape_search.py": {"FINE": ITERATION},
