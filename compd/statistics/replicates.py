@@ -31,9 +31,7 @@ class ReplicatePairs(NamedTuple):
         return np.asarray((values[self.first] - values[self.second]) / np.sqrt(2.0))
 
 
-def replicate_pairs(
-    use: BoolArray, visit: IntArray | None, max_rows: int
-) -> ReplicatePairs | None:
+def replicate_pairs(use: BoolArray, visit: IntArray | None, max_rows: int) -> ReplicatePairs | None:
     """The pairs among the rows `use` (N,); None where no visit has two such rows.
 
     visit : (N,) number of the visit, negative for none; None where it was not recorded.
