@@ -20,7 +20,7 @@ from compd.line_settings import LineSettings
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
-    from compd.finding import Computer, Finding
+    from compd.probes.finding import Computer, Finding
     from compd.line_settings import Pace
     from compd.lines.line import Line, WrapPort
     from compd.lines.stream import StreamLine

@@ -12,7 +12,7 @@ from compd.lines.line_definition import PolledDefinition
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
-    from compd.finding import Computer, Finding
+    from compd.probes.finding import Computer, Finding
     from compd.line_settings import SerialPortSettings
     from compd.lines.line import WrapPort
     from compd.lines.stream import StreamLine
@@ -66,7 +66,7 @@ class SerialDefinition(PolledDefinition):
     def probe(
         self, computer: Computer, subject: str, settings: SerialPortSettings, daemon_runs: bool
     ) -> Iterator[Finding]:
-        from compd.lines.probes.serial_port import serial_findings
+        from compd.probes.serial_port import serial_findings
 
         return serial_findings(computer, subject, settings.port, settings.low_latency is not False)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from compd.finding import Computer, Finding
+from compd.probes.finding import Computer, Finding
 from compd.line_settings import LineSettings
 from compd.lines import definition_of
 
