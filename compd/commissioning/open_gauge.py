@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from compd.clock import Clock
+from compd.documents.assignments import assigned
 from compd.documents.section import separate_errors
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, LineKind, Quality, Reading, bad
@@ -18,7 +19,7 @@ from compd.lines.echo import explained
 from compd.lines.line_definition import LineDefinition
 from compd.lines.line_settings import LineSettings, PolledLineSettings, PushedLineSettings, powered
 from compd.lines.port import Port
-from compd.lines.port_arguments import PortArguments, assigned
+from compd.lines.port_arguments import PortArguments
 from compd.lines.registry import kinds_that_carry
 from compd.lines.stream import StreamLine
 from compd.live.acquisition.round_trigger import read_latched

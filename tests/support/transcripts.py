@@ -19,8 +19,8 @@ from compd.clock import MonotonicClock
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.lines.kinds.modbus_rtu.master import RtuMaster
 from compd.lines.kinds.modbus_tcp.master import ModbusTcp
-from compd.lines.twins.modbus_slaves import ModbusSlaves
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
+from compd.twins.modbus_slaves import ModbusSlaves
 
 PATIENCE_S = 5.0
 

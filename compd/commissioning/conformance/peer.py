@@ -9,8 +9,8 @@ from typing import Any
 
 from compd.commissioning.conformance.faults import NONE, Fault, Piece
 from compd.gauge import Channel
-from compd.lines.twins.device import SimulatedByteDevice, SimulatedRegisterDevice
-from compd.lines.twins.modbus_slaves import ModbusSlaves
+from compd.twins.device import SimulatedByteDevice, SimulatedRegisterDevice
+from compd.twins.modbus_slaves import ModbusSlaves
 
 # Where a gauge does not say what it can show, by unit.
 RANGES = {"mm": (-0.9, 0.9), "degC": (5.0, 45.0), "N": (-50.0, 50.0), "hPa": (950.0, 1050.0), "pct": (10.0, 90.0)}

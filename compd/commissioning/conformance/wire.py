@@ -15,7 +15,7 @@ from compd.lines import Line, open_line
 from compd.lines.line_settings import PolledLineSettings
 from compd.lines.port_arguments import PortArguments
 from compd.lines.registry import polled_kind
-from compd.lines.twins.wire_ends import End
+from compd.twins.wire_ends import End
 
 FAST_BAUD = 115200
 CHARACTER_BITS = 10  # 8N1: a pty knows no parity

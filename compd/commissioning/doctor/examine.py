@@ -15,7 +15,7 @@ from compd.commissioning.doctor.system import (
     unit_finding,
 )
 from compd.configuration import Configuration
-from compd.lines.probes.finding import Computer, Finding, Verdict, advice, good, unknown
+from compd.probes.finding import Computer, Finding, Verdict, advice, good, unknown
 
 # Of the shipped configurations, for a computer that has none yet.
 _USUAL_PRIORITY = 40

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from compd.lines.line_settings import LineSettings
-from compd.lines.probes.finding import Computer, Finding
 from compd.lines.registry import definition_of
+from compd.probes.finding import Computer, Finding
 
 
 def port_findings(computer: Computer, lines: Mapping[str, LineSettings], daemon_runs: bool) -> Iterator[Finding]:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from compd.configuration import Configuration
 from compd.configuration.crosscheck import resolve_channel
-from compd.lines.twins.device import Sense
+from compd.twins.device import Sense
 
 # Source by unit for a channel that is not wired or that the simulated machine does not have; otherwise 0.
 _IDLE_SOURCE = {"degC": "temperature_room_degC", "hPa": "pressure_hPa", "pct": "humidity_pct"}

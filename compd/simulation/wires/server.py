@@ -15,7 +15,6 @@ from compd.configuration import Configuration
 from compd.lines.line_definition import PushedDefinition
 from compd.lines.line_settings import LineSettings, PolledLineSettings
 from compd.lines.registry import definition_of
-from compd.lines.twins.pushed_line import SimulatedPushedLine
 from compd.plugins import SIMULATED_GAUGES, load
 from compd.simulation.truth.follow_motion import MotorCommand
 from compd.simulation.truth.instruments import INTERFEROMETER, TRACKER
@@ -28,6 +27,7 @@ from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.simulated_line import SimulatedLine
 from compd.simulation.wires.simulation_directory import CONTROL_SOCKET, PORTS, SimulationDirectory
 from compd.simulation.wires.tcp_port import ANY, claimed_port
+from compd.twins.pushed_line import SimulatedPushedLine
 
 # Step in which the world warms up and bends. Its scales follow the motion without steps.
 STEP_S = 0.02

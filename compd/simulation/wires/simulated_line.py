@@ -16,10 +16,10 @@ from pathlib import Path
 from compd.clock import Clock, MonotonicClock
 from compd.lines.line_settings import PolledLineSettings
 from compd.lines.registry import polled_definition
-from compd.lines.twins.device import SimulatedByteDevice, SimulatedRegisterDevice
-from compd.lines.twins.line_fault import UNPLUGGED, checked_fault
-from compd.lines.twins.polled_twin import LATE
-from compd.lines.twins.wire_ends import End, Port
+from compd.twins.device import SimulatedByteDevice, SimulatedRegisterDevice
+from compd.twins.line_fault import UNPLUGGED, checked_fault
+from compd.twins.polled_twin import LATE
+from compd.twins.wire_ends import End, Port
 
 # Replies are written in pieces of this duration; shorter pieces would only cost processor time.
 PIECE_S = 1e-3

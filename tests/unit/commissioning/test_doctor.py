@@ -24,8 +24,8 @@ from compd.configuration import load
 from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
 from compd.lines.kinds.serial.settings import SerialLine
 from compd.lines.line_settings import LineSettings
-from compd.lines.probes import serial_port as ports
-from compd.lines.probes.finding import Computer, Finding, Verdict, advice, fault, good
+from compd.probes import serial_port as ports
+from compd.probes.finding import Computer, Finding, Verdict, advice, fault, good
 from tests.support.paths import CONFIG
 
 PORT = "/dev/serial/by-id/usb-FTDI_A1-if00-port0"

@@ -13,7 +13,7 @@ from compd.commissioning.conformance.report import driver_under_test, run_confor
 from compd.gauge import LineFault, Quality, RegisterReply
 from compd.lines.kinds.modbus_rtu.master import RtuMaster, crc16
 from compd.lines.stream import StreamLine
-from compd.lines.twins.modbus_slaves import ModbusSlaves
+from compd.twins.modbus_slaves import ModbusSlaves
 from compd_drivers.modbus import Modbus
 from compd_drivers.simulated.modbus import SimulatedRegisters
 from tests.support.wire_rig import InstantClock, ScriptedPort, rig

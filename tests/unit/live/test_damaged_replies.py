@@ -20,8 +20,6 @@ from compd.configuration import load
 from compd.configuration.stated_noise import tolerance_mm
 from compd.gauge import Reading
 from compd.lines.pace import character_bits
-from compd.lines.twins.byte_devices import ByteDevices
-from compd.lines.twins.modbus_slaves import ModbusSlaves
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
@@ -29,6 +27,8 @@ from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
+from compd.twins.byte_devices import ByteDevices
+from compd.twins.modbus_slaves import ModbusSlaves
 from tests.support.paths import CONFIG
 from tests.support.wire_rig import PATIENCE_S
 

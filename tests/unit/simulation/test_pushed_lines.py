@@ -18,8 +18,8 @@ from compd.errors import CompdError
 from compd.gauge import Quality
 from compd.lines.kinds.mqtt.twin import MqttPublisher
 from compd.lines.kinds.opc_ua.twin import OpcUaNodes
-from compd.lines.twins.pushed_line import SimulatedPushedLine
 from compd.plugins import SIMULATED_GAUGES, load
+from compd.twins.pushed_line import SimulatedPushedLine
 from tests.support.mosquitto import needs_mosquitto, running_broker
 from tests.support.pushed_gauges import STALE_AFTER_S, acquiring, gauge
 from tests.support.sampled import sampled

@@ -11,7 +11,7 @@ from compd.lines.serial_definition import SerialDefinition
 if TYPE_CHECKING:
     from compd.lines.kinds.modbus_ascii.master import AsciiMaster
     from compd.lines.line import WrapPort
-    from compd.lines.twins.polled_twin import PolledTwin
+    from compd.twins.polled_twin import PolledTwin
 
 
 class ModbusAscii(SerialDefinition):

@@ -12,7 +12,7 @@ from compd.lines.serial_settings import SerialPortSettings
 if TYPE_CHECKING:
     from compd.lines.kinds.modbus_rtu.master import RtuMaster
     from compd.lines.line import WrapPort
-    from compd.lines.twins.polled_twin import PolledTwin
+    from compd.twins.polled_twin import PolledTwin
 
 
 class ModbusRtu(SerialDefinition):

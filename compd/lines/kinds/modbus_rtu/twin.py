@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pymodbus.framer.rtu import FramerRTU
 
-from compd.lines.twins.modbus_slaves import register_listener
-from compd.lines.twins.polled_twin import DAMAGES, PolledTwin
-from compd.lines.twins.serial_end import serial_character_s, serial_end
+from compd.twins.modbus_slaves import register_listener
+from compd.twins.polled_twin import DAMAGES, PolledTwin
+from compd.twins.serial_end import serial_character_s, serial_end
 
 
 def _other_unit(reply: bytes) -> bytes:

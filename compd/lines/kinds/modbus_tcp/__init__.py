@@ -11,7 +11,7 @@ from compd.lines.tcp_definition import TcpDefinition
 if TYPE_CHECKING:
     from compd.lines.kinds.modbus_tcp.master import ModbusTcp as ModbusTcpMaster
     from compd.lines.line import WrapPort
-    from compd.lines.twins.polled_twin import PolledTwin
+    from compd.twins.polled_twin import PolledTwin
 
 
 class ModbusTcp(TcpDefinition):

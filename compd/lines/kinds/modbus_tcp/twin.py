@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from compd.lines.twins.modbus_slaves import register_listener
-from compd.lines.twins.polled_twin import DAMAGED_BIT, DAMAGES, PolledTwin
-from compd.lines.twins.wire_ends import tcp_end
+from compd.twins.modbus_slaves import register_listener
+from compd.twins.polled_twin import DAMAGED_BIT, DAMAGES, PolledTwin
+from compd.twins.wire_ends import tcp_end
 
 
 def _garble_header(reply: bytes) -> bytes:

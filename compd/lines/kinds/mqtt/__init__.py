@@ -13,7 +13,7 @@ from compd.lines.port_arguments import PortArguments
 if TYPE_CHECKING:
     from compd.lines.kinds.mqtt.subscriber import MqttSubscriber
     from compd.lines.kinds.mqtt.twin import MqttPublisher
-    from compd.lines.probes.finding import Computer, Finding
+    from compd.probes.finding import Computer, Finding
 
 
 class Mqtt(PushedDefinition):
@@ -37,7 +37,7 @@ class Mqtt(PushedDefinition):
         return MqttPublisher(name, devices, broker)
 
     def probe(self, computer: Computer, subject: str, settings: MqttLine, daemon_runs: bool) -> Iterator[Finding]:
-        from compd.lines.probes.network import tcp_finding
+        from compd.probes.network import tcp_finding
 
         yield tcp_finding(subject, settings.host, settings.port, daemon_runs)
 

@@ -11,8 +11,8 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from compd.clock import Clock
 from compd.errors import CompdError, Problem
-from compd.lines.twins.device import SimulatedPushedDevice
-from compd.lines.twins.pushed_line import WRONG_TYPE, SimulatedPushedLine
+from compd.twins.device import SimulatedPushedDevice
+from compd.twins.pushed_line import WRONG_TYPE, SimulatedPushedLine
 
 NOT_A_NUMBER = "not a number"
 # What spreadsheets and gateways write in place of a value that they do not have.

@@ -16,9 +16,9 @@ from asyncua.server.server import Server
 from asyncua.ua.status_codes import StatusCodes
 
 from compd.clock import Clock
-from compd.lines.twins.device import SimulatedPushedDevice
-from compd.lines.twins.pushed_line import WRONG_TYPE, SimulatedPushedLine, is_off
-from compd.lines.twins.wire_ends import LOOPBACK
+from compd.twins.device import SimulatedPushedDevice
+from compd.twins.pushed_line import WRONG_TYPE, SimulatedPushedLine, is_off
+from compd.twins.wire_ends import LOOPBACK
 
 for _name in ("asyncua.server", "asyncua.client"):
     logging.getLogger(_name).setLevel(logging.CRITICAL)

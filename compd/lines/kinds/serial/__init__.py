@@ -8,7 +8,7 @@ from compd.lines.kinds.serial.settings import SerialLine
 from compd.lines.serial_definition import SerialDefinition
 
 if TYPE_CHECKING:
-    from compd.lines.twins.polled_twin import PolledTwin
+    from compd.twins.polled_twin import PolledTwin
 
 
 class Serial(SerialDefinition):

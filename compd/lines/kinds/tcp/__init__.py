@@ -11,7 +11,7 @@ from compd.lines.tcp_definition import TcpDefinition
 if TYPE_CHECKING:
     from compd.lines.line import WrapPort
     from compd.lines.stream import StreamLine
-    from compd.lines.twins.polled_twin import PolledTwin
+    from compd.twins.polled_twin import PolledTwin
 
 # Silence before a request, by which a late or repeated reply is noticed before the next one is asked for. TCP has no
 # character times: a second copy of a reply follows the first within this, s.

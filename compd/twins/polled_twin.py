@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from compd.lines.twins.line_fault import SILENT
-from compd.lines.twins.wire_ends import End
+from compd.twins.line_fault import SILENT
+from compd.twins.wire_ends import End
 
 DAMAGED_BIT = 0x80
 # A fault's effect on a reply.

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from compd.lines.probes.finding import Computer, Finding, advice, fault, good, unknown
+from compd.probes.finding import Computer, Finding, advice, fault, good, unknown
 
 _BY_ID, _BY_PATH = "/dev/serial/by-id", "/dev/serial/by-path"
 # Their other end is held by another program as a matter of course.

@@ -106,5 +106,5 @@ class TcpEnd:
 
 
 def tcp_end(settings: Any, link: Path, number: int) -> End:
-    """See `compd.lines.twins.polled_twin.PolledTwin.end`."""
+    """See `compd.twins.polled_twin.PolledTwin.end`."""
     return TcpEnd(number)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from compd.lines.probes.finding import Finding, fault, good, unknown
+from compd.probes.finding import Finding, fault, good, unknown
 
 _CONNECT_TIMEOUT_S = 1.0
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import binascii
 import struct
 from collections.abc import Sequence
+from typing import Any, Protocol
 
 from pymodbus.framer.ascii import FramerAscii
 from pymodbus.framer.rtu import FramerRTU
@@ -21,10 +22,8 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
-from compd.lines.line_settings import PolledLineSettings
-from compd.lines.round_trigger import TriggerWrite
-from compd.lines.twins.device import SimulatedRegisterDevice
-from compd.lines.twins.latch import Latch
+from compd.twins.device import SimulatedRegisterDevice
+from compd.twins.latch import Latch
 
 READ_COILS, READ_HOLDING, WRITE_REGISTERS = 1, 3, 16
 COIL_ON = 0xFF00
@@ -32,6 +31,17 @@ ILLEGAL_FUNCTION, ILLEGAL_ADDRESS = 1, 2
 RTU_REQUEST = 8  # unit, function, address, count or value, CRC
 RTU_WRITE = 9  # unit, function, address, count, byte count, CRC; and the registers
 MBAP = struct.Struct(">HHH")  # transaction, protocol, length of what follows
+
+
+class LatchingWrite(Protocol):
+    """The write of a round trigger: to the coil or register `address` of `unit`, by `function`."""
+
+    @property
+    def unit(self) -> int: ...
+    @property
+    def function(self) -> int: ...
+    @property
+    def address(self) -> int: ...
 
 
 class ModbusSlaves:
@@ -42,7 +52,7 @@ class ModbusSlaves:
         devices: Sequence[SimulatedRegisterDevice],
         over_tcp: bool = False,
         as_text: bool = False,
-        trigger: TriggerWrite | None = None,
+        trigger: LatchingWrite | None = None,
         latch: Latch | None = None,
     ) -> None:
         """over_tcp : Modbus TCP framing (MBAP) instead of RTU. as_text : ASCII framing instead.
@@ -130,15 +140,14 @@ class ModbusSlaves:
 
 
 def register_listener(
-    settings: PolledLineSettings,
+    settings: Any,
     devices: Sequence[SimulatedRegisterDevice],
     over_tcp: bool = False,
     as_text: bool = False,
 ) -> ModbusSlaves:
-    """The slaves, latched by the line's round trigger where it has one. over_tcp, as_text : as of `ModbusSlaves`."""
+    """The slaves, latched by the write `settings.round_trigger` where that is not None; else as of `ModbusSlaves`."""
     trigger = settings.round_trigger
-    latch = None if trigger is None else Latch(devices)
-    return ModbusSlaves(devices, over_tcp, as_text, trigger if isinstance(trigger, TriggerWrite) else None, latch)
+    return ModbusSlaves(devices, over_tcp, as_text, trigger, None if trigger is None else Latch(devices))
 
 
 def _unit_and_message(text: bytes) -> bytes:

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from compd.clock import Clock, MonotonicClock
-from compd.lines.twins.device import SimulatedPushedDevice
-from compd.lines.twins.line_fault import SILENT, UNPLUGGED, checked_fault
-from compd.lines.twins.wire_ends import Port
+from compd.twins.device import SimulatedPushedDevice
+from compd.twins.line_fault import SILENT, UNPLUGGED, checked_fault
+from compd.twins.wire_ends import Port
 
 # The source's clock stands still, or is wrong by an hour.
 CLOCK_STUCK, CLOCK_BEHIND, CLOCK_AHEAD = "clock stuck", "clock behind", "clock ahead"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from compd.lines.twins.device import Sense, SimulatedByteDevice, SimulatedRegisterDevice
+from compd.twins.device import Sense, SimulatedByteDevice, SimulatedRegisterDevice
 
 
 class Latch:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from compd.lines.line_settings import PolledLineSettings
-from compd.lines.round_trigger import TriggerBytes
-from compd.lines.twins.device import SimulatedByteDevice
-from compd.lines.twins.latch import Latch, TriggeredDevices
-from compd.lines.twins.polled_twin import Listener
+from compd.twins.device import SimulatedByteDevice
+from compd.twins.latch import Latch, TriggeredDevices
+from compd.twins.polled_twin import Listener
 
 
 class ByteDevices:
@@ -21,9 +20,9 @@ class ByteDevices:
         return b"".join(device.hear(data) for device in self._devices)
 
 
-def byte_listener(settings: PolledLineSettings, devices: Sequence[SimulatedByteDevice]) -> Listener:
-    """The devices, latched by the line's round trigger where it has one."""
-    if not isinstance(settings.round_trigger, TriggerBytes):
+def byte_listener(settings: Any, devices: Sequence[SimulatedByteDevice]) -> Listener:
+    """The devices, latched by the bytes of `settings.round_trigger` where that is not None."""
+    if settings.round_trigger is None:
         return ByteDevices(devices)
     latch = Latch(devices)
     return TriggeredDevices(ByteDevices(devices), settings.round_trigger.request, latch)
