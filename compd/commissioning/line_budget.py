@@ -17,24 +17,19 @@ silence 1.8 ms; with a turnaround of 1.8 ms a round takes 19.8 ms: 51 rounds a s
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from compd.configuration import Configuration
 from compd.gauge import replies_tell_whose
-from compd.line_settings import (
-    BROADCAST,
-    WRITE_REGISTERS,
-    Pace,
-    PolledLineSettings,
-    Traffic,
-    TriggerBytes,
-)
-from compd.lines import PolledDefinition, polled_definition
+from compd.line_settings import Pace, PolledLineSettings
+from compd.lines import polled_definition
 from compd.live.acquisition import LATER_S, SLOWER
 
 # A slave must keep the silence too before it answers; many take longer: 10 ms is usual, so plan with both.
 USUAL_TURNAROUND_S = 10e-3
+
+Traffic = Sequence[tuple[int, int]]
 
 
 @dataclass(frozen=True)
@@ -90,7 +85,7 @@ def budget_of_line(
     }
     known: list[tuple[int, int]] = [exchange for traffic in gauges.values() for exchange in traffic or ()]
     fastest, slowest = kind.pace(line), kind.pace(line, USUAL_TURNAROUND_S)
-    trigger_s = _trigger_s(line, kind, fastest) if known else 0.0
+    trigger_s = kind.trigger_s(line) if known else 0.0
     usual_s = [slowest.exchange_s(*exchange) for exchange in known]
     wait_s = kind.absent_wait_s(line)
     absent_s = max(
@@ -108,22 +103,6 @@ def budget_of_line(
         spread_s=0.0 if line.round_trigger is not None else sum(usual_s) - min(usual_s, default=0.0),
         unknown=tuple(gauge for gauge, traffic in gauges.items() if traffic is None),
     )
-
-
-def _trigger_s(line: PolledLineSettings, kind: PolledDefinition, line_pace: Pace) -> float:
-    """What a round trigger takes with its settling time, s; over TCP, and to one slave alone, with its confirmation."""
-    trigger = line.round_trigger
-    if trigger is None:
-        return 0.0
-    settle_s = trigger.settle_s or 0.0
-    if isinstance(trigger, TriggerBytes):
-        return line_pace.quiet_s + len(trigger.request) * line_pace.character_s + settle_s
-    several = trigger.function == WRITE_REGISTERS
-    sent = 9 + 2 * len(trigger.values) if several else 8  # Modbus over Serial Line V1.02: with unit and CRC
-    sent, received = kind.bytes_on_wire(sent, 8)
-    if trigger.unit == BROADCAST and not kind.broadcast_answered:
-        return line_pace.quiet_s + sent * line_pace.character_s + settle_s
-    return max(line_pace.exchange_s(sent, received), settle_s)
 
 
 def _silence_s(line_pace: Pace, traffic: Traffic) -> float:

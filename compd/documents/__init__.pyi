@@ -1,3 +1,4 @@
+from .assignments import assigned as assigned
 from .document import CONFIGURATION as CONFIGURATION
 from .document import Document as Document
 from .document import read_document as read_document

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from compd.clock import Clock
-from compd.documents import separate_errors
+from compd.documents import assigned, separate_errors
 from compd.errors import ConfigurationError, Problem
 from compd.gauge import Gauge, LineFault, LineKind, Quality, Reading, bad
 from compd.line_settings import LineSettings, PolledLineSettings, PushedLineSettings, powered
@@ -20,7 +20,6 @@ from compd.lines import (
     Port,
     PortArguments,
     StreamLine,
-    assigned,
     explained,
     kinds_that_carry,
     open_line,

@@ -9,8 +9,6 @@ from .line_settings import powered as powered
 from .pace import LATENCY_TIMER_S as LATENCY_TIMER_S
 from .pace import QUIET_CHARACTERS as QUIET_CHARACTERS
 from .pace import Pace as Pace
-from .pace import Traffic as Traffic
-from .pace import character_bits as character_bits
 from .pace import network_pace as network_pace
 from .pace import serial_pace as serial_pace
 from .round_trigger import BROADCAST as BROADCAST

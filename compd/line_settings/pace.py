@@ -18,8 +18,6 @@ LATENCY_TIMER_S = 16e-3
 # Over Ethernet: a packet there and back through a device's firmware. No bits to count.
 TCP_EXCHANGE_S = 2e-3
 
-Traffic = Sequence[tuple[int, int]]
-
 
 @dataclass(frozen=True)
 class Pace:
@@ -38,7 +36,7 @@ class Pace:
         """One request of `sent` bytes and its reply of `received` bytes, s."""
         return self.quiet_s + (sent + received) * self.character_s + self.turnaround_s
 
-    def round_s(self, traffic: Traffic) -> float:
+    def round_s(self, traffic: Sequence[tuple[int, int]]) -> float:
         """All exchanges of a round, s."""
         return sum(self.exchange_s(sent, received) for sent, received in traffic)
 

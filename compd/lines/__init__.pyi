@@ -12,7 +12,6 @@ from .open import open_line as open_line
 from .open import open_stream as open_stream
 from .port import Port as Port
 from .port_arguments import PortArguments as PortArguments
-from .port_arguments import assigned as assigned
 from .registry import LINES_BY_NAME as LINES_BY_NAME
 from .registry import definition_of as definition_of
 from .registry import kinds_that_carry as kinds_that_carry

@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from compd.clock import Clock
 from compd.gauge import LineFault, LineKind, Quality
-from compd.line_settings import LineSettings
+from compd.line_settings import BROADCAST, WRITE_REGISTERS, LineSettings, TriggerBytes, TriggerWrite
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
-    from compd.probes.finding import Computer, Finding
     from compd.line_settings import Pace
     from compd.lines.line import Line, WrapPort
     from compd.lines.stream import StreamLine
+    from compd.probes import Computer, Finding
     from compd.twins import PolledTwin, SimulatedPushedLine
 
 
@@ -120,6 +120,21 @@ class PolledDefinition(LineDefinition):
     def bytes_on_wire(self, sent: int, received: int) -> tuple[int, int]:
         """Bytes there and back of an exchange that has so many in `Gauge.traffic`."""
         return sent, received
+
+    def trigger_s(self, settings: Any) -> float:
+        """What the round trigger takes with its settling time, s; with its confirmation, where it is answered."""
+        trigger: TriggerBytes | TriggerWrite | None = settings.round_trigger
+        if trigger is None:
+            return 0.0
+        pace, settle_s = self.pace(settings), trigger.settle_s or 0.0
+        if isinstance(trigger, TriggerBytes):
+            return pace.quiet_s + len(trigger.request) * pace.character_s + settle_s
+        several = trigger.function == WRITE_REGISTERS
+        # Modbus over Serial Line V1.02: with unit and CRC
+        sent, received = self.bytes_on_wire(9 + 2 * len(trigger.values) if several else 8, 8)
+        if trigger.unit == BROADCAST and not self.broadcast_answered:
+            return pace.quiet_s + sent * pace.character_s + settle_s
+        return max(pace.exchange_s(sent, received), settle_s)
 
     def absent_wait_s(self, settings: Any) -> float:
         """How long nothing comes from a device that is absent before the line is free again, s."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from compd.documents import parse_yaml
 from compd.errors import ConfigurationError, Problem
 
 
@@ -52,16 +50,3 @@ class PortArguments:
                 )
             )
         return {"port": self.port, "baud": self.baud, "format": self.format}
-
-
-def assigned(option: str, assignments: Sequence[str], example: str) -> dict[str, Any]:
-    """The data of KEY=VALUE. ConfigurationError for an assignment that is none."""
-    data = {}
-    for assignment in assignments:
-        key, equals, value = assignment.partition("=")
-        if not equals:
-            raise ConfigurationError(
-                Problem(where=option, what="is not KEY=VALUE", value=assignment, allowed=f"{option} {example}")
-            )
-        data[key], _ = parse_yaml(value, Path(f"{option} {key}"))
-    return data

@@ -12,10 +12,10 @@ from compd.lines.line_definition import PolledDefinition
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
-    from compd.probes.finding import Computer, Finding
     from compd.line_settings import SerialPortSettings
     from compd.lines.line import WrapPort
     from compd.lines.stream import StreamLine
+    from compd.probes import Computer, Finding
 
 # Silence before a request, by which a late or repeated reply is noticed before the next one is asked for: at least
 # this, s, since a USB adapter hands over what has come once a millisecond.
@@ -66,7 +66,7 @@ class SerialDefinition(PolledDefinition):
     def probe(
         self, computer: Computer, subject: str, settings: SerialPortSettings, daemon_runs: bool
     ) -> Iterator[Finding]:
-        from compd.probes.serial_port import serial_findings
+        from compd.probes import serial_findings
 
         return serial_findings(computer, subject, settings.port, settings.low_latency is not False)
 

@@ -10,7 +10,7 @@ from compd.lines.line_definition import PolledDefinition
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
-    from compd.probes.finding import Computer, Finding
+    from compd.probes import Computer, Finding
 
 
 class TcpDefinition(PolledDefinition):
@@ -23,7 +23,7 @@ class TcpDefinition(PolledDefinition):
         return network_pace(settings.pause_s, turnaround_s)
 
     def probe(self, computer: Computer, subject: str, settings: Any, daemon_runs: bool) -> Iterator[Finding]:
-        from compd.probes.network import tcp_finding
+        from compd.probes import tcp_finding
 
         yield tcp_finding(subject, settings.host, settings.port, daemon_runs)
 

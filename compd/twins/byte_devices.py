@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from compd.line_settings import PolledLineSettings, TriggerBytes
 from compd.twins.device import SimulatedByteDevice
 from compd.twins.latch import Latch, TriggeredDevices
 from compd.twins.polled_twin import Listener
@@ -20,9 +20,9 @@ class ByteDevices:
         return b"".join(device.receive(data) for device in self._devices)
 
 
-def byte_listener(settings: PolledLineSettings, devices: Sequence[SimulatedByteDevice]) -> Listener:
-    """The devices, latched by the line's round trigger where it has one."""
-    if not isinstance(settings.round_trigger, TriggerBytes):
+def byte_listener(settings: Any, devices: Sequence[SimulatedByteDevice]) -> Listener:
+    """The devices, latched by the bytes of `settings.round_trigger` where that is not None."""
+    if settings.round_trigger is None:
         return ByteDevices(devices)
     latch = Latch(devices)
     return TriggeredDevices(ByteDevices(devices), settings.round_trigger.request, latch)

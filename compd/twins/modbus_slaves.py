@@ -8,6 +8,7 @@ from __future__ import annotations
 import binascii
 import struct
 from collections.abc import Sequence
+from typing import Any, Protocol
 
 from pymodbus.framer.ascii import FramerAscii
 from pymodbus.framer.rtu import FramerRTU
@@ -21,7 +22,6 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterResponse,
 )
 
-from compd.line_settings import PolledLineSettings, TriggerWrite
 from compd.twins.device import SimulatedRegisterDevice
 from compd.twins.latch import Latch
 
@@ -33,6 +33,17 @@ RTU_WRITE = 9  # unit, function, address, count, byte count, CRC; and the regist
 MBAP = struct.Struct(">HHH")  # transaction, protocol, length of what follows
 
 
+class LatchingWrite(Protocol):
+    """The write of a round trigger: to the coil or register `address` of `unit`, by `function`."""
+
+    @property
+    def unit(self) -> int: ...
+    @property
+    def function(self) -> int: ...
+    @property
+    def address(self) -> int: ...
+
+
 class ModbusSlaves:
     """The slaves on one wire, by unit number; requests to an absent unit get no reply."""
 
@@ -41,7 +52,7 @@ class ModbusSlaves:
         devices: Sequence[SimulatedRegisterDevice],
         over_tcp: bool = False,
         as_text: bool = False,
-        trigger: TriggerWrite | None = None,
+        trigger: LatchingWrite | None = None,
         latch: Latch | None = None,
     ) -> None:
         """over_tcp : Modbus TCP framing (MBAP) instead of RTU. as_text : ASCII framing instead.
@@ -129,15 +140,14 @@ class ModbusSlaves:
 
 
 def register_listener(
-    settings: PolledLineSettings,
+    settings: Any,
     devices: Sequence[SimulatedRegisterDevice],
     over_tcp: bool = False,
     as_text: bool = False,
 ) -> ModbusSlaves:
-    """The slaves, latched by the line's round trigger where it has one. over_tcp, as_text : as of `ModbusSlaves`."""
+    """The slaves, latched by the write `settings.round_trigger` where that is not None; else as of `ModbusSlaves`."""
     trigger = settings.round_trigger
-    latch = None if trigger is None else Latch(devices)
-    return ModbusSlaves(devices, over_tcp, as_text, trigger if isinstance(trigger, TriggerWrite) else None, latch)
+    return ModbusSlaves(devices, over_tcp, as_text, trigger, None if trigger is None else Latch(devices))
 
 
 def _unit_and_message(text: bytes) -> bytes:

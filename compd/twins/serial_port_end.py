@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-from compd.line_settings import SerialPortSettings, character_bits
 from compd.twins.wire_ends import LOOPBACK, End, PtyEnd, TcpEnd
 
 
@@ -16,13 +16,14 @@ class SocketUrlEnd(TcpEnd):
         return f"socket://{LOOPBACK}:{self.number}"
 
 
-def serial_end(settings: SerialPortSettings | None, link: Path, number: int) -> End:
+def serial_end(settings: Any, link: Path, number: int) -> End:
     """See `PolledTwin.end`."""
     if settings is not None and settings.behind_url:
         return SocketUrlEnd(number)
     return PtyEnd(link)
 
 
-def serial_character_s(settings: SerialPortSettings) -> float:
+def serial_character_s(settings: Any) -> float:
     """Time of a character on a pty, s; 0 behind a URL, where the device server has the baud rate."""
-    return 0.0 if settings.behind_url else character_bits(settings.format) / settings.baud
+    bits = 1 + int(settings.format[0]) + (settings.format[1] != "N") + int(settings.format[2])
+    return 0.0 if settings.behind_url else float(bits / settings.baud)

@@ -15,7 +15,7 @@ from compd.commissioning.doctor.system import (
     unit_finding,
 )
 from compd.configuration import Configuration
-from compd.probes.finding import Computer, Finding, Verdict, advice, good, unknown
+from compd.probes import Computer, Finding, Verdict, advice, good, unknown
 
 # Values of the shipped configurations, for a computer without a configuration.
 _USUAL_PRIORITY = 40

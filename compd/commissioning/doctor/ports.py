@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from compd.probes.finding import Computer, Finding
 from compd.line_settings import LineSettings
 from compd.lines import definition_of
+from compd.probes import Computer, Finding
 
 
 def port_findings(computer: Computer, lines: Mapping[str, LineSettings], daemon_runs: bool) -> Iterator[Finding]:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from compd.probes.finding import Computer, Finding, advice, fault, good, unknown
+from compd.probes import Computer, Finding, advice, fault, good, unknown
 
 # linux/capability.h
 _CAP_IPC_LOCK, _CAP_SYS_NICE = 14, 23

@@ -21,10 +21,10 @@ from compd.commissioning.doctor.system import (
     unit_finding,
 )
 from compd.configuration import load
-from compd.probes.finding import Computer, Finding, Verdict, advice, fault, good
 from compd.line_settings import LineSettings
 from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
 from compd.lines.kinds.serial.settings import SerialLine
+from compd.probes import Computer, Finding, Verdict, advice, fault, good
 from compd.probes import serial_port as ports
 from tests.support.paths import CONFIG
 

@@ -73,7 +73,7 @@ def test_a_library_that_a_kind_needs_is_an_extra() -> None:
 
 def test_the_registry_loads_neither_a_library_nor_a_twin() -> None:
     """A daemon with serial lines alone must not wait for asyncua; `compd check` of such a machine neither."""
-    heavy = ("asyncua", "paho", "pymodbus", "serial", "compd.twins", "compd.lines.probes", "compd.lines.stream")
+    heavy = ("asyncua", "paho", "pymodbus", "serial", "compd.twins", "compd.probes", "compd.lines.stream")
     code = f"import compd.lines.registry, sys; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert done.stdout.strip() == "[]"

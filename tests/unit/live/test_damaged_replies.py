@@ -19,7 +19,7 @@ from compd.configuration import load
 from compd.conformance.faults import Piece
 from compd.conformance.virtual import VirtualWire
 from compd.gauge import Reading
-from compd.line_settings import character_bits
+from compd.line_settings.pace import character_bits
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings

@@ -11,9 +11,9 @@ from compd.lines.line_definition import Library, PushedDefinition
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
-    from compd.probes.finding import Computer, Finding
     from compd.lines.kinds.mqtt.subscriber import MqttSubscriber
     from compd.lines.kinds.mqtt.twin import MqttPublisher
+    from compd.probes import Computer, Finding
 
 
 class Mqtt(PushedDefinition):
@@ -37,7 +37,7 @@ class Mqtt(PushedDefinition):
         return MqttPublisher(name, devices, broker)
 
     def probe(self, computer: Computer, subject: str, settings: MqttLine, daemon_runs: bool) -> Iterator[Finding]:
-        from compd.probes.network import tcp_finding
+        from compd.probes import tcp_finding
 
         yield tcp_finding(subject, settings.host, settings.port, daemon_runs)
 

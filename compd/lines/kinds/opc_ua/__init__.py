@@ -12,9 +12,9 @@ from compd.lines.line_definition import Library, PushedDefinition
 from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
-    from compd.probes.finding import Computer, Finding
     from compd.lines.kinds.opc_ua.subscriber import OpcUaSubscriber
     from compd.lines.kinds.opc_ua.twin import OpcUaNodes
+    from compd.probes import Computer, Finding
 
 
 class OpcUa(PushedDefinition):
@@ -38,7 +38,7 @@ class OpcUa(PushedDefinition):
         return OpcUaNodes(name, devices)
 
     def probe(self, computer: Computer, subject: str, settings: OpcUaLine, daemon_runs: bool) -> Iterator[Finding]:
-        from compd.probes.network import tcp_finding
+        from compd.probes import tcp_finding
 
         address = urlsplit(settings.endpoint)
         yield tcp_finding(subject, address.hostname or "", address.port or 0, daemon_runs)

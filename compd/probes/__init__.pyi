@@ -1,0 +1,9 @@
+from .finding import Computer as Computer
+from .finding import Finding as Finding
+from .finding import Verdict as Verdict
+from .finding import advice as advice
+from .finding import fault as fault
+from .finding import good as good
+from .finding import unknown as unknown
+from .network import tcp_finding as tcp_finding
+from .serial_port import serial_findings as serial_findings
