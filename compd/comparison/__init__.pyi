@@ -1,15 +1,9 @@
 from .alignment.aligned_recording import AlignedRecording as AlignedRecording
-from .alignment.measured_attitude import LABELS as LABELS
-from .alignment.measured_attitude import MM_PER_RAD as MM_PER_RAD
-from .alignment.measured_attitude import UNIT as UNIT
 from .comparison import Comparison as Comparison
 from .covariate import Covariate as Covariate
 from .covariate import covariates as covariates
 from .covariate import why_no_covariate as why_no_covariate
 from .criteria import ComparisonCriteria as ComparisonCriteria
-from .display_unit import format_error as format_error
-from .display_unit import in_place_unit as in_place_unit
-from .display_unit import place_unit as place_unit
 from .effect_fit import FitResult as FitResult
 from .effect_fit import fit as fit
 from .effect_fit import initial_effect as initial_effect

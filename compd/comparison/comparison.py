@@ -13,13 +13,12 @@ from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, TextArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.alignment.measured_attitude import UNIT as ATTITUDE_UNIT
 from compd.comparison.contributions import Contribution
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.display_unit import format_error, residual_ending
 from compd.comparison.noise_floor import NoiseFloor
 from compd.comparison.prediction_uncertainty import Uncertainty
 from compd.comparison.residual_trends import Trend
+from compd.display_unit import ATTITUDE_UNIT, format_error, residual_ending
 from compd.model import GaugeNoise
 from compd.model.effects import FittedEffect
 from compd.recording import sigma_key

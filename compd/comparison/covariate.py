@@ -11,7 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.columns import is_sensitivity
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.display_unit import in_place_unit, place_unit
+from compd.display_unit import in_place_unit, place_unit
 from compd.units import unit_of
 
 # Units of pure numbers, and words by which people call a number that names something.

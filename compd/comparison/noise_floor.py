@@ -25,7 +25,7 @@ from scipy.special import fdtr
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.display_unit import format_error
+from compd.display_unit import format_error
 from compd.recording import sigma_key
 from compd.statistics import SCALE_EFFICIENCY, replicate_pairs, trimmed_scale
 

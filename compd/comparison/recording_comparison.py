@@ -10,7 +10,6 @@ from scipy.linalg import block_diag
 from compd.arrays import BoolArray, FloatArray
 from compd.columns import is_sensitivity
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.alignment.measured_attitude import MM_PER_RAD
 from compd.comparison.comparison import NO_QUANTITY, Comparison
 from compd.comparison.contributions import contributions
 from compd.comparison.criteria import ComparisonCriteria
@@ -19,6 +18,7 @@ from compd.comparison.nuisance import FittedAlong, fit_along
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import Uncertainty, first_order_uncertainty, gauge_noise
 from compd.comparison.residual_trends import find_trends
+from compd.display_unit import MM_PER_RAD
 from compd.errors import Problem, RecordingError
 from compd.model import GaugeNoise, link_residuals
 from compd.model.effects import FittedEffect

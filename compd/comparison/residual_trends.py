@@ -20,9 +20,9 @@ from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.covariate import Covariate, covariates
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.display_unit import format_error
 from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.noise_floor import NoiseFloor
+from compd.display_unit import format_error
 from compd.statistics import cluster_std, filled
 
 ENDS = {

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from statistics import median
 
-from compd.comparison import format_error
+from compd.display_unit import format_error
 from compd.fleet.criteria import FleetCriteria
 from compd.fleet.drift import Drift, drifts, named_drifts
 from compd.fleet.outlying import ERROR, ERROR_LEFT, OutlyingMachine, outlying_machines

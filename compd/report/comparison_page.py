@@ -10,7 +10,8 @@ from plotly.graph_objects import Figure, Scatter
 from plotly.subplots import make_subplots
 
 from compd.arrays import rms
-from compd.comparison import Comparison, StreamedComparison, covariates, format_error
+from compd.comparison import Comparison, StreamedComparison, covariates
+from compd.display_unit import format_error
 from compd.model_file import parameter_estimates
 from compd.report.figures import (
     plot_contributions,

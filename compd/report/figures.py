@@ -7,7 +7,8 @@ from plotly.graph_objects import Bar, Figure, Heatmap, Scatter, Scatter3d
 from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, rms
-from compd.comparison import Comparison, format_error, in_place_unit, place_unit
+from compd.comparison import Comparison
+from compd.display_unit import format_error, in_place_unit, place_unit
 from compd.report.page import COLOURS, style_figure
 from compd.report.page_table import PageTable
 from compd.report.small_multiples import NOT_RECORDED, SERIES_COLOURS, add_dots_and_means, thin

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from plotly.graph_objects import Figure, Scatter
 
-from compd.comparison import format_error
+from compd.display_unit import format_error
 from compd.model_file import StoredModel
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable

@@ -178,7 +178,7 @@ def _finish(
     from rich.table import Table
 
     from compd.api import compare
-    from compd.comparison import format_error
+    from compd.display_unit import format_error
     from compd.report import keep_words_whole
 
     if dry_run:

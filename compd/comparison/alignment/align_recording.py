@@ -10,12 +10,12 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.alignment.external_machine import external_observations
 from compd.comparison.alignment.fixed_ends import place_balls, place_pins
-from compd.comparison.alignment.measured_attitude import LABELS as ATTITUDE_LABELS
 from compd.comparison.alignment.measured_attitude import attitude_mm, measured_attitude, target_turn
 from compd.comparison.alignment.registration import Registration, register
 from compd.comparison.alignment.velocity import velocities
 from compd.comparison.criteria import ComparisonCriteria, SpeedCriteria
 from compd.configuration import Configuration
+from compd.display_unit import ATTITUDE_LABELS
 from compd.errors import Problem, RecordingError
 from compd.machine_builder import build_model
 from compd.model import MachineModel, observe

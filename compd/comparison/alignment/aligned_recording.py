@@ -12,15 +12,12 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.alignment.external_machine import external_change, external_prediction
 from compd.comparison.alignment.fixed_ends import FixedEnds
-from compd.comparison.alignment.measured_attitude import LABELS as ATTITUDE_LABELS
 from compd.comparison.alignment.measured_attitude import (
-    MM_PER_RAD,
     attitude_mm,
     attitude_registration_columns,
     measured_attitude,
     target_turn,
 )
-from compd.comparison.alignment.measured_attitude import UNIT as ATTITUDE_UNIT
 from compd.comparison.alignment.registration import (
     Registration,
     displacement_columns,
@@ -28,7 +25,7 @@ from compd.comparison.alignment.registration import (
     registration_columns,
 )
 from compd.comparison.criteria import ComparisonCriteria
-from compd.comparison.display_unit import in_place_unit
+from compd.display_unit import ATTITUDE_LABELS, ATTITUDE_UNIT, MM_PER_RAD, in_place_unit
 from compd.errors import CompdError
 from compd.model import (
     Deltas,

@@ -15,12 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
 from compd.comparison.alignment.registration import Registration
+from compd.display_unit import MM_PER_RAD
 from compd.rotation import compose, rotation_matrix, rotation_vector
-
-LABELS = ("rx", "ry", "rz")
-UNIT = "urad"
-# mm that stand for a radian: 1 urad counts as 1 um.
-MM_PER_RAD = 1e3
 
 
 def attitude_mm(rotation_M_P: FloatArray, nominal_M_P: FloatArray) -> FloatArray:

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison import LABELS as ATTITUDE_LABELS
-from compd.comparison import MM_PER_RAD, AlignedRecording
-from compd.comparison import UNIT as ATTITUDE_UNIT
+from compd.comparison import AlignedRecording
 from compd.diagnosis.candidates.candidates import Candidate
+from compd.display_unit import ATTITUDE_LABELS, ATTITUDE_UNIT, MM_PER_RAD
 from compd.model.effects import ConstantValues, Effect, Observations, Parameter, memoryless_basis
 from compd.statistics import column_norms, solve_least_squares
 from compd.units import UM_PER_MM

@@ -10,10 +10,10 @@ import pytest
 
 from compd.comparison.comparison import Comparison
 from compd.comparison.covariate import covariates
-from compd.comparison.display_unit import format_error
 from compd.comparison.open import open_recording
 from compd.comparison.recording_comparison import compare
 from compd.diagnosis import diagnose
+from compd.display_unit import format_error
 from compd.model.library import load_library
 from compd.report import write_comparison_page
 from tests.support.command import run_in_process

@@ -30,7 +30,6 @@ NUMBERS = {
         "PLACE_NUMBERS": DEFINITION,
         "PLANE_SHARE": CONDITIONING,
     },
-    "comparison/alignment/measured_attitude.py": {"MM_PER_RAD": DEFINITION},
     "comparison/alignment/registration.py": {
         "ROUNDS": ITERATION,
         "FEWEST_POINTS": DEFINITION,

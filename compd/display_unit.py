@@ -13,6 +13,12 @@ from compd.arrays import FloatArray
 from compd.text import number_text
 from compd.units import REFERENCE_UNITS, UM_PER_MM
 
+# The coordinates of a measured attitude, and their unit.
+ATTITUDE_LABELS = ("rx", "ry", "rz")
+ATTITUDE_UNIT = "urad"
+# mm that stand for a radian: 1 urad counts as 1 um.
+MM_PER_RAD = 1e3
+
 
 def format_error(value: float, unit: str = "um", figures: int = 2) -> str:
     """A value with its unit, with so many figures and without powers of ten where it is large: "0.12 um", "1234 um"."""
