@@ -21,7 +21,7 @@ from compd.live.loop.directions import Directions
 from compd.live.loop.loop import Loop
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import Models, ModelText, try_model
-from compd.live.loop.sent_cycle import CyclePacker, SentSetpoint
+from compd.live.loop.sent_cycle import CyclePacker
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.pipeline import build_pipeline
@@ -73,7 +73,7 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
         return number < _CYCLES
 
     def send(setpoint: Setpoint) -> None:
-        sent = SentSetpoint.of(setpoint, None)
+        sent = setpoint.encoded(None)
         sent.pack()
         packer.pack(setpoint, sent.line)
 

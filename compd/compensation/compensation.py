@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from compd.arrays import FloatArray
 from compd.compensation.rows import Rows, kernel_rows
-from compd.compensation.values import Compensation, CorrectionShares, GaugeValues, Wanted, WarmStart
+from compd.compensation.values import Compensation, Contributions, GaugeValues, Wanted, WarmStart
 from compd.errors import KinematicsError, Problem
 from compd.model.effect import Memory
 from compd.model.effect_memory import EffectMemory, PackedMemory
@@ -88,10 +88,10 @@ def _compensate(
 
 
 class _Solved(NamedTuple):
-    """What the kernel leaves: results (N,), shares_mm (N, 2 + K, n), and the memory after the last row."""
+    """What the kernel leaves: results (N,), contributions_mm (N, 2 + K, n), and the memory after the last row."""
 
     results: NDArray[np.void]
-    shares_mm: FloatArray
+    contributions_mm: FloatArray
     memory: PackedMemory
 
 
@@ -138,7 +138,7 @@ def _solve(
         solved.memory.memories,
         _room(1, WORKSPACE),
         solved.results,
-        solved.shares_mm,
+        solved.contributions_mm,
     )
     return solved
 
@@ -193,7 +193,11 @@ def _result(
     """The compensation and the next warm start. memories : of the Python effects."""
     n, lead = model.links, rows.lead
     results: Any = solved.results.reshape(lead) if lead else solved.results[0]
-    shares_mm = solved.shares_mm.reshape(*lead, *solved.shares_mm.shape[1:]) if lead else solved.shares_mm[0]
+    contributions_mm = (
+        solved.contributions_mm.reshape(*lead, *solved.contributions_mm.shape[1:])
+        if lead
+        else solved.contributions_mm[0]
+    )
     frame, pose = results["frame"], results["pose"]
     compensation = Compensation(
         results["tip_M_mm"],
@@ -216,7 +220,7 @@ def _result(
         results["nominal_scale_mm"][..., :n],
         results["scale_setpoint_mm"][..., :n],
         results["correction_mm"][..., :n],
-        CorrectionShares(model.source_names, np.moveaxis(shares_mm, -2, 0) if lead else shares_mm),
+        Contributions(model.contribution_names, np.moveaxis(contributions_mm, -2, 0) if lead else contributions_mm),
         results["reason"],
     )
     if model.live_effects:

@@ -31,7 +31,7 @@ from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.commands import Commands
 from compd.live.loop.machine_zero import MachineZero, load_zero
 from compd.live.loop.model_loader import ModelLoader, Models, try_model, warn_of_datum
-from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.poll_requests import PollRequests
 from compd.live.memory.shared_ring import SharedRing
@@ -317,7 +317,7 @@ class Daemon:
         """The SETPOINT line of the loop's last cycle; None before the first."""
         count = self.setpoints.count
         content = self.setpoints.get(count - 1) if count else None
-        return None if content is None else SentSetpoint.unpack(content).line
+        return None if content is None else Setpoint.unpack(content).line
 
     def _trust(self, before: Daemon | None) -> TrustMemory:
         """What is known of the wired gauges: that of the daemon whose place this one takes, where it has the same."""

@@ -63,7 +63,7 @@ class MachineModel:
         return tuple(fitted for fitted in self.effects if fitted.effect.live)
 
     @cached_property
-    def source_names(self) -> tuple[str, ...]:
+    def contribution_names(self) -> tuple[str, ...]:
         """Names of the parts of a correction: joints, frame, and each live effect."""
         return ("joints", "frame", *(fitted.effect.id for fitted in self.live_effects))
 

@@ -32,15 +32,17 @@ from typing import Any
 
 import numpy as np
 
+from compd.compensation.values import Compensation, Contributions
 from compd.configuration.operation import LoopSettings
 from compd.gauge import Quality, Reading, bad, good
 from compd.live import realtime
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.setpoint import Setpoint, SetpointValues
+from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.states import Mode, State
 from compd.live.memory.latest import Snapshot
 from compd.live.memory.readings import Readings
+from compd.model.frame import Frame
 from tests.benchmarks.bench_loop import PRIORITY, BusyDrivers, load_beside
 from tests.benchmarks.figures import quiet, show
 from tests.support.live_machine import machine
@@ -62,6 +64,9 @@ SETTLE_S = 1.5
 WARM_UP_CYCLES = 200
 HISTOGRAM_US = 20_000
 RING_SLOTS, RING_SLOT_BYTES = 512, 1024
+# What a client is sent of a setpoint's values, and of their frame.
+VECTORS = ("tip_M_mm", "tip_B0_mm", "tip_P_mm", "link_length_mm", "scale_setpoint_mm", "correction_mm")
+FRAME_VECTORS = ("origin_M_mm", "displacement_M_mm", "rotation_M_rad")
 # Version, value, time, version: where the two versions differ, the slot is being written.
 SLOT = struct.Struct("QddQ")
 FORK = multiprocessing.get_context("fork")
@@ -137,14 +142,24 @@ def flat(setpoint: Setpoint) -> tuple[Any, ...]:
     values = setpoint.values
     assert values is not None
     names = (setpoint.state.value, setpoint.reason, setpoint.mode.value, setpoint.model)
-    return setpoint[:4], names, values[:9], tuple(values.sources_mm.items()), values.u_tip_um
+    vectors = {name: getattr(values, name).tobytes() for name in VECTORS}
+    frame = {name: getattr(values.frame, name).tobytes() for name in FRAME_VECTORS}
+    contributions = {name: part.tobytes() for name, part in values.contributions.items()}
+    return setpoint[:4], names, vectors, frame, contributions, setpoint.u_tip_um
 
 
-def unflat(head: Any, names: Any, vectors: Any, sources: Any, u_tip_um: Any) -> Setpoint:
-    arrays = [None if data is None else np.frombuffer(data) for data in (*vectors, u_tip_um)]
-    by_source = {name: np.frombuffer(data) for name, data in sources}
-    values = SetpointValues(*arrays[:9], by_source, arrays[9])
-    return Setpoint(*head, State(names[0]), names[1], Mode(names[2]), values, names[3])
+def unflat(head: Any, names: Any, vectors: Any, frame: Any, contributions: Any, u_tip_um: Any) -> Setpoint:
+    arrays, of_frame, parts = (
+        {name: np.frombuffer(data) for name, data in by_name.items()} for by_name in (vectors, frame, contributions)
+    )
+    absent = np.zeros(0)
+    values = Compensation(
+        **dict.fromkeys(Compensation._fields, absent)
+        | arrays
+        | {"frame": Frame(**dict.fromkeys(Frame._fields, absent) | of_frame)}
+        | {"contributions": Contributions(tuple(parts), np.array(list(parts.values())))}
+    )
+    return Setpoint(*head, State(names[0]), names[1], Mode(names[2]), values, names[3], u_tip_um=u_tip_um)
 
 
 def fork(function: Callable[[], Figures]) -> Callable[[], Figures]:

@@ -10,12 +10,11 @@ import threading
 import numpy as np
 
 from compd.clock import MonotonicClock
-from compd.compensation.values import CorrectionShares
+from compd.compensation.values import Compensation, Contributions
 from compd.configuration.operation import SocketSettings
 from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
-from compd.live.loop.sent_cycle import SentSetpoint
-from compd.live.loop.setpoint import Setpoint, SetpointValues
+from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.states import Mode, State
 from compd.live.memory.poll_requests import PollRequests
 from compd.live.memory.shared_ring import SharedRing
@@ -25,6 +24,7 @@ from compd.live.service.publisher import Publisher
 from compd.live.service.request_context import RequestContext, TargetKeys
 from compd.live.service.requests import Requests
 from compd.live.service.tcp_access import TcpAccess
+from compd.model.frame import Frame
 
 PERIOD_S = 0.005
 TIMEOUT_S = 20
@@ -35,8 +35,9 @@ NO_ZERO = StateError(Problem(where="zero", what="none"))
 
 def setpoint(seq: int, time_s: float | None = None) -> Setpoint:
     three = np.array([1.0, 2.0, 3.0])
-    sources_mm = CorrectionShares(("joints", "frame"), np.array([three, three]))
-    numbers = SetpointValues(three, three, None, three, three, three, three, three, three, sources_mm)
+    contributions = Contributions(("joints", "frame"), np.array([three, three]))
+    frame = Frame(three, three, three, three, three, three, *(np.array(0),) * 3)
+    numbers = Compensation(*(three,) * 4, frame, *(three,) * 5, contributions, np.array(0))
     time_s = seq * PERIOD_S if time_s is None else time_s
     return Setpoint(seq, time_s, time_s + 0.1, 0.01, State.OK, "", Mode.CMM, numbers)
 
@@ -172,7 +173,7 @@ class Service:
         self.ring.wake_reader()
 
     def deliver(self, setpoint):
-        self.ring.put(setpoint.time_s, setpoint.state.code, SentSetpoint.of(setpoint, None).pack())
+        self.ring.put(setpoint.time_s, setpoint.state.code, setpoint.encoded(None).pack())
 
     def unix(self, **options):
         return self._peer(Peer(socket.AF_UNIX, str(self.path), **options))

@@ -23,7 +23,7 @@ from compd.live.loop.directions import Directions
 from compd.live.loop.loop import Loop
 from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.model_loader import LiveModel, ModelLoader, Models, ModelText, warn_of_datum
-from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker, SentSetpoint
+from compd.live.loop.sent_cycle import CyclePacker, CycleUnpacker
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory.latest import Latest
@@ -154,7 +154,7 @@ class LoopProcess:
 
         def send(setpoint: Setpoint) -> None:
             time_s, state = setpoint.time_s, setpoint.state.code
-            sent = SentSetpoint.of(setpoint, self.packet_hash)
+            sent = setpoint.encoded(self.packet_hash)
             self.setpoints.put(time_s, state, sent.pack())
             self.cycles.put(time_s, state, packer.pack(setpoint, sent.line))
 
@@ -179,7 +179,7 @@ class LoopProcess:
         packer = CyclePacker(Directions(self.settings.wires.scale.wires))
         for tick in range(1, _TRIAL_CYCLES + 1):
             setpoint, state = step(state, self._inputs(tick), self.settings)
-            sent = SentSetpoint.of(setpoint, self.packet_hash)
+            sent = setpoint.encoded(self.packet_hash)
             # what effects remember may grow while the machine moves
             if len(packer.pack(setpoint, sent.line)) > (most := self.cycles.longest_content // 2):
                 raise ValueError(f"a cycle, with what its effects remember, has more than {most} bytes")

@@ -10,7 +10,7 @@ import structlog
 
 from compd.clock import Clock
 from compd.live.journal import Journal
-from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.states import State
 from compd.live.processes.control import Control, Phase
 from compd.live.processes.log_relay import LogRelay
@@ -35,7 +35,7 @@ class StateLog:
         self._control = control
         self._state: State | None = None
 
-    def note(self, setpoint: SentSetpoint) -> None:
+    def note(self, setpoint: Setpoint) -> None:
         """Take a setpoint; called on the publisher's thread."""
         if setpoint.state is self._state:
             return

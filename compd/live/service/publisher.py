@@ -20,7 +20,7 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.live.loop.sent_cycle import CycleUnpacker, SentSetpoint
+from compd.live.loop.sent_cycle import CycleUnpacker
 from compd.live.loop.setpoint import Setpoint
 from compd.live.memory.shared_ring import RingReader, SharedRing
 from compd.live.service.client_session import ClientSession, Stream
@@ -59,7 +59,7 @@ class Publisher:
         watch: LoopWatch,
         period_s: float,
         clock: Clock,
-        observers: Sequence[Callable[[SentSetpoint], None]] = (),
+        observers: Sequence[Callable[[Setpoint], None]] = (),
         packet_hash: bytes | None = None,
     ) -> None:
         """`period_s`: of the loop. `observers` are called with every setpoint that is read, on the publisher's thread:
@@ -243,7 +243,7 @@ class Publisher:
     def _forward(self) -> None:
         """Publish what is due; where there is nothing from the loop, say so."""
         for content in self._setpoints.contents(self._is_setpoint_due):
-            setpoint = SentSetpoint.unpack(content)
+            setpoint = Setpoint.unpack(content)
             if self._watch.admits(setpoint.seq, setpoint.time_s):
                 self._publish(setpoint)
         for content in self._cycles.contents(lambda time_s, _: self._is_due(Stream.READINGS, time_s)):
@@ -260,7 +260,7 @@ class Publisher:
     def _is_due(self, stream: Stream, time_s: float) -> bool:
         return time_s >= self._due_s[stream] - self._half_period_s
 
-    def _publish(self, setpoint: SentSetpoint) -> None:
+    def _publish(self, setpoint: Setpoint) -> None:
         self._last_state = setpoint.state.code
         for observe in self._observers:
             observe(setpoint)
@@ -268,7 +268,7 @@ class Publisher:
             self._send_to_watchers(Stream.SETPOINTS, setpoint.time_s, setpoint.line)
 
     def _publish_in_place_of_loop(self, setpoint: Setpoint) -> None:
-        self._publish(SentSetpoint.of(setpoint, self._packet_hash))
+        self._publish(setpoint.encoded(self._packet_hash))
 
     def _send_to_watchers(self, stream: Stream, time_s: float, line: bytes) -> None:
         """Send a line to the clients of a stream that are due at `time_s`."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from compd.configuration.operation import UdpTarget
 from compd.errors import DaemonError, Problem
-from compd.live.loop.sent_cycle import SentSetpoint
+from compd.live.loop.setpoint import Setpoint
 
 
 class UdpSender:
@@ -35,7 +35,7 @@ class UdpSender:
         self.sent = 0
         self.dropped = 0
 
-    def deliver(self, setpoint: SentSetpoint) -> None:
+    def deliver(self, setpoint: Setpoint) -> None:
         """Send the packet of a setpoint, without waiting."""
         try:
             self._socket.sendto(setpoint.packet, self._address)

@@ -40,7 +40,7 @@ def _solve_bare(
     warm_rotation_M_P: FloatArray,
     work: Any,
     result: Any,
-    shares_mm: FloatArray,
+    contributions_mm: FloatArray,
 ) -> None:
     """The cycle without effects: equations (1) to (9)."""
     n, k = model.links, joint_mm.shape[0]
@@ -49,7 +49,7 @@ def _solve_bare(
         distances_mm[i] = model.zero_distances_mm[i] + frame_mm[i]
     frame, pose = result.bare_frame, result.bare_pose
     solve_frame(model, model.plate_points_M_mm, distances_mm, warm_supports_M_mm, frame)
-    shorten_by_joints(model.joint_weights[:n, :k], joint_mm, shares_mm[0], work.altered.joint_reason)
+    shorten_by_joints(model.joint_weights[:n, :k], joint_mm, contributions_mm[0], work.altered.joint_reason)
     base_M_mm, zero_base_M_mm = frame.base_joints_M_mm, model.zero_base_joints_M_mm
     if machine_tool:
         inverse_pose(model, zero_base_M_mm, model, result.target_M_mm, result.target_P_mm, attitude_M_P, work.nominal)
@@ -62,7 +62,7 @@ def _solve_bare(
         nominal_mm = np.empty(n)
         for i in range(n):
             nominal_mm[i] = model.zero_link_length_mm[i] + scale_mm[i]
-            length_mm[i] = nominal_mm[i] - shares_mm[0, i]
+            length_mm[i] = nominal_mm[i] - contributions_mm[0, i]
         forward_pose(model, base_M_mm, model, length_mm, warm_origin_M_mm, warm_rotation_M_P, pose)
         forward_pose(model, zero_base_M_mm, model, nominal_mm, warm_origin_M_mm, warm_rotation_M_P, work.nominal)
         set_contact(model, work.nominal, model.tool_mm, result.target_M_mm, result.target_P_mm)
@@ -80,8 +80,8 @@ def _solve_bare(
         length_mm_i = work.command.link_length_mm[i]
         nominal_mm_i = work.nominal.link_length_mm[i]
         result.nominal_scale_mm[i] = nominal_mm_i - model.zero_link_length_mm[i] if machine_tool else scale_mm[i]
-        result.scale_setpoint_mm[i] = length_mm_i - model.zero_link_length_mm[i] + shares_mm[0, i]
-        shares_mm[1, i] = length_mm_i - nominal_mm_i
+        result.scale_setpoint_mm[i] = length_mm_i - model.zero_link_length_mm[i] + contributions_mm[0, i]
+        contributions_mm[1, i] = length_mm_i - nominal_mm_i
     result.reason = max(
         work.altered.joint_reason[0],
         frame.reason[0],
@@ -94,7 +94,7 @@ def _solve_bare(
 
 
 @helper
-def _finish(model: Any, result: Any, shares_mm: FloatArray) -> None:
+def _finish(model: Any, result: Any, contributions_mm: FloatArray) -> None:
     """What follows from the tip and the target; where the row failed, every number is nan."""
     n = model.links
     to_inner_frame(model.zero_rotation_M_B, model.zero_origin_M_mm, result.tip_M_mm, result.tip_B0_mm)
@@ -112,7 +112,7 @@ def _finish(model: Any, result: Any, shares_mm: FloatArray) -> None:
     result.nominal_scale_mm[:] = math.nan
     result.scale_setpoint_mm[:] = math.nan
     result.correction_mm[:] = math.nan
-    shares_mm[:, :] = math.nan
+    contributions_mm[:, :] = math.nan
 
 
 @helper
@@ -184,9 +184,9 @@ def compensate_rows(  # noqa: PLR0912  the steps of a cycle, in their order
     memory: FloatArray,
     works: Any,
     results: Any,
-    shares_mm: FloatArray,
+    contributions_mm: FloatArray,
 ) -> None:
-    """N rows of `results` and of `shares_mm` (N, 2 + K, n): joints, frame, and each of K effects.
+    """N rows of `results` and of `contributions_mm` (N, 2 + K, n): joints, frame, and each of K effects.
 
     passes : how often effects are computed, each time at the setpoint of the time before.  starts : the first row has
     no history.  other_mode : the motion before the first row is of the other mode.
@@ -222,7 +222,7 @@ def compensate_rows(  # noqa: PLR0912  the steps of a cycle, in their order
             warm_rotation_M_P[w],
             work,
             result,
-            shares_mm[r],
+            contributions_mm[r],
         )
         result.warm_supports_M_mm[:, :] = result.bare_frame.supports_M_mm
         result.warm_origin_M_mm[:] = result.bare_pose.origin_M_mm
@@ -286,7 +286,7 @@ def compensate_rows(  # noqa: PLR0912  the steps of a cycle, in their order
                     attitude,
                     work,
                     result,
-                    shares_mm[r],
+                    contributions_mm[r],
                     at_mm,
                 )
             result.scale_setpoint_mm[:n] = at_mm
@@ -302,4 +302,4 @@ def compensate_rows(  # noqa: PLR0912  the steps of a cycle, in their order
             result.warm_supports_M_mm[:, :] = warm_supports_M_mm[w]
             result.warm_origin_M_mm[:] = warm_origin_M_mm[w]
             result.warm_rotation_M_P[:, :] = warm_rotation_M_P[w]
-        _finish(model, result, shares_mm[r])
+        _finish(model, result, contributions_mm[r])

@@ -156,7 +156,7 @@ def add_effects(
     attitude_M_P: FloatArray,
     work: Any,
     result: Any,
-    shares_mm: FloatArray,
+    contributions_mm: FloatArray,
     setpoint_mm: FloatArray,
 ) -> int:
     """The command that reaches the target on the machine with its effects; returns the reason.
@@ -191,7 +191,7 @@ def add_effects(
         for i in range(n):
             length_mm = work.with_effects.link_length_mm[i] - altered.reading_to_length_mm[i]
             setpoint = length_mm - model.zero_link_length_mm[i] + altered.joint_shortening_mm[i]
-            shares_mm[2 + e, i] = setpoint - setpoint_mm[i]
+            contributions_mm[2 + e, i] = setpoint - setpoint_mm[i]
             setpoint_mm[i] = setpoint
         reason = max(reason, altered.joint_reason[0], result.frame.reason[0], work.with_effects.reason[0])
         level = LENGTHS

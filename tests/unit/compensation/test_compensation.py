@@ -93,19 +93,19 @@ def test_both_modes_mean_the_same_by_a_correction(model: MachineModel) -> None:
     found, _ = compensate_cmm(model, values._replace(scale_mm=asked.nominal_scale_mm), WarmStart.at_zero(model))
     np.testing.assert_allclose(found.correction_mm, asked.correction_mm, rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.target_B_mm, asked.target_B_mm, rtol=0, atol=1e-9)
-    for cause in asked.sources:
-        np.testing.assert_allclose(found.sources[cause], asked.sources[cause], rtol=0, atol=1e-9)
+    for cause in asked.contributions:
+        np.testing.assert_allclose(found.contributions[cause], asked.contributions[cause], rtol=0, atol=1e-9)
 
 
 @every_machine
 def test_the_shares_add_up_and_each_is_what_its_gauges_do_alone(model: MachineModel) -> None:
     values = gauges(model)
     both = machine_tool(model, values)
-    np.testing.assert_allclose(sum(both.sources.values()), both.correction_mm, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(sum(both.contributions.values()), both.correction_mm, rtol=0, atol=1e-12)
     no_frame = machine_tool(model, values._replace(frame_mm=np.zeros((ROWS, 9))))
     no_joints = machine_tool(model, values._replace(joint_mm=0 * values.joint_mm))
-    np.testing.assert_allclose(both.sources["joints"], no_frame.correction_mm, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(both.sources["frame"], no_joints.correction_mm, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(both.contributions["joints"], no_frame.correction_mm, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(both.contributions["frame"], no_joints.correction_mm, rtol=0, atol=1e-9)
     np.testing.assert_allclose(both.scale_setpoint_mm, both.nominal_scale_mm + both.correction_mm, rtol=0, atol=1e-12)
 
 
@@ -144,8 +144,8 @@ def assert_same_bits(one: Compensation, many: Compensation, i: int) -> None:
     for name in ("tip_M_mm", "tip_B0_mm", "tip_P_mm"):
         every = np.broadcast_to(getattr(many, name), (ROWS, 3))
         assert getattr(one, name).tobytes() == every[i].tobytes(), name
-    for cause, share in one.sources.items():
-        assert share.tobytes() == many.sources[cause][i].tobytes(), cause
+    for cause, share in one.contributions.items():
+        assert share.tobytes() == many.contributions[cause][i].tobytes(), cause
     assert all(a.tobytes() == b[i].tobytes() for a, b in zip(one.frame, many.frame, strict=True))
 
 
@@ -215,8 +215,8 @@ def test_a_gauge_without_a_number_gives_a_reason_and_no_number(model: MachineMod
 def assert_blank(result: Compensation, rows: list[int]) -> None:
     """nan in exactly these rows."""
     others = [i for i in range(ROWS) if i not in rows]
-    numbers = [value for name, value in result._asdict().items() if name not in ("frame", "sources", "reason")]
-    for value in [*numbers, *result.sources.values()]:
+    numbers = [value for name, value in result._asdict().items() if name not in ("frame", "contributions", "reason")]
+    for value in [*numbers, *result.contributions.values()]:
         assert np.isnan(value[rows]).all()
         assert np.isfinite(value[others]).all()
 

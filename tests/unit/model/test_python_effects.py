@@ -68,7 +68,7 @@ def results(machine: MachineModel, machine_tool: bool) -> list[Floats]:
         else:
             result, warm = compensate_cmm(machine, values, warm)
         assert not result.reason
-        rows.append(np.concatenate([result.scale_setpoint_mm, result.tip_M_mm, *result.sources.values()]))
+        rows.append(np.concatenate([result.scale_setpoint_mm, result.tip_M_mm, *result.contributions.values()]))
     return rows
 
 
