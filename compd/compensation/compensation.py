@@ -24,10 +24,12 @@ from compd.model.effect_memory import EffectMemory, PackedMemory
 from compd.model.frame import Frame
 from compd.model.kernels.compensation import compensate_rows
 from compd.model.kernels.rotation import compose, rotation_matrix
+from compd.model.kernels.row_arguments import GivenRows, RowOptions, SolvedRows
 from compd.model.kernels.solver_structures import RESULT, WORKSPACE
 from compd.model.kinematics import Pose
 from compd.model.machine import MachineModel
-from compd.model.python_effects import EffectInputs, python_effects
+from compd.model.observe import EffectInputs
+from compd.model.python_effects import python_effects
 
 # In machine-tool mode effects are computed at the scale setpoint, which they shift themselves. After the first pass the
 # error left is at most a scale's cyclic error, 1 % of its period; the second leaves 2 pi times 1 % of that: nanometres.
@@ -78,7 +80,7 @@ def _compensate(
     # the kernel computes without effects, Python what its effects add there, and the kernel the whole
     without = replace(model, effects=())
     bare = _solve(without, rows, EffectMemory(), machine_tool, 1, None, None)
-    effects_at_mm = bare.results["scale_setpoint_mm"][:, : model.links].copy() if machine_tool else rows.scale_mm
+    effects_at_mm = bare.results["scale_setpoint_mm"][:, : model.links].copy() if machine_tool else rows.gauges.scale_mm
     for _ in range(_EFFECT_PASSES if machine_tool else 1):
         inputs = _effect_inputs(model, rows, bare.results, values, effects_at_mm)
         given_mm, memories = python_effects(model, inputs, memory, machine_tool)
@@ -104,40 +106,27 @@ def _solve(
     effects_at_mm: FloatArray | None,
     given_mm: FloatArray | None,
 ) -> _Solved:
-    program, structure = model.program, model.structure
-    count, links = rows.scale_mm.shape
+    program = model.program
+    count, links = rows.gauges.scale_mm.shape
     solved = _Solved(
         _room(count, RESULT),
-        np.empty((count, 2 + len(program.effects), links)),
-        memory.pack(model, rows.joint_mm.shape[1]),
+        np.empty((count, 2 + len(program.arrays.effects), links)),
+        memory.pack(model, rows.gauges.joint_mm.shape[1]),
     )
     compensate_rows(
-        machine_tool,
-        passes,
-        memory.is_empty,
-        memory.commanded != machine_tool,
-        structure,
-        program.machine,
-        program.effects,
-        program.theta,
-        program.numbers,
-        program.code,
-        program.quantity_places,
-        program.targets,
-        rows.scale_mm,
-        rows.joint_mm,
-        rows.frame_mm,
+        RowOptions(machine_tool, passes, memory.is_empty, memory.commanded != machine_tool),
+        model.structure,
+        program.arrays,
+        rows.gauges,
         rows.quantities,
-        rows.time_s,
-        rows.wanted_mm,
-        rows.attitude_M_P,
-        _not_given(count, links) if effects_at_mm is None else effects_at_mm,
-        np.empty((0, 0, program.size)) if given_mm is None else given_mm,
-        *rows.warm,
-        solved.memory.motion,
-        solved.memory.memories,
-        _room(1, WORKSPACE),
-        solved.results,
+        rows.wanted,
+        GivenRows(
+            _not_given(count, links) if effects_at_mm is None else effects_at_mm,
+            np.empty((0, 0, program.size)) if given_mm is None else given_mm,
+        ),
+        rows.warm,
+        solved.memory.arrays,
+        SolvedRows(_room(1, WORKSPACE), solved.results),
         solved.contributions_mm,
     )
     return solved
@@ -160,15 +149,12 @@ def _effect_inputs(
     n, pose = model.links, bare["bare_pose"]
     count = len(bare)
     return EffectInputs(
-        effects_at_mm,
-        rows.joint_mm,
-        rows.frame_mm,
+        rows.gauges._replace(scale_mm=effects_at_mm),
         {
             name: np.broadcast_to(quantity, rows.lead or (1,)).reshape(count)
             for name, quantity in values.quantities.items()
         },
         values.quantities_at_zero,
-        rows.time_s,
         bare["bare_frame"]["base_joints_M_mm"][:, :n],
         Pose(
             pose["origin_M_mm"],

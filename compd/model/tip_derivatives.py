@@ -11,6 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.model.effect_basis import evaluate_basis
 from compd.model.effect_memory import EffectMemory
+from compd.model.kernels.row_arguments import GaugeRows, SolvedRows, TipDerivativeArrays, WarmRows
 from compd.model.kernels.solver_structures import RESULT, WORKSPACE
 from compd.model.kernels.tip_derivatives import set_tip_derivatives
 from compd.model.machine import MachineModel
@@ -58,33 +59,28 @@ def tip_derivatives(
     values = np.array([quantities[name] for name in program.quantities], dtype=np.float64)
     references = [quantities_at_zero[name] if value is None else value for name, value in program.references]
     raised = values + np.array([sigmas.get(name, np.nan) for name in program.quantities], dtype=np.float64)
-    by_port = np.empty((3, program.size))
-    by_theta, by_quantity = np.empty((3, len(program.theta))), np.empty((3, len(values)))
+    zero = model.zero
+    arrays = TipDerivativeArrays(
+        np.empty((3, program.size)), np.empty((3, len(program.arrays.theta))), np.empty((3, len(values)))
+    )
     set_tip_derivatives(
         model.structure,
-        program.machine,
-        program.effects,
-        program.theta,
-        program.numbers,
-        program.code,
-        program.quantity_places,
-        program.targets,
-        np.array(scale_mm),
-        np.array(joint_mm),
-        np.array(frame_mm),
+        program.arrays,
+        GaugeRows(
+            np.array(scale_mm, ndmin=2), np.array(joint_mm, ndmin=2), np.array(frame_mm, ndmin=2), np.array([time_s])
+        ),
         np.concatenate([values, references]),
-        time_s,
         raised,
-        model.zero.platform_origin_M_mm.copy(),
-        model.zero.rotation_M_P.copy(),
-        packed.motion,
-        packed.memories,
-        np.zeros(1, WORKSPACE),
-        np.zeros(1, RESULT),
-        by_port,
-        by_theta,
-        by_quantity,
+        WarmRows(
+            np.array(model.frame.zero_supports_M_mm, ndmin=3),
+            np.array(zero.platform_origin_M_mm, ndmin=2),
+            np.array(zero.rotation_M_P, ndmin=3),
+        ),
+        packed.arrays,
+        SolvedRows(np.zeros(1, WORKSPACE), np.zeros(1, RESULT)),
+        arrays,
     )
+    by_port, by_theta, by_quantity = arrays
     derivatives = TipDerivatives(by_port[:, : model.links + len(joint_mm) + 9], by_theta, by_quantity)
     if program.given:
         rows = _rows(model, scale_mm, joint_mm, frame_mm, quantities, quantities_at_zero, time_s, effects)
@@ -131,14 +127,14 @@ def _add_python_effects(
 ) -> None:
     """Add what the effects without a kernel give; by_port (3, size), raised (q,) as in the kernel."""
     program = model.program
-    for place in program.given:
-        fitted, structure = model.live_effects[place], program.effects[place]
+    for index in program.given:
+        fitted, structure = model.live_effects[index], program.arrays.effects[index]
         memory = effects.memories.get(fitted.effect.id)
         basis = evaluate_basis(fitted.effect, rows, fitted.constants, memory)[0][0]
         begin = structure["targets_begin"]
-        by_added = by_port[:, program.targets[begin : begin + structure["size"]]]
+        by_added = by_port[:, program.arrays.targets[begin : begin + structure["size"]]]
         derivatives.by_theta[:, structure["theta_begin"] : structure["theta_end"]] = by_added @ basis
-        needed = program.quantity_places[structure["quantities_begin"] : structure["quantities_end"]]
+        needed = program.arrays.quantity_indices[structure["quantities_begin"] : structure["quantities_end"]]
         for quantity in needed[: len(needed) // 2]:
             changed = {**rows.quantities, program.quantities[quantity]: raised[quantity : quantity + 1]}
             moved = evaluate_basis(fitted.effect, replace(rows, quantities=changed), fitted.constants, memory)[0][0]

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray
 from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.jit import helper
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import copy_frame, copy_pose, inverse_pose, solve_frame
 from compd.model.kernels.reason_codes import OK
 from compd.model.kernels.rotation import to_outer_frame
+from compd.model.kernels.row_arguments import EffectArrays
 from compd.model.kernels.solver_structures import FRAME, LENGTHS
 
 
@@ -66,39 +67,30 @@ def set_row(
 
 @helper
 def add_effect(
-    effect: Any,
-    row: Any,
-    machine: Any,
-    quantities: FloatArray,
-    quantity_places: IntArray,
-    code: IntArray,
-    numbers: FloatArray,
-    theta: FloatArray,
-    targets: IntArray,
-    memory: FloatArray,
-    added: FloatArray,
+    program: EffectArrays, e: int, row: Any, quantities: FloatArray, memory: FloatArray, added: FloatArray
 ) -> None:
-    """Add basis @ theta of one effect to the row of numbers `added`."""
+    """Add basis @ theta of effect e to the row of numbers `added`. memory : of all effects."""
+    effect = program.effects[e]
     needed = np.empty(effect.quantities_end - effect.quantities_begin)
     for i in range(needed.shape[0]):
-        needed[i] = quantities[quantity_places[effect.quantities_begin + i]]
+        needed[i] = quantities[program.quantity_indices[effect.quantities_begin + i]]
     parameters = effect.theta_end - effect.theta_begin
     basis = np.zeros((effect.size, parameters))
     set_basis(
         effect.number,
         row,
-        machine,
+        program.machine[0],
         needed,
-        code[effect.code_begin : effect.code_end],
-        numbers[effect.numbers_begin : effect.numbers_end],
+        program.code[effect.code_begin : effect.code_end],
+        program.numbers[effect.numbers_begin : effect.numbers_end],
         memory[effect.memory_begin : effect.memory_end],
         basis,
     )
     for i in range(effect.size):
         total = 0.0
         for p in range(parameters):
-            total += basis[i, p] * theta[effect.theta_begin + p]
-        added[targets[effect.targets_begin + i]] += total
+            total += basis[i, p] * program.theta[effect.theta_begin + p]
+        added[program.targets[effect.targets_begin + i]] += total
 
 
 @helper
@@ -161,9 +153,9 @@ def add_effects(
 ) -> int:
     """The command that reaches the target on the machine with its effects; returns the reason.
 
-    added_mm (K, size) : what each effect adds.  every : compute each effect's share, by how much it changes the
-    setpoint of those before it; otherwise the setpoint with all of them alone.  setpoint_mm : that without effects, and
-    afterwards with them.
+    added_mm (K, size) : what each effect adds.  every : compute each effect's contribution, by how much it changes
+    the setpoint of those before it; otherwise the setpoint with all of them alone.  setpoint_mm : that without
+    effects, and afterwards with them.
     """
     n = model.links
     total_mm = np.zeros(added_mm.shape[1])
