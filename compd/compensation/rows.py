@@ -74,11 +74,13 @@ def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wante
 
 
 def _row_copy(values: FloatArray, lead: tuple[int, ...], core: int) -> FloatArray:
-    """(N, ...), a copy: the kernel takes none that is read-only."""
+    """(N, ...): a contiguous copy, since the kernel takes no read-only array."""
     if not lead:
-        return np.array(values, dtype=np.float64, ndmin=core + 1)
+        return np.array(values, dtype=np.float64, ndmin=core + 1, order="C")
     shape = values.shape[values.ndim - core :]
-    return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64).reshape(math.prod(lead), *shape)
+    return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64, order="C").reshape(
+        math.prod(lead), *shape
+    )
 
 
 def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:

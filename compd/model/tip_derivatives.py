@@ -67,14 +67,14 @@ def tip_derivatives(
         model.structure,
         program.arrays,
         GaugeRows(
-            np.array(scale_mm, ndmin=2), np.array(joint_mm, ndmin=2), np.array(frame_mm, ndmin=2), np.array([time_s])
+            _row_copy(scale_mm, 1), _row_copy(joint_mm, 1), _row_copy(frame_mm, 1), np.array([time_s], dtype=np.float64)
         ),
         np.concatenate([values, references]),
         raised,
         WarmRows(
-            np.array(model.frame.zero_supports_M_mm, ndmin=3),
-            np.array(zero.platform_origin_M_mm, ndmin=2),
-            np.array(zero.rotation_M_P, ndmin=3),
+            _row_copy(model.frame.zero_supports_M_mm, 2),
+            _row_copy(zero.platform_origin_M_mm, 1),
+            _row_copy(zero.rotation_M_P, 2),
         ),
         packed.arrays,
         SolvedRows(np.zeros(1, WORKSPACE), np.zeros(1, RESULT)),
@@ -86,6 +86,11 @@ def tip_derivatives(
         rows = _rows(model, scale_mm, joint_mm, frame_mm, quantities, quantities_at_zero, time_s, effects)
         _add_python_effects(model, rows, raised, effects, by_port, derivatives)
     return derivatives
+
+
+def _row_copy(values: FloatArray, axes: int) -> FloatArray:
+    """One row (1, ...) of values with so many axes: a contiguous copy, since the kernel takes no read-only array."""
+    return np.array(values, dtype=np.float64, ndmin=axes + 1, order="C")
 
 
 def _rows(

@@ -9,7 +9,7 @@ from compd.compensation.compensation import compensate_cmm, compensate_machine_t
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.errors import KinematicsError
 from compd.model.kernels.rotation import rotation_matrix, rotation_vector, to_inner
-from compd.model.machine import MachineModel, machine_model
+from compd.model.machine import MachineModel, MachineParts, machine_model
 from compd.model.solve_status import Reason, require
 from compd.model.tool import Contact, ToolOnPlate
 from tests.support.model_machines import (
@@ -29,7 +29,9 @@ ROWS = 25
 def work_on_platform(parts: dict[str, object]) -> MachineModel:
     """Figure 15: the tool stands on the surface plate, the work is carried under it."""
     tool_M, place_P = np.array([0.0, 0.0, 190.0]), np.array([10.0, 5.0, -60.0])
-    return machine_model(**{**parts, "arrangement": ToolOnPlate(tool_M), "zero_contact": Contact(tool_M, place_P)})  # type: ignore[arg-type]
+    return machine_model(
+        MachineParts(**{**parts, "arrangement": ToolOnPlate(tool_M), "zero_contact": Contact(tool_M, place_P)})
+    )  # type: ignore[arg-type]
 
 
 UNDER = (rotation("x", 180), np.array([0.0, 0.0, 50.0]))
@@ -37,8 +39,8 @@ BESIDE = (rotation("y", 90), np.array([-800.0, 0.0, 300.0]))
 MACHINES = {
     "tripod": tripod(),
     "hexapod": hexapod(),
-    "tripod under the work": machine_model(**move_machine(tripod_parts(), *UNDER)),
-    "hexapod beside the work": machine_model(**move_machine(hexapod_parts(), *BESIDE)),
+    "tripod under the work": machine_model(MachineParts(**move_machine(tripod_parts(), *UNDER))),
+    "hexapod beside the work": machine_model(MachineParts(**move_machine(hexapod_parts(), *BESIDE))),
     "tripod with the work on the platform": work_on_platform(tripod_parts()),
     "hexapod with the work on the platform": work_on_platform(hexapod_parts()),
 }
@@ -152,7 +154,7 @@ def assert_same_bits(one: Compensation, many: Compensation, i: int) -> None:
 @pytest.mark.parametrize("turn", [UNDER, BESIDE], ids=["under", "beside"])
 @pytest.mark.parametrize("parts", [tripod_parts(), hexapod_parts()], ids=["tripod", "hexapod"])
 def test_a_turned_world_asks_for_the_same_setpoint(parts: dict[str, object], turn: tuple[Floats, Floats]) -> None:
-    here, there = machine_model(**parts), machine_model(**move_machine(parts, *turn))  # type: ignore[arg-type]
+    here, there = machine_model(MachineParts(**parts)), machine_model(MachineParts(**move_machine(parts, *turn)))  # type: ignore[arg-type]
     values = gauges(here)
     upright, _ = compensate_machine_tool(here, targets(here), None, values, WarmStart.at_zero(here))
     turned, _ = compensate_machine_tool(there, targets(here), None, values, WarmStart.at_zero(there))

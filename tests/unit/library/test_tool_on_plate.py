@@ -16,7 +16,7 @@ from compd.compensation.compensation import compensate_cmm, compensate_machine_t
 from compd.compensation.values import GaugeValues, WarmStart
 from compd.configuration import load
 from compd.model.effect import FittedEffect
-from compd.model.machine import MachineModel, machine_constants, machine_model
+from compd.model.machine import MachineModel, MachineParts, machine_constants, machine_model
 from compd.model.tool import ToolOnPlate
 from tests.support.effect_rows import DETAILS, LIBRARY, all_quantities
 from tests.support.model_machines import Floats, tripod_parts
@@ -75,7 +75,7 @@ def test_a_hidden_offset_is_fitted_in_the_plates_frame(hide: Hide, tmp_path: Pat
 def machine_with(id_: str) -> tuple[MachineModel, Floats]:
     """The tripod with its tool on the plate and this effect, and how far that moves the tool's tip in {M}, mm."""
     theta, moved_um = CASES[id_]
-    model = machine_model(**{**tripod_parts(), "arrangement": ToolOnPlate(TOOL_M_MM)})
+    model = machine_model(MachineParts(**{**tripod_parts(), "arrangement": ToolOnPlate(TOOL_M_MM)}))
     fitted = FittedEffect(LIBRARY[id_], np.array(theta))
     return replace(model, effects=(fitted,), constants=machine_constants(model, DETAILS)), 1e-3 * moved_um
 
