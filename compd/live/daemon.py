@@ -53,7 +53,7 @@ from compd.live.service.model_keeping import ModelKeeping
 from compd.live.service.model_switch import ModelSwitch
 from compd.live.service.publisher import Publisher
 from compd.live.service.readings_message import ReadingsMessage
-from compd.live.service.request_context import RequestContext, TargetKeys
+from compd.live.service.request_context import Errands, Messages, RequestContext, TargetKeys
 from compd.live.service.requests import Requests
 from compd.live.service.status_message import StatusReport
 from compd.live.service.tcp_access import TcpAccess
@@ -141,7 +141,14 @@ class Daemon:
         if packets is not None:
             observers.append(packets.deliver)
         publisher = Publisher(
-            self.listeners, self.setpoints, cycles, watch, self.period_s, clock, observers, packet_hash
+            listeners=self.listeners,
+            setpoints=self.setpoints,
+            cycles=cycles,
+            watch=watch,
+            period_s=self.period_s,
+            clock=clock,
+            observers=observers,
+            packet_hash=packet_hash,
         )
         zero_capture = ZeroCapture(
             self._wires,
@@ -172,19 +179,19 @@ class Daemon:
             "links": configuration.geometry.links,
         }
         report = StatusReport(
-            version,
-            self.latest,
-            self._wires,
-            self.commands,
-            adopted,
-            timing,
-            self.control,
-            publisher,
-            packets,
-            self._lines_status,
-            self.trust,
-            clock,
-            self.ports,
+            version=version,
+            latest=self.latest,
+            wires=self._wires,
+            commands=self.commands,
+            adopted=adopted,
+            timing=timing,
+            control=self.control,
+            publisher=publisher,
+            packets=packets,
+            lines=self._lines_status,
+            trust=self.trust,
+            clock=clock,
+            ports=self.ports,
         )
         keys = TargetKeys(
             tip="tip_B0_mm" if configuration.geometry.tool.on == "platform" else "tip_P_mm",
@@ -192,22 +199,26 @@ class Daemon:
         )
         requests = Requests(
             RequestContext(
-                version,
-                keys,
-                self.commands,
-                report.message,
-                machine_message(configuration, self._wires),
-                BudgetMessage(pipeline.settings.model, self._newest_setpoint).message,
-                zero_capture.start,
-                ReadingsMessage(self._wires, self.latest.channels),
-                model_switch.start,
-                lambda: {**adopted.summary, **keeping(adopted.summary)},
-                Acceptance(self.trust, clock).start,
-                sockets.target,
-                access,
-                clock,
-                self._poll_requests.add,
-                publisher.tell_order,
+                messages=Messages(
+                    version=version,
+                    machine=machine_message(configuration, self._wires),
+                    status=report.message,
+                    budget=BudgetMessage(pipeline.settings.model, self._newest_setpoint).message,
+                    models=lambda: {**adopted.summary, **keeping(adopted.summary)},
+                    readings=ReadingsMessage(self._wires, self.latest.channels),
+                ),
+                errands=Errands(
+                    take_zero=zero_capture.start,
+                    switch_model=model_switch.start,
+                    accept=Acceptance(self.trust, clock).start,
+                    poll=self._poll_requests.add,
+                    tell_order=publisher.tell_order,
+                ),
+                commands=self.commands,
+                target_keys=keys,
+                targets=sockets.target,
+                access=access,
+                clock=clock,
             )
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}

@@ -16,7 +16,7 @@ from compd.errors import Problem, StateError
 from compd.live.loop.commands import Commands
 from compd.live.service.client_session import ClientSession
 from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError
-from compd.live.service.request_context import RequestContext, TargetKeys
+from compd.live.service.request_context import Errands, Messages, RequestContext, TargetKeys
 from compd.live.service.requests import REQUESTS, SENT_MESSAGES, Requests
 from tests.fuzz.bounds import examples
 
@@ -59,14 +59,22 @@ def requests(tip: str, rotation: bool) -> Requests:
     commands = Commands(StateError(Problem(where="zero", what="none")))
     return Requests(
         RequestContext(
-            {"class": "VERSION", "protocol": 1, "release": "1", "machine": "test", "config_hash": "00", "links": 3},
-            TargetKeys(tip, rotation),  # type: ignore[arg-type]
-            commands,
-            lambda: {"class": "STATUS"},
-            {"class": "MACHINE"},
-            lambda: {"class": "BUDGET"},
-            lambda *_: None,
-            switch_model=lambda *_: None,
+            messages=Messages(
+                version={
+                    "class": "VERSION",
+                    "protocol": 1,
+                    "release": "1",
+                    "machine": "test",
+                    "config_hash": "00",
+                    "links": 3,
+                },
+                machine={"class": "MACHINE"},
+                status=lambda: {"class": "STATUS"},
+                budget=lambda: {"class": "BUDGET"},
+            ),
+            errands=Errands(take_zero=lambda *_: None, switch_model=lambda *_: None),
+            commands=commands,
+            target_keys=TargetKeys(tip, rotation),  # type: ignore[arg-type]
         )
     )
 

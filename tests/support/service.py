@@ -21,7 +21,7 @@ from compd.live.memory.shared_ring import SharedRing
 from compd.live.service.listeners import Listeners
 from compd.live.service.messages import line
 from compd.live.service.publisher import Publisher
-from compd.live.service.request_context import RequestContext, TargetKeys
+from compd.live.service.request_context import Errands, Messages, RequestContext, TargetKeys
 from compd.live.service.requests import Requests
 from compd.live.service.tcp_access import TcpAccess
 from compd.model.frame import Frame
@@ -127,24 +127,34 @@ class Service:
         self.listeners = Listeners(sockets)
         self.ring = SharedRing()
         self.publisher = Publisher(
-            self.listeners, self.ring, SharedRing(), LoopIsWell(), PERIOD_S, self.clock, [self.observed.append]
+            listeners=self.listeners,
+            setpoints=self.ring,
+            cycles=SharedRing(),
+            watch=LoopIsWell(),
+            period_s=PERIOD_S,
+            clock=self.clock,
+            observers=[self.observed.append],
         )
         self.requests = Requests(
             RequestContext(
-                VERSION,
-                target_keys,
-                self.commands,
-                self.status,
-                {"class": "MACHINE"},
-                lambda: {"class": "BUDGET"},
-                lambda replace, answer: self.zeros.append((replace, answer)),
-                switch_model=lambda *arguments: self.models.append(arguments),
-                accept=self.accept,
+                messages=Messages(
+                    version=VERSION,
+                    machine={"class": "MACHINE"},
+                    status=self.status,
+                    budget=lambda: {"class": "BUDGET"},
+                ),
+                errands=Errands(
+                    take_zero=lambda replace, answer: self.zeros.append((replace, answer)),
+                    switch_model=lambda *arguments: self.models.append(arguments),
+                    accept=self.accept,
+                    poll=self.poll_requests.add,
+                    tell_order=self.publisher.tell_order,
+                ),
+                commands=self.commands,
+                target_keys=target_keys,
                 targets=sockets.target,
                 access=TcpAccess.of(sockets.tcp),
                 clock=self.clock,
-                poll=self.poll_requests.add,
-                tell_order=self.publisher.tell_order,
             )
         )
         self.stopping = threading.Event()

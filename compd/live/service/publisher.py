@@ -53,6 +53,7 @@ class Publisher:
 
     def __init__(
         self,
+        *,
         listeners: Listeners,
         setpoints: SharedRing,
         cycles: SharedRing,
@@ -248,7 +249,7 @@ class Publisher:
                 self._publish(setpoint)
         for content in self._cycles.contents(lambda time_s, _: self._is_due(Stream.READINGS, time_s)):
             cycle = self._unpacker.unpack(content)
-            readings = self._requests.context.readings
+            readings = self._requests.context.messages.readings
             assert readings is not None, "who watches them has been told their columns"
             self._send_to_watchers(Stream.READINGS, cycle.inputs.snapshot.time_s, readings.line(cycle))
         if (stop := self._watch.missing(self._clock.monotonic())) is not None:
