@@ -128,8 +128,8 @@ class PushedGauge(Gauge[PushedLine]):
         """What the channels of the message's address read by it; none for a message that came before."""
         return [
             heard
-            for place, address in enumerate(self.addresses)
-            if address == message.address and (heard := self._heard(place, message)) is not None
+            for index, address in enumerate(self.addresses)
+            if address == message.address and (heard := self._heard(index, message)) is not None
         ]
 
     def read(self, line: PushedLine) -> Sequence[Reading]:
@@ -151,32 +151,32 @@ class PushedGauge(Gauge[PushedLine]):
         if not heard_any:
             raise LineFault(Quality.TIMEOUT, f"nothing came on {', '.join(sorted(set(self.addresses)))}")
         return [
-            self._newest.get(place, bad(-math.inf, Quality.TIMEOUT, f"nothing came on {address}"))
-            for place, address in enumerate(self.addresses)
+            self._newest.get(index, bad(-math.inf, Quality.TIMEOUT, f"nothing came on {address}"))
+            for index, address in enumerate(self.addresses)
         ]
 
-    def _heard(self, place: int, message: Message) -> Heard | None:
+    def _heard(self, index: int, message: Message) -> Heard | None:
         arrived_s = message.arrival.arrived_s
         if message.quality is not Quality.OK:
-            self._sent.pop(place, None)  # the value before it counts again when the source says so
-            return Heard(place, bad(arrived_s, message.quality, message.detail))
+            self._sent.pop(index, None)  # the value before it counts again when the source says so
+            return Heard(index, bad(arrived_s, message.quality, message.detail))
         try:
-            stamp = self.stamp(place, message)
-            time = self._times[place].of(message.arrival, stamp.utc_s, stamp.resolution_s)
-            reading = self.decode(place, message, time.time_s)
-            if self._is_repeated(place, stamp, reading) and not message.arrival.holds:
+            stamp = self.stamp(index, message)
+            time = self._times[index].of(message.arrival, stamp.utc_s, stamp.resolution_s)
+            reading = self.decode(index, message, time.time_s)
+            if self._is_repeated(index, stamp, reading) and not message.arrival.holds:
                 return None
         except LineFault as fault:
-            return Heard(place, bad(arrived_s, fault.quality, fault.detail))
+            return Heard(index, bad(arrived_s, fault.quality, fault.detail))
         except OutOfOrderError as error:
-            return Heard(place, bad(arrived_s, Quality.MISMATCH, str(error)))
+            return Heard(index, bad(arrived_s, Quality.MISMATCH, str(error)))
         except AgeUnknownError as error:
-            return Heard(place, bad(arrived_s, Quality.STALE, str(error)))
-        return Heard(place, reading, time.window_s, time.note)
+            return Heard(index, bad(arrived_s, Quality.STALE, str(error)))
+        return Heard(index, reading, time.window_s, time.note)
 
-    def _is_repeated(self, place: int, stamp: Stamp, reading: Reading) -> bool:
+    def _is_repeated(self, index: int, stamp: Stamp, reading: Reading) -> bool:
         """Whether this is a second copy of the last value: only a time of the source that counts can show it."""
         if self.options.time_from == "arrival" or math.isnan(stamp.utc_s):
             return False
-        sent, self._sent[place] = self._sent.get(place), (stamp.utc_s, reading.value)
-        return sent == self._sent[place]
+        sent, self._sent[index] = self._sent.get(index), (stamp.utc_s, reading.value)
+        return sent == self._sent[index]

@@ -13,7 +13,7 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.covariates import Covariate, covariates
 from compd.model.effect import FittedEffect
 from compd.model.effect_needs import needed_quantities
-from compd.report.error_part import ErrorPart
+from compd.report.error_part import ErrorContribution
 from compd.report.small_multiples import axis_title
 from compd.units import unit_of
 
@@ -40,7 +40,7 @@ class Driver:
 
 
 def find_driver(
-    part: ErrorPart, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording, unit: str
+    part: ErrorContribution, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording, unit: str
 ) -> Driver:
     """What a series of the part follows most closely: among what the effects need, else where the machine stands.
 
@@ -57,7 +57,7 @@ def find_driver(
 
 
 def _needed(
-    part: ErrorPart, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording
+    part: ErrorContribution, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording
 ) -> Iterator[Driver]:
     """What the effects say that they need: at a link its own, else each column."""
     rows = aligned.rows
@@ -139,7 +139,7 @@ def _column(covariate: Covariate) -> str:
     return f"tip_{covariate.name}_mm" if covariate.name in ("x", "y", "z") else f"{covariate.name}_{unit}"
 
 
-def _driven_share(part: ErrorPart, series: int, values: FloatArray) -> float:
+def _driven_share(part: ErrorContribution, series: int, values: FloatArray) -> float:
     """Share of the series' variation that rows with neighbouring values have in common.
 
     1 - sum (y_{i+1} - y_i)^2 / (2 sum (y_i - mean)^2), rows sorted by the values: 1 for a line, 0 for no relation (J.

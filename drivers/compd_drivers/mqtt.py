@@ -140,9 +140,9 @@ class Mqtt(PushedGauge):
         period_s: float | None = self.options.period_s
         return period_s
 
-    def stamp(self, place: int, message: Message) -> Stamp:
+    def stamp(self, index: int, message: Message) -> Stamp:
         """The time in the payload. Raises LineFault (MISMATCH) where it is to have one."""
-        described = self._described[place]
+        described = self._described[index]
         if described.time is None or self.options.time_from == "arrival":
             return Stamp(math.nan)
         value = _at(self._json(message), described.time)
@@ -151,8 +151,8 @@ class Mqtt(PushedGauge):
             raise LineFault(Quality.MISMATCH, f"no time in {described.time_format}: {value!r}"[:SHOWN_BYTES])
         return stamp
 
-    def decode(self, place: int, message: Message, time_s: float) -> Reading:
-        described = self._described[place]
+    def decode(self, index: int, message: Message, time_s: float) -> Reading:
+        described = self._described[index]
         if described.status is not None:
             status = _at(self._json(message), described.status.at)
             if not any(status == ok and type(status) is type(ok) for ok in described.status.ok):

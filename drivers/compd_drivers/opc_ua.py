@@ -70,8 +70,8 @@ class OpcUa(PushedGauge):
     def addresses(self) -> Sequence[str]:
         return [described.node for described in self._described]
 
-    def decode(self, place: int, message: Message, time_s: float) -> Reading:
-        described = self._described[place]
+    def decode(self, index: int, message: Message, time_s: float) -> Reading:
+        described = self._described[index]
         value: Any = message.payload
         if described.index is not None:
             if not isinstance(value, list) or described.index >= len(value):

@@ -65,23 +65,23 @@ class GaugeTrust:
             judged.append(reading)
         return judged
 
-    def hear(self, place: int, reading: Reading, window_s: float, now_s: float) -> Reading:
+    def hear(self, index: int, reading: Reading, window_s: float, now_s: float) -> Reading:
         """A reading of the channel number `place` that came unasked, as it may be published.
 
         Nobody can ask again: where a value is not where its last readings lead, the next reading is the second answer.
         window_s : by how much later than its time it may have been measured, s.
         """
-        channel = self._channels[place]
+        channel = self._channels[index]
         if channel is None:
             return reading
         if not reading.ok:
-            self._surprising.pop(place, None)
+            self._surprising.pop(index, None)
             channel.fail(reading.quality, now_s)
             return reading
         window_s += WINDOW_S
-        first = self._surprising.pop(place, None)
+        first = self._surprising.pop(index, None)
         if first is None and channel.surprises(GaugeSample(reading.value, reading.time_s, window_s)):
-            self._surprising[place] = reading
+            self._surprising[index] = reading
         return channel.judge(reading, window_s, first)
 
     def fail(self, quality: Quality, now_s: float) -> None:

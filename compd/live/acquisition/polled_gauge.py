@@ -116,8 +116,8 @@ class PolledGauge:
         for reading in readings:
             _check(reading, now_s)
         readings = self._trust.judge(readings, now_s)
-        for place, reading in enumerate(readings):
-            self._publish_unless_kept(place, reading, now_s)
+        for index, reading in enumerate(readings):
+            self._publish_unless_kept(index, reading, now_s)
         self._count(readings, readings, now_s)
 
     def hear(self, heard: Sequence[Heard], now_s: float) -> None:
@@ -169,7 +169,7 @@ class PolledGauge:
         self.faults[quality] += 1
         self._trust.fail(quality, now_s)
         published = bad(now_s, quality, detail)
-        kept = sum(self._publish_unless_kept(place, published, now_s) for place in range(len(self._slots)))
+        kept = sum(self._publish_unless_kept(index, published, now_s) for index in range(len(self._slots)))
         self._note(quality, detail)
         if not kept:
             self._log_change()
@@ -188,9 +188,9 @@ class PolledGauge:
         """Give every channel `quality`, without a poll: the line is lost."""
         self._trust.fail(quality, now_s)
         self.faults[quality] += 1
-        for place in range(len(self._slots)):
-            self._heard[place] = bad(now_s, quality, detail)
-            self._publish(place, self._heard[place])
+        for index in range(len(self._slots)):
+            self._heard[index] = bad(now_s, quality, detail)
+            self._publish(index, self._heard[index])
         self._note(quality, detail)
         self._log_change()
 
@@ -202,20 +202,20 @@ class PolledGauge:
         """End a rest."""
         self.rests_until_s = -math.inf
 
-    def _publish_unless_kept(self, place: int, reading: Reading, now_s: float) -> bool:
+    def _publish_unless_kept(self, index: int, reading: Reading, now_s: float) -> bool:
         """Publish a reading, but no fault that may pass while the last reading is good; whether that was kept."""
-        last = self._published[place]
+        last = self._published[index]
         if reading.quality in MAY_PASS and self._is_fresh(last, now_s):
             return True
-        self._publish(place, reading)
+        self._publish(index, reading)
         return False
 
     def _is_fresh(self, reading: Reading, now_s: float) -> bool:
         return reading.ok and now_s - reading.time_s <= self._stale_after_s
 
-    def _publish(self, place: int, reading: Reading) -> None:
-        self._published[place] = reading
-        self._latest.put(self._slots[place], reading)
+    def _publish(self, index: int, reading: Reading) -> None:
+        self._published[index] = reading
+        self._latest.put(self._slots[index], reading)
 
     def _note(self, quality: Quality, detail: str) -> None:
         self.quality = quality

@@ -59,10 +59,10 @@ class PushedRound:
         self._back_off = back_off
         self._subscribe_s = -math.inf  # when what was refused is asked for again
         self._listeners = [
-            _Listener(gauge, gauge.driver, place, address, stale_after_s[gauge.name])
+            _Listener(gauge, gauge.driver, index, address, stale_after_s[gauge.name])
             for gauge in gauges
             if isinstance(gauge.driver, PushedGauge)
-            for place, address in enumerate(gauge.driver.addresses)
+            for index, address in enumerate(gauge.driver.addresses)
         ]
         self._noted: dict[str, bool] = {}  # by gauge: whether its clock was wrong
 

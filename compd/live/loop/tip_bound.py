@@ -190,8 +190,8 @@ def _largest_part(bound: TipBound, snapshot: Snapshot, usable: UsableComparators
     )
 
 
-def _named(wires: MachineWires, places: list[int]) -> str:
-    return _listed([f"{wires.length_wires[k].meaning} ({wires.length_wires[k].channel})" for k in places])
+def _named(wires: MachineWires, indices: list[int]) -> str:
+    return _listed([f"{wires.length_wires[k].meaning} ({wires.length_wires[k].channel})" for k in indices])
 
 
 def _listed(names: list[str]) -> str:

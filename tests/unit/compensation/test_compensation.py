@@ -146,8 +146,8 @@ def assert_same_bits(one: Compensation, many: Compensation, i: int) -> None:
     for name in ("tip_M_mm", "tip_B0_mm", "tip_P_mm"):
         every = np.broadcast_to(getattr(many, name), (ROWS, 3))
         assert getattr(one, name).tobytes() == every[i].tobytes(), name
-    for cause, share in one.contributions.items():
-        assert share.tobytes() == many.contributions[cause][i].tobytes(), cause
+    for cause, contribution in one.contributions.items():
+        assert contribution.tobytes() == many.contributions[cause][i].tobytes(), cause
     assert all(a.tobytes() == b[i].tobytes() for a, b in zip(one.frame, many.frame, strict=True))
 
 

@@ -116,8 +116,8 @@ def test_snapshots_one_by_one_are_as_all_rows_together(model: MachineModel) -> N
         assert one.tip_M_mm.tobytes() == together_.tip_M_mm[i].tobytes()
         assert one.tip_P_mm.tobytes() == np.broadcast_to(together_.tip_P_mm, (ROWS, 3))[i].tobytes()
         assert one.correction_mm.tobytes() == together_.correction_mm[i].tobytes()
-        for name, share in one.contributions.items():
-            assert share.tobytes() == together_.contributions[name][i].tobytes(), name
+        for name, contribution in one.contributions.items():
+            assert contribution.tobytes() == together_.contributions[name][i].tobytes(), name
     for name, memory in warm.effects.memories.items():
         for a, b in zip(memory or (), after.effects.memories[name] or (), strict=True):
             assert np.array_equal(a, b, equal_nan=True), name
