@@ -109,7 +109,9 @@ class Setpoint(NamedTuple):
 
     def encoded(self, config_hash: bytes | None) -> Setpoint:
         """With its `line` and `packet`. config_hash : for the packet; None for no packet."""
-        return self._replace(line=self.to_json(), packet=b"" if config_hash is None else self.to_packet(config_hash))
+        packet = b"" if config_hash is None else self.to_packet(config_hash)
+        # a quarter of the time of `_replace`
+        return Setpoint._make((*self[:_ENCODED_FROM], self.to_json(), packet))
 
     def pack(self) -> bytes:
         """What clients are sent of an encoded setpoint, as the content of a ring's entry."""
@@ -260,3 +262,6 @@ def _rounded(values: FloatArray, decimals: int) -> list[Any]:
     if not math.isfinite(sum(lists) if values.ndim == 1 else sum(map(sum, lists))):
         raise ValueError("a value of the setpoint is not finite")
     return lists
+
+
+_ENCODED_FROM = Setpoint._fields.index("line")
