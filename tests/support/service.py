@@ -183,7 +183,8 @@ class Service:
         self.ring.wake_reader()
 
     def deliver(self, setpoint):
-        self.ring.put(setpoint.time_s, setpoint.state.code, setpoint.encoded(None).pack())
+        _, content = setpoint.pack(None)
+        self.ring.put(setpoint.time_s, setpoint.state.code, content)
 
     def unix(self, **options):
         return self._peer(Peer(socket.AF_UNIX, str(self.path), **options))

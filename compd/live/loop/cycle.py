@@ -215,9 +215,7 @@ def _compute(
         if code := int(compensation.reason):
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
     reported, reason = _reported(usable, scales_state, scales_reason, limited)
-    compensation = compensation._replace(
-        scale_setpoint_mm=compensation.nominal_scale_mm + limited.applied_mm, correction_mm=limited.applied_mm
-    )
+    compensation = _with_applied(compensation, limited.applied_mm)
     return (
         _Outcome(
             reported,
@@ -231,6 +229,13 @@ def _compute(
         ),
         next_state,
     )
+
+
+def _with_applied(compensation: Compensation, applied_mm: FloatArray) -> Compensation:
+    """The compensation with the correction (n) that is applied, and the scale setpoint that belongs to it."""
+    setpoint_mm = compensation.nominal_scale_mm + applied_mm
+    # in the order of the fields: `_replace` takes three times as long
+    return Compensation._make((*compensation[:8], setpoint_mm, applied_mm, *compensation[10:]))
 
 
 def _reported(

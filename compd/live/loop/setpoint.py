@@ -82,7 +82,7 @@ class Setpoint(NamedTuple):
         or None.
     shadow : result of the model that runs beside the applied one; None without one.
     tool_on_plate : whether the tool stands on the plate: `tip_P_mm` of the values is the place on the work then.
-    line : its JSON, with the newline. packet : for UDP. Both are b"" until `encoded`.
+    line : its JSON, with the newline. packet : for UDP. Both are b"" but in what `unpack` returned.
     """
 
     seq: int
@@ -107,17 +107,14 @@ class Setpoint(NamedTuple):
     def valid(self) -> bool:
         return self.state.valid
 
-    def encoded(self, config_hash: bytes | None) -> Setpoint:
-        """With its `line` and `packet`. config_hash : for the packet; None for no packet."""
-        packet = b"" if config_hash is None else self.to_packet(config_hash)
-        # a quarter of the time of `_replace`
-        return Setpoint._make((*self[:_ENCODED_FROM], self.to_json(), packet))
+    def pack(self, config_hash: bytes | None) -> tuple[bytes, bytes]:
+        """Its line, and what clients are sent of it as the content of a ring's entry: the line among it.
 
-    def pack(self) -> bytes:
-        """What clients are sent of an encoded setpoint, as the content of a ring's entry."""
-        return pickle.dumps(
-            (*self[:4], self.state.code, self.reason, self.mode.code, self.line, self.packet), _PICKLE_PROTOCOL
-        )
+        config_hash : for the packet; None for no packet.
+        """
+        line, packet = self.to_json(), b"" if config_hash is None else self.to_packet(config_hash)
+        content = (*self[:4], self.state.code, self.reason, self.mode.code, line, packet)
+        return line, pickle.dumps(content, _PICKLE_PROTOCOL)
 
     @classmethod
     def unpack(cls, content: bytes) -> Self:
@@ -262,6 +259,3 @@ def _rounded(values: FloatArray, decimals: int) -> list[Any]:
     if not math.isfinite(sum(lists) if values.ndim == 1 else sum(map(sum, lists))):
         raise ValueError("a value of the setpoint is not finite")
     return lists
-
-
-_ENCODED_FROM = Setpoint._fields.index("line")

@@ -269,7 +269,8 @@ class Publisher:
             self._send_to_watchers(Stream.SETPOINTS, setpoint.time_s, setpoint.line)
 
     def _publish_in_place_of_loop(self, setpoint: Setpoint) -> None:
-        self._publish(setpoint.encoded(self._packet_hash))
+        _, content = setpoint.pack(self._packet_hash)
+        self._publish(Setpoint.unpack(content))
 
     def _send_to_watchers(self, stream: Stream, time_s: float, line: bytes) -> None:
         """Send a line to the clients of a stream that are due at `time_s`."""
