@@ -8,10 +8,11 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
-from numba import boolean, float64, guvectorize, int64, njit
+from numba import boolean, float64, guvectorize, int64, njit, types
 from numba.core import config as numba_config
 
 Kernel: TypeAlias = Callable[..., Any]
@@ -47,7 +48,9 @@ def _cache_directory() -> str:
     files = [*sorted(here.glob("*.py")), *sorted((here / "model").rglob("*.py"))]
     texts = [file.read_bytes() for file in files]
     compiled = [
-        text for text in texts if b"@helper" in text or b"kernel(" in text or b"@loop" in text or b"_LIMIT = " in text
+        text
+        for text in texts
+        if any(mark in text for mark in (b"@helper", b"kernel(", b"@loop", b"structure(", b"_LIMIT = "))
     ]
     digest = hashlib.sha256(b"".join(compiled)).hexdigest()[:12]
     user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "compd"
@@ -132,16 +135,42 @@ def kernel(arguments: list[Any], layout: str) -> Callable[[Callable[..., None]],
     return compile_
 
 
+def structure(kind: type, **fields: Any) -> Any:
+    """The type of a kernel's argument that is a named tuple of the class `kind`, whose fields have these types."""
+    names: tuple[str, ...] = getattr(kind, "_fields")  # noqa: B009  NamedTuple classes have no common base
+    tuple_type: Any = types.BaseTuple
+    return tuple_type.from_types([fields[name] for name in names], kind)
+
+
 def loop(arguments: list[Any]) -> Callable[[FunctionT], FunctionT]:
     """Compile a function that goes through rows in their order: a row needs what the rows before it left behind.
 
     It takes contiguous arrays of exactly the types in `arguments` and broadcasts nothing. Compilation, or loading from
     the cache, happens here as in `kernel`.
+
+    A function with a `structure` among its arguments does not check the types of the arrays in it: numba takes 3 us for
+    each structure to do that. Such a function is called from one place, whose test compares the types.
     """
 
     def compile_(function: FunctionT) -> FunctionT:
         with _said(function), _kept():
             compiled = njit([tuple(arguments)], error_model="numpy", cache=bool(CACHE_DIRECTORY))(function)
+        if any(isinstance(argument, types.BaseTuple) for argument in arguments):
+            return cast(FunctionT, _unchecked(function, compiled))
         return cast(FunctionT, compiled)
 
     return compile_
+
+
+def _unchecked(function: Callable[..., Any], compiled: Any) -> Callable[..., Any]:
+    """The compiled code of the only signature, without numba's look at the types of the arguments."""
+    ((signature, overload),) = compiled.overloads.items()
+    entry = overload.entry_point
+
+    @wraps(function)
+    def call(*arguments: Any) -> Any:
+        return entry(*arguments)
+
+    # whoever has the function keeps the code, and a test finds the types
+    vars(call).update(compiled=compiled, signature=signature)
+    return call

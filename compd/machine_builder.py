@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration import Geometry, ToolOnPlateSettings, ToolOnPlatformSettings
-from compd.model import MachineModel, machine_constants, machine_model
+from compd.model import MachineModel, MachineParts, machine_constants, machine_model
 from compd.model.effects import MachineDetails
 from compd.model.kinematics import Arrangement, Contact, ToolOnPlate, ToolOnPlatform
 from compd.operation_settings import Wiring
@@ -32,18 +32,20 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
     attitude_rad = np.array(geometry.tool.zero_rotation_P_in_M_rad)
     tool, contact = _tool(geometry.tool)
     model = machine_model(
-        supports_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.supports_B_mm)),
-        plate_points_M_mm=geometry.plate_points_M_mm,
-        base_joints_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.joints_B_mm)),
-        support_of_joint=np.array(base.support_of_joint) - 1,
-        platform_joints_P_mm=geometry.platform.joints_P_mm,
-        revolute_axes_P=np.array(geometry.platform.revolute_axes_P).reshape(-1, 3),
-        arrangement=tool,
-        zero_contact=contact,
-        zero_rotation_M_P=None if geometry.links == 3 else rotation_matrix(attitude_rad),
-        joint_weights=joint_weights(wiring, geometry.links),
-        weight_N=geometry.platform.weight_N,
-        weight_at_P_mm=geometry.platform.weight_at_P_mm,
+        MachineParts(
+            supports_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.supports_B_mm)),
+            plate_points_M_mm=geometry.plate_points_M_mm,
+            base_joints_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.joints_B_mm)),
+            support_of_joint=np.array(base.support_of_joint) - 1,
+            platform_joints_P_mm=geometry.platform.joints_P_mm,
+            revolute_axes_P=np.array(geometry.platform.revolute_axes_P).reshape(-1, 3),
+            arrangement=tool,
+            zero_contact=contact,
+            zero_rotation_M_P=None if geometry.links == 3 else rotation_matrix(attitude_rad),
+            joint_weights=joint_weights(wiring, geometry.links),
+            weight_N=geometry.platform.weight_N,
+            weight_at_P_mm=geometry.platform.weight_at_P_mm,
+        )
     )
     return replace(model, constants=machine_constants(model, machine_details(geometry)))
 

@@ -24,7 +24,6 @@ from compd.live.loop import (
     MachineZero,
     Models,
     ModelText,
-    SentSetpoint,
     Setpoint,
     build_pipeline,
     try_model,
@@ -77,9 +76,8 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
         return number < _CYCLES
 
     def send(setpoint: Setpoint) -> None:
-        sent = SentSetpoint.of(setpoint, None)
-        sent.pack()
-        packer.pack(setpoint, sent.line)
+        line, _ = setpoint.pack(None)
+        packer.pack(setpoint, line)
 
     Loop(settings, latest, commands, [send], clock, timing).run(keep_on)
     return CycleTime(timing.cost.quantile_us(0.5) * 1e-6, timing.cost.largest_us * 1e-6)

@@ -112,8 +112,8 @@ def _bracket(
     if constant.period_of:
         return constant.name, *neighbouring_periods(effect, constant, aligned, shape[constant.name])
     grid = sorted({other[constant.name] for other in shapes})
-    place = grid.index(shape[constant.name])
-    return constant.name, grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
+    index = grid.index(shape[constant.name])
+    return constant.name, grid[max(index - 1, 0)], grid[min(index + 1, len(grid) - 1)]
 
 
 def _evident(suggested: _Trial, described: _Trial, loss_without: float, independent: int, chance: float) -> bool:

@@ -1,6 +1,5 @@
 from .compensation import compensate_cmm as compensate_cmm
 from .compensation import compensate_machine_tool as compensate_machine_tool
 from .values import Compensation as Compensation
-from .values import CorrectionShares as CorrectionShares
 from .values import GaugeValues as GaugeValues
 from .values import WarmStart as WarmStart

@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from compd.arrays import FloatArray
 from compd.compensation.rows import Rows, kernel_rows
-from compd.compensation.values import Compensation, CorrectionShares, GaugeValues, Wanted, WarmStart
+from compd.compensation.values import Compensation, Contributions, GaugeValues, Wanted, WarmStart
 from compd.errors import KinematicsError, Problem
 from compd.model import EffectInputs, EffectMemory, MachineModel, PackedMemory, python_effects
 from compd.model.effects import Memory
-from compd.model.kernels import RESULT, WORKSPACE, compensate_rows
+from compd.model.kernels import RESULT, WORKSPACE, GivenRows, RowOptions, SolvedRows, compensate_rows
 from compd.model.kinematics import Frame, Pose
 from compd.rotation import compose, rotation_matrix
 
@@ -74,7 +74,7 @@ def _compensate(
     # the kernel computes without effects, Python what its effects add there, and the kernel the whole
     without = replace(model, effects=())
     bare = _solve(without, rows, EffectMemory(), machine_tool, 1, None, None)
-    effects_at_mm = bare.results["scale_setpoint_mm"][:, : model.links].copy() if machine_tool else rows.scale_mm
+    effects_at_mm = bare.results["scale_setpoint_mm"][:, : model.links].copy() if machine_tool else rows.gauges.scale_mm
     for _ in range(_EFFECT_PASSES if machine_tool else 1):
         inputs = _effect_inputs(model, rows, bare.results, values, effects_at_mm)
         given_mm, memories = python_effects(model, inputs, memory, machine_tool)
@@ -84,10 +84,10 @@ def _compensate(
 
 
 class _Solved(NamedTuple):
-    """What the kernel leaves: results (N,), shares_mm (N, 2 + K, n), and the memory after the last row."""
+    """What the kernel leaves: results (N,), contributions_mm (N, 2 + K, n), and the memory after the last row."""
 
     results: NDArray[np.void]
-    shares_mm: FloatArray
+    contributions_mm: FloatArray
     memory: PackedMemory
 
 
@@ -100,41 +100,28 @@ def _solve(
     effects_at_mm: FloatArray | None,
     given_mm: FloatArray | None,
 ) -> _Solved:
-    program, structure = model.program, model.structure
-    count, links = rows.scale_mm.shape
+    program = model.program
+    count, links = rows.gauges.scale_mm.shape
     solved = _Solved(
         _uninitialised(count, RESULT),
-        np.empty((count, 2 + len(program.effects), links)),
-        memory.pack(model, rows.joint_mm.shape[1]),
+        np.empty((count, 2 + len(program.arrays.effects), links)),
+        memory.pack(model, rows.gauges.joint_mm.shape[1]),
     )
     compensate_rows(
-        machine_tool,
-        passes,
-        memory.is_empty,
-        memory.commanded != machine_tool,
-        structure,
-        program.machine,
-        program.effects,
-        program.theta,
-        program.numbers,
-        program.code,
-        program.quantity_places,
-        program.targets,
-        rows.scale_mm,
-        rows.joint_mm,
-        rows.frame_mm,
+        RowOptions(machine_tool, passes, memory.is_empty, memory.commanded != machine_tool),
+        model.structure,
+        program.arrays,
+        rows.gauges,
         rows.quantities,
-        rows.time_s,
-        rows.wanted_mm,
-        rows.attitude_M_P,
-        _not_given(count, links) if effects_at_mm is None else effects_at_mm,
-        np.empty((0, 0, program.size)) if given_mm is None else given_mm,
-        *rows.warm,
-        solved.memory.motion,
-        solved.memory.memories,
-        _uninitialised(1, WORKSPACE),
-        solved.results,
-        solved.shares_mm,
+        rows.wanted,
+        GivenRows(
+            _not_given(count, links) if effects_at_mm is None else effects_at_mm,
+            np.empty((0, 0, program.size)) if given_mm is None else given_mm,
+        ),
+        rows.warm,
+        solved.memory.arrays,
+        SolvedRows(_uninitialised(1, WORKSPACE), solved.results),
+        solved.contributions_mm,
     )
     return solved
 
@@ -156,15 +143,12 @@ def _effect_inputs(
     n, pose = model.links, bare["bare_pose"]
     count = len(bare)
     return EffectInputs(
-        effects_at_mm,
-        rows.joint_mm,
-        rows.frame_mm,
+        rows.gauges._replace(scale_mm=effects_at_mm),
         {
             name: np.broadcast_to(quantity, rows.lead or (1,)).reshape(count)
             for name, quantity in values.quantities.items()
         },
         values.quantities_at_zero,
-        rows.time_s,
         bare["bare_frame"]["base_joints_M_mm"][:, :n],
         Pose(
             pose["origin_M_mm"],
@@ -189,7 +173,11 @@ def _result(
     """The compensation and the next warm start. memories : of the Python effects."""
     n, lead = model.links, rows.lead
     results: Any = solved.results.reshape(lead) if lead else solved.results[0]
-    shares_mm = solved.shares_mm.reshape(*lead, *solved.shares_mm.shape[1:]) if lead else solved.shares_mm[0]
+    contributions_mm = (
+        solved.contributions_mm.reshape(*lead, *solved.contributions_mm.shape[1:])
+        if lead
+        else solved.contributions_mm[0]
+    )
     frame, pose = results["frame"], results["pose"]
     compensation = Compensation(
         results["tip_M_mm"],
@@ -212,7 +200,7 @@ def _result(
         results["nominal_scale_mm"][..., :n],
         results["scale_setpoint_mm"][..., :n],
         results["correction_mm"][..., :n],
-        CorrectionShares(model.source_names, np.moveaxis(shares_mm, -2, 0) if lead else shares_mm),
+        Contributions(model.contribution_names, np.moveaxis(contributions_mm, -2, 0) if lead else contributions_mm),
         results["reason"],
     )
     if model.live_effects:

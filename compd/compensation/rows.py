@@ -12,6 +12,7 @@ from compd.arrays import FloatArray
 from compd.compensation.values import GaugeValues, Wanted, WarmStart
 from compd.errors import CompdError, Problem
 from compd.model import MachineModel
+from compd.model.kernels import GaugeRows, WantedRows, WarmRows
 from compd.reference_conditions import value_at_zero
 
 
@@ -20,18 +21,14 @@ class Rows(NamedTuple):
 
     lead : the leading axes of the result; () for a single snapshot.
     quantities : (N, q + z), those that the effects need and those from which they count, as in the model's program.
-    wanted : (N, 6) tip in {M} and in {P}.  warm : one row, or N.
+    wanted : not filled where nothing is wanted.  warm : one row, or N.
     """
 
     lead: tuple[int, ...]
-    scale_mm: FloatArray
-    joint_mm: FloatArray
-    frame_mm: FloatArray
+    gauges: GaugeRows
     quantities: FloatArray
-    time_s: FloatArray
-    wanted_mm: FloatArray
-    attitude_M_P: FloatArray
-    warm: tuple[FloatArray, FloatArray, FloatArray]
+    wanted: WantedRows
+    warm: WarmRows
 
 
 def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wanted: Wanted | None) -> Rows:
@@ -46,8 +43,8 @@ def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wante
     names = model.program.quantities
     references = model.program.references
     quantities = np.empty((count, len(names) + len(references)))
-    for place, name in enumerate(names):
-        quantities[:, place] = _quantity(values.quantities, name)
+    for index, name in enumerate(names):
+        quantities[:, index] = _quantity(values.quantities, name)
     if references:
         at_zero = values.quantities_at_zero
         quantities[:, len(names) :] = [
@@ -60,14 +57,15 @@ def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wante
         attitude_M_P[:] = _row_copy(wanted.attitude_M_P, lead, 2)
     return Rows(
         lead,
-        _row_copy(values.scale_mm, lead, 1),
-        _row_copy(values.joint_mm, lead, 1),
-        _row_copy(values.frame_mm, lead, 1),
+        GaugeRows(
+            _row_copy(values.scale_mm, lead, 1),
+            _row_copy(values.joint_mm, lead, 1),
+            _row_copy(values.frame_mm, lead, 1),
+            _row_copy(np.asarray(values.time_s), lead, 0),
+        ),
         quantities,
-        _row_copy(np.asarray(values.time_s), lead, 0),
-        wanted_mm,
-        attitude_M_P,
-        (
+        WantedRows(wanted_mm, attitude_M_P),
+        WarmRows(
             _row_copy(warm.supports_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 2),
             _row_copy(warm.origin_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 1),
             _row_copy(warm.rotation_M_P, lead if warm.supports_M_mm.ndim > 2 else (), 2),
@@ -76,11 +74,13 @@ def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wante
 
 
 def _row_copy(values: FloatArray, lead: tuple[int, ...], core: int) -> FloatArray:
-    """(N, ...), a copy: the kernel takes none that is read-only."""
+    """(N, ...): a contiguous copy, since the kernel takes no read-only array."""
     if not lead:
-        return np.array(values, dtype=np.float64, ndmin=core + 1)
+        return np.array(values, dtype=np.float64, ndmin=core + 1, order="C")
     shape = values.shape[values.ndim - core :]
-    return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64).reshape(math.prod(lead), *shape)
+    return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64, order="C").reshape(
+        math.prod(lead), *shape
+    )
 
 
 def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:

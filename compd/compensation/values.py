@@ -48,24 +48,24 @@ class WarmStart(NamedTuple):
         return cls(model.frame.zero_supports_M_mm, zero.platform_origin_M_mm, zero.rotation_M_P)
 
 
-class CorrectionShares(Mapping[str, FloatArray]):
-    """The share (..., n) of each cause, by its name; their sum is the correction but for rounding.
+class Contributions(Mapping[str, FloatArray]):
+    """The contribution (..., n) of each cause, by its name; their sum is the correction but for rounding.
 
     Attributes
     ----------
     causes : "joints", "frame", and the id of each effect.
-    shares_mm : (K, ..., n), in the order of `causes`.
+    by_cause_mm : (K, ..., n), in the order of `causes`.
     """
 
-    def __init__(self, causes: Sequence[str], shares_mm: FloatArray) -> None:
+    def __init__(self, causes: Sequence[str], by_cause_mm: FloatArray) -> None:
         self.causes = causes
-        self.shares_mm = shares_mm
+        self.by_cause_mm = by_cause_mm
 
     def __getitem__(self, cause: str) -> FloatArray:
         if cause not in self.causes:
             raise KeyError(cause)
-        share_mm: FloatArray = self.shares_mm[self.causes.index(cause)]
-        return share_mm
+        contribution_mm: FloatArray = self.by_cause_mm[self.causes.index(cause)]
+        return contribution_mm
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.causes)
@@ -87,7 +87,7 @@ class Compensation(NamedTuple):
     nominal_scale_mm : (..., n), the command without compensation.
     scale_setpoint_mm : (..., n), what the scales must show for the tip to be on the target.
     correction_mm : (..., n) = scale_setpoint_mm - nominal_scale_mm.
-    sources : the correction by cause, (..., n) each.
+    contributions : the correction by cause, (..., n) each.
     reason : (...), a Reason, of the step that failed first.
     """
 
@@ -101,7 +101,7 @@ class Compensation(NamedTuple):
     nominal_scale_mm: FloatArray
     scale_setpoint_mm: FloatArray
     correction_mm: FloatArray
-    sources: CorrectionShares
+    contributions: Contributions
     reason: IntArray
 
 

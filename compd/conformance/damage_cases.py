@@ -44,10 +44,10 @@ def _bytes_lost(session: ConformanceSession, subject: Subject) -> CaseResult:
         return CaseResult(case, "", f"every byte: {IN_VIRTUAL_TIME}", "-")
     tries: list[Sequence[Fault]] = []
     for number, exchange in enumerate(good_poll(session)):
-        for place in range(len(exchange.reply)):
+        for index in range(len(exchange.reply)):
             tries += [
                 fault_at(number, fault)
-                for fault in (faults.lost(place), faults.lost(0, place), faults.lost(place, 2), faults.repeated(place))
+                for fault in (faults.lost(index), faults.lost(0, index), faults.lost(index, 2), faults.repeated(index))
             ]
     return _damaged(session, subject, case, tries, "describe the number's exact width, where it has one")
 

@@ -94,18 +94,18 @@ def flipped(bit: int) -> Fault:
     return Fault(f"bit {bit} turned", act)
 
 
-def lost(place: int, count: int = 1) -> Fault:
-    """`count` bytes from `place` on are lost; both count through the reply."""
+def lost(index: int, count: int = 1) -> Fault:
+    """`count` bytes from `index` on are lost; both count through the reply."""
 
     def act(reply: bytes, _: float) -> Sequence[Piece]:
-        return [Piece(0.0, reply[:place] + reply[place + count :])]
+        return [Piece(0.0, reply[:index] + reply[index + count :])]
 
-    return Fault(f"{count} byte{'s' * (count != 1)} lost from byte {place} on", act)
+    return Fault(f"{count} byte{'s' * (count != 1)} lost from byte {index} on", act)
 
 
-def repeated(place: int) -> Fault:
-    """The byte at `place` is doubled."""
-    return Fault(f"byte {place} twice", lambda reply, _: [Piece(0.0, reply[: place + 1] + reply[place:])])
+def repeated(index: int) -> Fault:
+    """The byte at `index` is doubled."""
+    return Fault(f"byte {index} twice", lambda reply, _: [Piece(0.0, reply[: index + 1] + reply[index:])])
 
 
 def replaced(data: bytes) -> Fault:

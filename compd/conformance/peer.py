@@ -36,8 +36,8 @@ class SensorValues:
     def advance(self) -> None:
         """New values: lowest + fraction (step x golden ratio + an offset per channel) x (highest - lowest)."""
         self._step += 1
-        for place, (name, (lowest, highest)) in enumerate(self.extents.items()):
-            share = (self._step * GOLDEN + place * 0.0719) % 1.0
+        for index, (name, (lowest, highest)) in enumerate(self.extents.items()):
+            share = (self._step * GOLDEN + index * 0.0719) % 1.0
             self.values[name] = lowest + share * (highest - lowest)
 
     def set_to_end(self, end: int) -> None:

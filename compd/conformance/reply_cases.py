@@ -224,8 +224,8 @@ def _replies(session: ConformanceSession) -> Iterator[_Reply]:
 def _values_at(session: ConformanceSession, sample: int) -> dict[str, float]:
     """Values all over the range of every channel."""
     return {
-        name: share_of(session, name, ((sample + 1) * GOLDEN + place * 0.0719) % 1.0, logarithmic=sample % 2 == 1)
-        for place, name in enumerate(session.sensors.values)
+        name: share_of(session, name, ((sample + 1) * GOLDEN + index * 0.0719) % 1.0, logarithmic=sample % 2 == 1)
+        for index, name in enumerate(session.sensors.values)
     }
 
 

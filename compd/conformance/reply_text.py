@@ -113,8 +113,8 @@ class ReplyText:
         self._request = request
         self._alike = [reply for reply in replies if len(reply) == len(base)]
         self._constant = [
-            len(self._alike) >= FEWEST_ALIKE and all(reply[place] == byte for reply in self._alike)
-            for place, byte in enumerate(base)
+            len(self._alike) >= FEWEST_ALIKE and all(reply[index] == byte for reply in self._alike)
+            for index, byte in enumerate(base)
         ]
         self._checksum: ReplyChecksum | None = checksum_in([base, *self._alike])
         self._check_place = self._checksum.place(base) if self._checksum else slice(0, 0)
@@ -162,11 +162,11 @@ class ReplyText:
 
     def signs(self) -> Iterator[Forgery]:
         """Replies with the other sign before one of their numbers."""
-        for place, byte in enumerate(self.base):
+        for index, byte in enumerate(self.base):
             other = {"+": "-", "-": "+", " ": "-"}.get(chr(byte))
-            if other is not None and any(reply[place : place + 1] == other.encode() for reply in self._alike):
-                what = f"the sign at byte {place} is {other!r}"
-                yield self._with(slice(place, place + 1), other.encode(), what)
+            if other is not None and any(reply[index : index + 1] == other.encode() for reply in self._alike):
+                what = f"the sign at byte {index} is {other!r}"
+                yield self._with(slice(index, index + 1), other.encode(), what)
 
     def addresses(self) -> Iterator[Forgery]:
         """Replies of other units: with another number in place of one from the request."""
@@ -192,17 +192,17 @@ class ReplyText:
 
     def checksums(self) -> Iterator[Forgery]:
         """Replies with one changed byte of the checksum."""
-        for place in range(self._check_place.start, self._check_place.stop):
-            byte = self.base[place : place + 1]
+        for index in range(self._check_place.start, self._check_place.stop):
+            byte = self.base[index : index + 1]
             other = bytes([byte[0] ^ 0x40]) if not self.is_text else (b"0" if byte != b"0" else b"1")
-            reply = self.base[:place] + other + self.base[place + 1 :]
-            yield Forgery(f"byte {place}, of the checksum, is {other!r} in place of {byte!r}", reply)
+            reply = self.base[:index] + other + self.base[index + 1 :]
+            yield Forgery(f"byte {index}, of the checksum, is {other!r} in place of {byte!r}", reply)
 
     def identities(self, identity: bytes) -> Iterator[Forgery]:
         """Replies with one changed byte of their identity."""
-        for place in range(len(identity)):
-            other = bytes([self.base[place] + 1 & 0x7F])
-            yield self._with(slice(place, place + 1), other, f"byte {place}, of `reply_identity`, is {other!r}")
+        for index in range(len(identity)):
+            other = bytes([self.base[index] + 1 & 0x7F])
+            yield self._with(slice(index, index + 1), other, f"byte {index}, of `reply_identity`, is {other!r}")
 
     def errors(self) -> Iterator[Forgery]:
         """Error texts in place of the reply, short ones and ones padded to the reply's length."""
@@ -216,10 +216,10 @@ class ReplyText:
     def fields(self, others: Sequence[bytes]) -> Iterator[Forgery]:
         """Replies without a number at the place where `others` differ from this one."""
         differing = [
-            place
-            for place in range(len(self.base))
-            if not self._check_place.start <= place < self._check_place.stop
-            and any(len(other) == len(self.base) and other[place] != self.base[place] for other in others)
+            index
+            for index in range(len(self.base))
+            if not self._check_place.start <= index < self._check_place.stop
+            and any(len(other) == len(self.base) and other[index] != self.base[index] for other in others)
         ]
         if not differing:
             return
@@ -229,9 +229,9 @@ class ReplyText:
             yield self._with(field, text, f"{self.base[field].decode()!r} is {text.decode()!r}")
 
     def _constant_places(self) -> Iterator[int]:
-        for place, constant in enumerate(self._constant):
-            if constant and not self._check_place.start <= place < self._check_place.stop:
-                yield place
+        for index, constant in enumerate(self._constant):
+            if constant and not self._check_place.start <= index < self._check_place.stop:
+                yield index
 
     def _with(self, place: slice, text: bytes, what: str) -> Forgery:
         reply = self.base[: place.start] + text + self.base[place.stop :]

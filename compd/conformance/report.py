@@ -38,11 +38,11 @@ def opened_within_a_line(session: ConformanceSession, wire: VirtualWire) -> Case
     """The line is opened at any position of the device's output."""
     violations = []
     session.recover()
-    for place in range(PLACES):
+    for index in range(PLACES):
         period_s = wire.pause_s + wire.peer.longest * wire.character_s
         session.reopen()
         session.sensors.advance()
-        wire.rest((RESTS_BEFORE_A_PLACE + place * GOLDEN % 1.0) * period_s)
+        wire.rest((RESTS_BEFORE_A_PLACE + index * GOLDEN % 1.0) * period_s)
         violations += violations_of(session.poll(new_values=False), GOOD)
     return result_of("opened within a line", GOOD, f"ok, at {PLACES} places", violations)
 

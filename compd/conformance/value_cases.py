@@ -44,14 +44,14 @@ def _sensor_off(session: ConformanceSession, _: Subject) -> CaseResult:
     """Each sensor off in turn: it must have no number, the others only right ones."""
     observed: set[str] = set()
     violations = []
-    for place, channel in enumerate(session.gauge.channels):
+    for index, channel in enumerate(session.gauge.channels):
         session.sensors.advance()
         session.sensors.values[channel.name] = math.nan
         poll = session.poll(new_values=False)
         violations += [f"{channel.name} off: {text}" for text in poll.wrong]
-        if place >= len(poll.readings):
+        if index >= len(poll.readings):
             continue
-        quality = poll.readings[place].quality
+        quality = poll.readings[index].quality
         observed.add(str(quality))
         if quality not in NO_VALUE | NO_ANSWER:
             violations.append(f"{channel.name} off: {poll}")
@@ -120,8 +120,8 @@ def _violations_at(session: ConformanceSession, channel: str, value: float) -> t
     violations = violations_of(poll, GOOD | NO_NUMBER) or list(poll.undetectable)
     if violations:
         return False, violations
-    place = [c.name for c in session.gauge.channels].index(channel)
-    reading = poll.readings[place]
+    index = [c.name for c in session.gauge.channels].index(channel)
+    reading = poll.readings[index]
     if not reading.ok:
         return False, []
     if abs(reading.value - value) <= 2 * session.replies.digit[channel]:
@@ -172,8 +172,8 @@ def _many_polls(session: ConformanceSession, subject: Subject) -> CaseResult:
     session.recover()
     polls = max(FEWEST_POLLS, MANY_EXCHANGES // max(1, len(session.exchanges)))
     for number in range(polls):
-        for place, name in enumerate(session.sensors.values):
-            share = (number * GOLDEN + place * 0.0719) % 1.0
+        for index, name in enumerate(session.sensors.values):
+            share = (number * GOLDEN + index * 0.0719) % 1.0
             session.sensors.values[name] = share_of(session, name, share, logarithmic=number % 2 == 1)
         if number < WATCHED_POLLS:
             with clock_calls() as called:

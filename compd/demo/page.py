@@ -144,22 +144,22 @@ def _errors(session: DemoSession) -> Figure:
 
 def _sources(session: DemoSession) -> Figure:
     figure = Figure()
-    sources = list(session.visits[-1].setpoint["sources_mm"]) if session.visits else []
-    shades = dict(zip(sources, [COLOURS["plain"], COLOURS["middle"], COLOURS["quiet"]], strict=False))
-    for source in sources:
-        per_link = np.array([visit.setpoint["sources_mm"][source] for visit in session.visits]) * UM_PER_MM
+    causes = list(session.visits[-1].setpoint["sources_mm"]) if session.visits else []
+    shades = dict(zip(causes, [COLOURS["plain"], COLOURS["middle"], COLOURS["quiet"]], strict=False))
+    for cause in causes:
+        per_link = np.array([visit.setpoint["sources_mm"][cause] for visit in session.visits]) * UM_PER_MM
         for link in range(per_link.shape[1]):
             figure.add_trace(
                 Scatter(
                     x=_times(session),
                     y=per_link[:, link],
-                    name=source,
-                    legendgroup=source,
+                    name=cause,
+                    legendgroup=cause,
                     showlegend=link == 0,
                     mode="lines+markers",
                     marker={"size": 4},
-                    line={"color": shades.get(source, COLOURS["quiet"])},
-                    hovertemplate=f"{source}, link {link + 1}: %{{y:.2f}} um",
+                    line={"color": shades.get(cause, COLOURS["quiet"])},
+                    hovertemplate=f"{cause}, link {link + 1}: %{{y:.2f}} um",
                 )
             )
     return style_figure(figure, "time since the start, s", "correction, um")

@@ -230,7 +230,7 @@ def _table(words: set[str], factors: Mapping[str, float]) -> str:
     return "|".join(f"{word}={factors.get(word, 1 if not word.strip() else 'FACTOR')}" for word in sorted(words))
 
 
-def _question(place: int, what: str, seen: Sequence[str], next_step: str) -> Problem:
+def _question(index: int, what: str, seen: Sequence[str], next_step: str) -> Problem:
     return Problem(
-        where=f"replies, character {place + 1}", what=what, value=", ".join(map(repr, seen)), next_step=next_step
+        where=f"replies, character {index + 1}", what=what, value=", ".join(map(repr, seen)), next_step=next_step
     )

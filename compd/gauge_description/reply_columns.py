@@ -69,14 +69,14 @@ def columns_of(
     """
     split = [_parts(body, mark) for body in bodies]
     for k, parts in enumerate(split):
-        for place, (part, first) in enumerate(zip(parts, split[0], strict=False)):
+        for index, (part, first) in enumerate(zip(parts, split[0], strict=False)):
             if part.is_number:
                 differs = (mark.encode() in part.text) != (mark.encode() in first.text) and not _exponents(part, first)
             else:
                 texts = [first.text, part.text]
-                there = all(len(other) > place for other in split)
+                there = all(len(other) > index for other in split)
                 if there and len(part.text) != len(first.text):
-                    texts = [other[place].text for other in split]
+                    texts = [other[index].text for other in split]
                 differs = len(part.text) != len(first.text) and not exchangeable(varying_word(texts), words)
             if differs:
                 raise _difference(k, part.start, bodies[k], bodies[0])
@@ -148,20 +148,20 @@ def _cut_off(columns: Sequence[ReplyColumn], constant: bytes) -> list[ReplyColum
     result = [list(column) for column in columns]
     for k in range(1, len(result), 2):
         matches = [pattern.match(part.text) for part in result[k]]
-        for place, match in enumerate(matches):
+        for index, match in enumerate(matches):
             if match is None or not all(matches):
                 break
-            text, number = result[k - 1][place], result[k][place]
-            result[k - 1][place] = text._replace(text=text.text + match[0])
-            result[k][place] = ReplyPart(True, number.text[match.end() :], number.start + match.end())
+            text, number = result[k - 1][index], result[k][index]
+            result[k - 1][index] = text._replace(text=text.text + match[0])
+            result[k][index] = ReplyPart(True, number.text[match.end() :], number.start + match.end())
     return result
 
 
-def _difference(k: int, place: int, body: bytes, first: bytes) -> DescriptionError:
-    """The error for reply `k`, whose form differs from the first one's from byte `place` on."""
+def _difference(k: int, index: int, body: bytes, first: bytes) -> DescriptionError:
+    """The error for reply `k`, whose form differs from the first one's from byte `index` on."""
     return DescriptionError(
         Problem(
-            where=f"reply {k + 1}, character {place + 1}",
+            where=f"reply {k + 1}, character {index + 1}",
             what="is built differently from reply 1",
             value=repr(body),
             allowed=repr(first),

@@ -133,8 +133,8 @@ def _owner(exchange: ObservedExchange, k: int, varying: VaryingWord, channels: O
 
 def _characters(column: ReplyColumn) -> tuple[str, str]:
     form, seen = "", []
-    for place in range(len(column[0].text)):
-        characters = sorted({part.text[place : place + 1] for part in column})
+    for index in range(len(column[0].text)):
+        characters = sorted({part.text[index : index + 1] for part in column})
         if len(characters) == 1:
             form += escaped(characters[0], "%")
             continue

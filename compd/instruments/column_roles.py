@@ -287,9 +287,9 @@ def _ask_for_one_triple(table: RawTable, roles: Roles, problems: ExportProblems)
     ]
     triples: dict[tuple[str, str], dict[str, int]] = {}
     for k in unused:
-        for place, letter in enumerate(names[k]):
+        for index, letter in enumerate(names[k]):
             if letter in POSITION_AXES:
-                triples.setdefault((names[k][:place], names[k][place + 1 :]), {})[letter] = k
+                triples.setdefault((names[k][:index], names[k][index + 1 :]), {})[letter] = k
     for others in triples.values():
         places = [others[axis] for axis in POSITION_AXES if axis in others]
         if len(places) != len(POSITION_AXES) or not _change_alike(table, chosen, places):

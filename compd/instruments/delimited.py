@@ -134,9 +134,9 @@ def _take_delimiter(file_rows: _Rows, options: ReadOptions) -> str:
     return delimiter
 
 
-def _drop(file_rows: _Rows, places: Sequence[int]) -> None:
-    if places:
-        gone = set(places)
+def _drop(file_rows: _Rows, indices: Sequence[int]) -> None:
+    if indices:
+        gone = set(indices)
         file_rows.rows = [row for i, row in enumerate(file_rows.rows) if i not in gone]
         file_rows.number = [number for i, number in enumerate(file_rows.number) if i not in gone]
 

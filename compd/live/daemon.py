@@ -31,7 +31,7 @@ from compd.live.loop import (
     MachineZero,
     ModelLoader,
     Models,
-    SentSetpoint,
+    Setpoint,
     build_pipeline,
     load_zero,
     try_model,
@@ -43,9 +43,11 @@ from compd.live.service import (
     PROTOCOL,
     Acceptance,
     BudgetMessage,
+    Errands,
     LastReadings,
     Listeners,
     LoopWatch,
+    Messages,
     ModelKeeping,
     ModelSwitch,
     Publisher,
@@ -142,7 +144,14 @@ class Daemon:
         if packets is not None:
             observers.append(packets.deliver)
         publisher = Publisher(
-            self.listeners, self.setpoints, cycles, watch, self.period_s, clock, observers, packet_hash
+            listeners=self.listeners,
+            setpoints=self.setpoints,
+            cycles=cycles,
+            watch=watch,
+            period_s=self.period_s,
+            clock=clock,
+            observers=observers,
+            packet_hash=packet_hash,
         )
         zero_capture = ZeroCapture(
             self._wires,
@@ -173,19 +182,19 @@ class Daemon:
             "links": configuration.geometry.links,
         }
         report = StatusReport(
-            version,
-            self.latest,
-            self._wires,
-            self.commands,
-            adopted,
-            timing,
-            self.control,
-            publisher,
-            packets,
-            self._lines_status,
-            self.trust,
-            clock,
-            self.ports,
+            version=version,
+            latest=self.latest,
+            wires=self._wires,
+            commands=self.commands,
+            adopted=adopted,
+            timing=timing,
+            control=self.control,
+            publisher=publisher,
+            packets=packets,
+            lines=self._lines_status,
+            trust=self.trust,
+            clock=clock,
+            ports=self.ports,
         )
         keys = TargetKeys(
             tip="tip_B0_mm" if configuration.geometry.tool.on == "platform" else "tip_P_mm",
@@ -193,22 +202,26 @@ class Daemon:
         )
         requests = Requests(
             RequestContext(
-                version,
-                keys,
-                self.commands,
-                report.message,
-                machine_message(configuration, self._wires),
-                BudgetMessage(pipeline.settings.model, self._newest_setpoint).message,
-                zero_capture.start,
-                ReadingsMessage(self._wires, self.latest.channels),
-                model_switch.start,
-                lambda: {**adopted.summary, **keeping(adopted.summary)},
-                Acceptance(self.trust, clock).start,
-                sockets.target,
-                access,
-                clock,
-                self._poll_requests.add,
-                publisher.tell_order,
+                messages=Messages(
+                    version=version,
+                    machine=machine_message(configuration, self._wires),
+                    status=report.message,
+                    budget=BudgetMessage(pipeline.settings.model, self._newest_setpoint).message,
+                    models=lambda: {**adopted.summary, **keeping(adopted.summary)},
+                    readings=ReadingsMessage(self._wires, self.latest.channels),
+                ),
+                errands=Errands(
+                    take_zero=zero_capture.start,
+                    switch_model=model_switch.start,
+                    accept=Acceptance(self.trust, clock).start,
+                    poll=self._poll_requests.add,
+                    tell_order=publisher.tell_order,
+                ),
+                commands=self.commands,
+                target_keys=keys,
+                targets=sockets.target,
+                access=access,
+                clock=clock,
             )
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}
@@ -318,7 +331,7 @@ class Daemon:
         """The SETPOINT line of the loop's last cycle; None before the first."""
         count = self.setpoints.count
         content = self.setpoints.get(count - 1) if count else None
-        return None if content is None else SentSetpoint.unpack(content).line
+        return None if content is None else Setpoint.unpack(content).line
 
     def _trust(self, before: Daemon | None) -> TrustMemory:
         """What is known of the wired gauges: that of the daemon whose place this one takes, where it has the same."""

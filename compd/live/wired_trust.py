@@ -46,9 +46,9 @@ def wired_trust(configuration: Configuration, wires: MachineWires, memory: Trust
     """The judge of each channel that is wired, by "gauge.channel"."""
     lengths: dict[str, Judge] = {
         wire.channel: ReadingTrust(
-            memory, wire.channel, _settings(configuration, wire, is_scale=place < len(wires.scale.wires))
+            memory, wire.channel, _settings(configuration, wire, is_scale=index < len(wires.scale.wires))
         )
-        for place, wire in enumerate(wires.length_wires)
+        for index, wire in enumerate(wires.length_wires)
     }
     limits = _quantity_limits(configuration)
     return lengths | {

@@ -9,12 +9,13 @@ from .effect_memory import EffectMemory as EffectMemory
 from .effect_memory import PackedMemory as PackedMemory
 from .effect_memory import carry_over as carry_over
 from .machine import MachineModel as MachineModel
+from .machine import MachineParts as MachineParts
 from .machine import machine_constants as machine_constants
 from .machine import machine_model as machine_model
+from .observer import EffectInputs as EffectInputs
 from .observer import observe as observe
 from .observer import observe_external as observe_external
 from .prediction import predict as predict
-from .python_effect import EffectInputs as EffectInputs
 from .python_effect import python_effects as python_effects
 from .sensitivity import Sensitivity as Sensitivity
 from .sensitivity import base_joints_by_distances as base_joints_by_distances

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from compd.arrays import FloatArray
 from compd.model.deltas import Memories
 from compd.model.effects import EffectProgram
+from compd.model.kernels import MemoryArrays
 from compd.model.kinematics import Motion, pack_motion, unpack_motion
 from compd.model.machine import MachineModel
 
@@ -17,13 +17,12 @@ _NO_MEMORIES: Memories = {}
 class PackedMemory(NamedTuple):
     """What the kernel of one program leaves; see `compd.model.kernels.motion` and `compd.model.effects.effect_program`.
 
-    links : n.  motion : a row of numbers.  memories : those of all effects, behind one another.
+    links : n.
     """
 
     program: EffectProgram
     links: int
-    motion: FloatArray
-    memories: FloatArray
+    arrays: MemoryArrays
 
 
 class EffectMemory:
@@ -55,13 +54,13 @@ class EffectMemory:
     @cached_property
     def motion(self) -> Motion | None:
         assert self._packed is not None
-        _, links, row, _ = self._packed
+        _, links, (row, _) = self._packed
         return unpack_motion(row, links, (len(row) - 1 - 4 * links) // 2)
 
     @cached_property
     def memories(self) -> Memories:
         assert self._packed is not None
-        return self._packed.program.unpack_memories(self._packed.memories)
+        return self._packed.program.unpack_memories(self._packed.arrays.memories)
 
     @property
     def is_empty(self) -> bool:
@@ -72,9 +71,10 @@ class EffectMemory:
         """A copy for the kernel of this machine with k joint comparators, which changes it."""
         program, links = model.program, model.links
         if self._packed is not None and self._packed.program is program:
-            return PackedMemory(program, links, self._packed.motion.copy(), self._packed.memories.copy())
+            kept = self._packed.arrays
+            return PackedMemory(program, links, MemoryArrays(kept.motion.copy(), kept.memories.copy()))
         motion = pack_motion(self.motion if model.needs_motion else None, links, joints)
-        return PackedMemory(program, links, motion, program.pack_memories(self.memories))
+        return PackedMemory(program, links, MemoryArrays(motion, program.pack_memories(self.memories)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return EffectMemory, (self.motion, self.memories, self.commanded)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,7 +68,7 @@ class MachineModel:
         return tuple(fitted for fitted in self.effects if fitted.effect.live)
 
     @cached_property
-    def source_names(self) -> tuple[str, ...]:
+    def contribution_names(self) -> tuple[str, ...]:
         """Names of the parts of a correction: joints, frame, and each live effect."""
         return ("joints", "frame", *(fitted.effect.id for fitted in self.live_effects))
 
@@ -121,36 +121,43 @@ class MachineModel:
         return Mechanism(base_joints_M_mm, self.platform_joints_P_mm, self.revolute_axes_P)
 
 
-def machine_model(
-    *,
-    supports_M_mm: ArrayLike,
-    plate_points_M_mm: ArrayLike,
-    base_joints_M_mm: ArrayLike,
-    support_of_joint: ArrayLike,
-    platform_joints_P_mm: ArrayLike,
-    revolute_axes_P: ArrayLike,
-    arrangement: Arrangement,
-    zero_contact: Contact,
-    zero_rotation_M_P: ArrayLike | None,
-    joint_weights: ArrayLike,
-    weight_N: float,
-    weight_at_P_mm: ArrayLike,
-) -> MachineModel:
-    """A machine from its parts at machine zero, all in {M} but what moves with the platform; lengths in mm.
+class MachineParts(NamedTuple):
+    """A machine at machine zero, all in {M} but what moves with the platform; lengths in mm.
 
     supports_M_mm, plate_points_M_mm : (3, 3).  base_joints_M_mm, platform_joints_P_mm : (n, 3), n = 3 or 6.
     support_of_joint : (n,), counted from 0.  revolute_axes_P : (3, 3), any length, or (0, 3).
     zero_contact : the tip in {M} and in {P}.  zero_rotation_M_P : (3, 3) for the hexapod, None for the tripod.
     joint_weights : (n, k).  weight_N at weight_at_P_mm (3,).
+    """
+
+    supports_M_mm: ArrayLike
+    plate_points_M_mm: ArrayLike
+    base_joints_M_mm: ArrayLike
+    support_of_joint: ArrayLike
+    platform_joints_P_mm: ArrayLike
+    revolute_axes_P: ArrayLike
+    arrangement: Arrangement
+    zero_contact: Contact
+    zero_rotation_M_P: ArrayLike | None
+    joint_weights: ArrayLike
+    weight_N: float
+    weight_at_P_mm: ArrayLike
+
+
+def machine_model(parts: MachineParts) -> MachineModel:
+    """A machine from its parts at machine zero.
+
     Raises KinematicsError where machine zero is unreachable, near-singular or not finite, ValueError for arrays of
     a wrong shape.
     """
-    supports, base_joints = _read_only(supports_M_mm), _read_only(base_joints_M_mm)
-    axes = np.asarray(revolute_axes_P, dtype=np.float64).reshape(-1, 3)
+    supports, base_joints = _read_only(parts.supports_M_mm), _read_only(parts.base_joints_M_mm)
+    axes = np.asarray(parts.revolute_axes_P, dtype=np.float64).reshape(-1, 3)
     axes = _read_only(axes / np.sqrt((axes * axes).sum(-1, keepdims=True)))
-    carriers: IntArray = np.array(support_of_joint, dtype=np.int64)
+    carriers: IntArray = np.array(parts.support_of_joint, dtype=np.int64)
     carriers.flags.writeable = False
-    plate, platform_joints, weights = map(_read_only, (plate_points_M_mm, platform_joints_P_mm, joint_weights))
+    plate, platform_joints, weights = map(
+        _read_only, (parts.plate_points_M_mm, parts.platform_joints_P_mm, parts.joint_weights)
+    )
     _check_shapes(supports, plate, base_joints, carriers, platform_joints, weights)
     distances, _ = distances_mm(supports, plate)
     origin, rotation = base_pose(supports)
@@ -162,8 +169,10 @@ def machine_model(
         "check supports and plate points, and that rods u1..u6 join them in the order of equation (3)",
     )
     mechanism = Mechanism(base_joints, platform_joints, axes)
-    attitude = _parallel_attitude(base_joints, platform_joints) if zero_rotation_M_P is None else zero_rotation_M_P
-    pose = inverse_kinematics(mechanism, *zero_contact, attitude)
+    attitude = (
+        _parallel_attitude(base_joints, platform_joints) if parts.zero_rotation_M_P is None else parts.zero_rotation_M_P
+    )
+    pose = inverse_kinematics(mechanism, *parts.zero_contact, attitude)
     check = "check the tip and the attitude at machine zero, base joints, platform joints and revolute axes"
     require(pose.reason, "links at machine zero", check)
     # forward kinematics must lead back to machine zero as well: the first cycle starts from there
@@ -176,12 +185,19 @@ def machine_model(
         base_joints,
         _read_only(pose.origin_M_mm),
         _read_only(pose.rotation_M_P),
-        Contact(*map(_read_only, zero_contact)),
+        Contact(*map(_read_only, parts.zero_contact)),
         _read_only(pose.link_length_mm),
         _read_only(distances),
     )
     return MachineModel(
-        frame, platform_joints, axes, arrangement, weights, float(weight_N), _read_only(weight_at_P_mm), zero
+        frame,
+        platform_joints,
+        axes,
+        parts.arrangement,
+        weights,
+        float(parts.weight_N),
+        _read_only(parts.weight_at_P_mm),
+        zero,
     )
 
 

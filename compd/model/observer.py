@@ -3,16 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import BoolArray, FloatArray
 from compd.model.effects import MachineConstants, Observations
-from compd.model.kernels import joint_shortening
+from compd.model.kernels import GaugeRows, joint_shortening
 from compd.model.kinematics import Movement, Pose, ToolOnPlatform, forward_kinematics, link_length_mm, solve_frame
 from compd.model.machine import MachineModel
 from compd.rotation import to_outer
+
+
+class EffectInputs(NamedTuple):
+    """What effects are computed from in N snapshots.
+
+    quantities : (N,) each, by name.  quantities_at_zero : the same at machine zero; None where that is not known.
+    base_joints_M_mm (N, n, 3), pose, tip_M_mm (N, 3): by the kinematics alone.
+    """
+
+    gauges: GaugeRows
+    quantities: Mapping[str, FloatArray]
+    quantities_at_zero: Mapping[str, float] | None
+    base_joints_M_mm: FloatArray
+    pose: Pose
+    tip_M_mm: FloatArray
 
 
 def observe(
@@ -43,47 +59,31 @@ def observe(
     pose = forward_kinematics(
         model.mechanism(frame.base_joints_M_mm), length_mm, zero.platform_origin_M_mm, zero.rotation_M_P
     )
-    return observe_at_pose(
-        constants,
+    inputs = EffectInputs(
+        GaugeRows(scale_mm, joint_mm, frame_mm, np.asarray(time_s, dtype=np.float64)),
+        quantities,
+        quantities_at_zero,
         frame.base_joints_M_mm,
         pose,
         # a tool that stands on the plate is at the same place in every row
         np.broadcast_to(model.arrangement.contact_at(pose).tip_M_mm, pose.origin_M_mm.shape),
-        scale_mm=scale_mm,
-        joint_mm=joint_mm,
-        frame_mm=frame_mm,
-        quantities=quantities,
-        time_s=np.asarray(time_s, dtype=np.float64),
-        session_start=session_start,
-        movement=movement,
-        quantities_at_zero=quantities_at_zero,
     )
+    return observe_at_pose(constants, inputs, session_start, movement)
 
 
 def observe_at_pose(
-    constants: MachineConstants,
-    base_joints_M_mm: FloatArray,
-    pose: Pose,
-    tip_M_mm: FloatArray,
-    *,
-    scale_mm: FloatArray,
-    joint_mm: FloatArray,
-    frame_mm: FloatArray,
-    quantities: Mapping[str, FloatArray],
-    time_s: FloatArray,
-    session_start: BoolArray,
-    movement: Movement,
-    quantities_at_zero: Mapping[str, float] | None,
+    constants: MachineConstants, inputs: EffectInputs, session_start: BoolArray, movement: Movement
 ) -> Observations:
-    """N rows whose base joints (N, n, 3), pose and tip (N, 3) are solved already; the rest as in `observe`."""
+    """N rows whose pose is solved already; the rest as in `observe`."""
+    gauges, quantities, quantities_at_zero, base_joints_M_mm, pose, tip_M_mm = inputs
     joints_M = to_outer(pose.rotation_M_P[:, None], pose.origin_M_mm[:, None], constants.platform_joints_P_mm)
     return Observations(
         constants=constants,
-        scale_mm=scale_mm,
-        joint_mm=joint_mm,
-        frame_mm=frame_mm,
+        scale_mm=gauges.scale_mm,
+        joint_mm=gauges.joint_mm,
+        frame_mm=gauges.frame_mm,
         quantities=quantities,
-        time_s=time_s,
+        time_s=gauges.time_s,
         session_start=session_start,
         direction=movement.direction,
         velocity_mm_per_s=movement.velocity_mm_per_s,

@@ -11,7 +11,15 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.model.effect_memory import EffectMemory
 from compd.model.effects import Observations, evaluate_basis
-from compd.model.kernels import RESULT, WORKSPACE, set_tip_derivatives
+from compd.model.kernels import (
+    RESULT,
+    WORKSPACE,
+    GaugeRows,
+    SolvedRows,
+    TipDerivativeArrays,
+    WarmRows,
+    set_tip_derivatives,
+)
 from compd.model.kinematics import Movement
 from compd.model.machine import MachineModel
 from compd.model.observer import observe
@@ -56,38 +64,38 @@ def tip_derivatives(
     values = np.array([quantities[name] for name in program.quantities], dtype=np.float64)
     references = [quantities_at_zero[name] if value is None else value for name, value in program.references]
     raised = values + np.array([sigmas.get(name, np.nan) for name in program.quantities], dtype=np.float64)
-    by_port = np.empty((3, program.size))
-    by_theta, by_quantity = np.empty((3, len(program.theta))), np.empty((3, len(values)))
+    zero = model.zero
+    arrays = TipDerivativeArrays(
+        np.empty((3, program.size)), np.empty((3, len(program.arrays.theta))), np.empty((3, len(values)))
+    )
     set_tip_derivatives(
         model.structure,
-        program.machine,
-        program.effects,
-        program.theta,
-        program.numbers,
-        program.code,
-        program.quantity_places,
-        program.targets,
-        np.array(scale_mm),
-        np.array(joint_mm),
-        np.array(frame_mm),
+        program.arrays,
+        GaugeRows(
+            _row_copy(scale_mm, 1), _row_copy(joint_mm, 1), _row_copy(frame_mm, 1), np.array([time_s], dtype=np.float64)
+        ),
         np.concatenate([values, references]),
-        time_s,
         raised,
-        model.zero.platform_origin_M_mm.copy(),
-        model.zero.rotation_M_P.copy(),
-        packed.motion,
-        packed.memories,
-        np.zeros(1, WORKSPACE),
-        np.zeros(1, RESULT),
-        by_port,
-        by_theta,
-        by_quantity,
+        WarmRows(
+            _row_copy(model.frame.zero_supports_M_mm, 2),
+            _row_copy(zero.platform_origin_M_mm, 1),
+            _row_copy(zero.rotation_M_P, 2),
+        ),
+        packed.arrays,
+        SolvedRows(np.zeros(1, WORKSPACE), np.zeros(1, RESULT)),
+        arrays,
     )
+    by_port, by_theta, by_quantity = arrays
     derivatives = TipDerivatives(by_port[:, : model.links + len(joint_mm) + 9], by_theta, by_quantity)
     if program.given:
         rows = _rows(model, scale_mm, joint_mm, frame_mm, quantities, quantities_at_zero, time_s, effects)
         _add_python_effects(model, rows, raised, effects, by_port, derivatives)
     return derivatives
+
+
+def _row_copy(values: FloatArray, axes: int) -> FloatArray:
+    """One row (1, ...) of values with so many axes: a contiguous copy, since the kernel takes no read-only array."""
+    return np.array(values, dtype=np.float64, ndmin=axes + 1, order="C")
 
 
 def _rows(
@@ -129,14 +137,14 @@ def _add_python_effects(
 ) -> None:
     """Add what the effects without a kernel give; by_port (3, size), raised (q,) as in the kernel."""
     program = model.program
-    for place in program.given:
-        fitted, structure = model.live_effects[place], program.effects[place]
+    for index in program.given:
+        fitted, structure = model.live_effects[index], program.arrays.effects[index]
         memory = effects.memories.get(fitted.effect.id)
         basis = evaluate_basis(fitted.effect, rows, fitted.constants, memory)[0][0]
         begin = structure["targets_begin"]
-        by_added = by_port[:, program.targets[begin : begin + structure["size"]]]
+        by_added = by_port[:, program.arrays.targets[begin : begin + structure["size"]]]
         derivatives.by_theta[:, structure["theta_begin"] : structure["theta_end"]] = by_added @ basis
-        needed = program.quantity_places[structure["quantities_begin"] : structure["quantities_end"]]
+        needed = program.arrays.quantity_indices[structure["quantities_begin"] : structure["quantities_end"]]
         for quantity in needed[: len(needed) // 2]:
             changed = {**rows.quantities, program.quantities[quantity]: raised[quantity : quantity + 1]}
             moved = evaluate_basis(fitted.effect, replace(rows, quantities=changed), fitted.constants, memory)[0][0]

@@ -192,16 +192,16 @@ class Orders:
 
     def _no_model(self, subject: str) -> Consequence:
         command = self._command("adopt", "--none", "--daemon", self._link.path)
-        sources = (self._link.readings or {}).get("setpoint", {}).get("sources_mm")
-        if sources is None:
+        contributions = (self._link.readings or {}).get("setpoint", {}).get("sources_mm")
+        if contributions is None:
             return Consequence(
                 True,
                 "The machine is computed without effects; by how much the correction changes is not known, "
                 "because there is no valid setpoint.",
                 command,
             )
-        asked_mm = [sum(parts) for parts in zip(*sources.values(), strict=True)]
-        bare_mm = [sum(parts) for parts in zip(sources["joints"], sources["frame"], strict=True)]
+        asked_mm = [sum(parts) for parts in zip(*contributions.values(), strict=True)]
+        bare_mm = [sum(parts) for parts in zip(contributions["joints"], contributions["frame"], strict=True)]
         return Consequence(True, self._change(asked_mm, bare_mm), command)
 
     def _change(self, before_mm: list[float], after_mm: list[float]) -> str:

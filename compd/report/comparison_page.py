@@ -72,8 +72,10 @@ def summary(comparisons: Sequence[Comparison]) -> PageTable:
             [f"constant taken off, {' / '.join(labels)}", *(_constant(comparison) for comparison in comparisons)]
         )
     rows.append(["distance in 3D: rms / 95 % / largest", *(_distance(comparison) for comparison in comparisons)])
-    sources = list(dict.fromkeys(name for comparison in comparisons for name in comparison.contributions))
-    rows += [[f"rms without {name}", *(_without(comparison, name) for comparison in comparisons)] for name in sources]
+    contributions = list(dict.fromkeys(name for comparison in comparisons for name in comparison.contributions))
+    rows += [
+        [f"rms without {name}", *(_without(comparison, name) for comparison in comparisons)] for name in contributions
+    ]
     rows += [
         ["prediction's own uncertainty", *(_uncertainty(comparison) for comparison in comparisons)],
         ["rows used", *(str(comparison.rows_used) for comparison in comparisons)],

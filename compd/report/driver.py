@@ -11,7 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording, Covariate, covariates
 from compd.model.effects import FittedEffect, needed_quantities
-from compd.report.error_part import ErrorPart
+from compd.report.error_part import ErrorContribution
 from compd.report.small_multiples import axis_title
 from compd.units import unit_of
 
@@ -38,7 +38,7 @@ class Driver:
 
 
 def find_driver(
-    part: ErrorPart, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording, unit: str
+    part: ErrorContribution, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording, unit: str
 ) -> Driver:
     """The quantity that a series of the part follows most closely: one that the effects need, else a position.
 
@@ -55,7 +55,7 @@ def find_driver(
 
 
 def _needed(
-    part: ErrorPart, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording
+    part: ErrorContribution, series: int, effects: Sequence[FittedEffect], aligned: AlignedRecording
 ) -> Iterator[Driver]:
     """Quantities that the effects need: those of the link itself, else each column."""
     rows = aligned.rows
@@ -137,7 +137,7 @@ def _column(covariate: Covariate) -> str:
     return f"tip_{covariate.name}_mm" if covariate.name in ("x", "y", "z") else f"{covariate.name}_{unit}"
 
 
-def _driven_share(part: ErrorPart, series: int, values: FloatArray) -> float:
+def _driven_share(part: ErrorContribution, series: int, values: FloatArray) -> float:
     """Share of the series' variation that rows with neighbouring values have in common.
 
     1 - sum (y_{i+1} - y_i)^2 / (2 sum (y_i - mean)^2), rows sorted by the values: 1 for a line, 0 for no relation (J.

@@ -21,7 +21,7 @@ LEAST_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorPart:
+class ErrorContribution:
     """The part of one effect in N rows of S series: measured coordinates, or links.
 
     series : their names, such as ``"x"`` or ``"link 1"``.  at_links : whether they are links.
@@ -47,9 +47,9 @@ class ErrorPart:
         return sorted(order) or [0]
 
 
-def error_part(
+def error_contribution(
     comparison: Comparison, effects: Sequence[FittedEffect], described: Sequence[FittedEffect] = ()
-) -> ErrorPart:
+) -> ErrorContribution:
     """The joint part of effects.
 
     comparison : whose model has the effects.  described : effects, among them these, that its model does not have: they
@@ -64,8 +64,8 @@ def error_part(
         link = aligned.sensitivity(["link"])["link"]
         labels = tuple(f"link {i + 1}" for i in range(aligned.rows.links))
         parts = (link_residuals(link, part_um[:, :3]), link_residuals(link, np.nan_to_num(after_um[:, :3])))
-        return ErrorPart(labels, *parts, used, at_links=True)
-    return ErrorPart(tuple(aligned.labels), part_um, after_um, used, at_links=aligned.of_links)
+        return ErrorContribution(labels, *parts, used, at_links=True)
+    return ErrorContribution(tuple(aligned.labels), part_um, after_um, used, at_links=aligned.of_links)
 
 
 def _moved(comparison: Comparison, effects: Sequence[FittedEffect]) -> FloatArray:

@@ -13,7 +13,7 @@ from compd.comparison import Comparison
 from compd.diagnosis import ErrorFall
 from compd.model.effects import FittedEffect
 from compd.report.driver import Driver, find_driver
-from compd.report.error_part import ErrorPart, error_part
+from compd.report.error_part import ErrorContribution, error_contribution
 from compd.report.page import style_figure
 from compd.report.small_multiples import DOTS, SERIES_COLOURS, add_dots_and_means, class_means, dot_style, thin
 
@@ -37,9 +37,9 @@ def plot_step(
 ) -> tuple[Figure, str]:
     """The picture of the effects together, and how to read it.
 
-    comparison, described : as in `error_part`.
+    comparison, described : as in `error_contribution`.
     """
-    part = error_part(comparison, effects, described)
+    part = error_contribution(comparison, effects, described)
     shown = part.largest(MOST_SERIES)
     drivers = [find_driver(part, k, effects, comparison.aligned, fall.unit) for k in shown]
     figure = make_subplots(
@@ -63,7 +63,7 @@ def plot_step(
     return figure, f"{caption}."
 
 
-def _add_series(figure: Figure, row: int, part: ErrorPart, k: int, driver: Driver, fall: ErrorFall) -> None:
+def _add_series(figure: Figure, row: int, part: ErrorContribution, k: int, driver: Driver, fall: ErrorFall) -> None:
     """One series before and after."""
     used = np.flatnonzero(part.used & np.isfinite(driver.values))
     colour = SERIES_COLOURS[k % len(SERIES_COLOURS)]
@@ -111,7 +111,7 @@ def _add_boxes(
     figure.update_xaxes(title_text=driver.title, title_standoff=4, type="category", row=row, col=col)
 
 
-def _is_discrete(driver: Driver, part: ErrorPart) -> bool:
+def _is_discrete(driver: Driver, part: ErrorContribution) -> bool:
     values = driver.values[part.used]
     return len(np.unique(values[np.isfinite(values)])) <= MOST_BOXES
 

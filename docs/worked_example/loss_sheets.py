@@ -20,7 +20,7 @@ def write_sums(sheets: Sheets) -> None:
     """Products of each row, weighted; what a row leaves by fits without its fold."""
     products = ["rr", "ra", "rb", "rc", "aa", "ab", "bb", "cc"]
     names = ["row", *products, *(f"left by {name}" for name in SETS), "gain of a", "gain of b", "c less a"]
-    column = {name: column_letters(place) for place, name in enumerate(names, start=1)}
+    column = {name: column_letters(index) for index, name in enumerate(names, start=1)}
     rows: list[list[float | str]] = []
     for k in range(FIRST, sheets.last_row + 1):
         cells: list[float | str] = [f"={sheets.cell('Rows', 'row', k)}"]
@@ -44,7 +44,7 @@ def write_sums(sheets: Sheets) -> None:
 
 def write_folds(sheets: Sheets) -> None:
     """Sums over each fold, the fit without it, and what that leaves on it."""
-    column = {name: column_letters(place) for place, name in enumerate(FOLD_NAMES, start=1)}
+    column = {name: column_letters(index) for index, name in enumerate(FOLD_NAMES, start=1)}
     ridges = _write_ridges(sheets)
     row = FIRST
     about = "Sums over each fold; each effect's number fitted without the fold; squares that it leaves on the fold"

@@ -80,7 +80,7 @@ def write_weights(sheets: Sheets) -> None:
     full, gross = sheets.criteria["full_weight_sigmas"], sheets.criteria["gross_sigmas"]
     names = ["row", *(f"r_{axis}" for axis in AXES), *(f"{e}_{axis}" for e in "abc" for axis in AXES)]
     names += [*(f"e_{axis}" for axis in AXES), "d", "far", "confirmed", "gross", "weight"]
-    column = {name: column_letters(place) for place, name in enumerate(names, start=1)}
+    column = {name: column_letters(index) for index, name in enumerate(names, start=1)}
     side = len(names) + 2
     fit = {name: Address("Weights", 3 + k, side + 1) for k, name in enumerate(["c_x", "c_y", "c_z", "a"])}
     consistency = Address("Weights", 8, side + 1)
@@ -133,24 +133,24 @@ def _robust_scale(
 ) -> dict[str, Address]:
     """Huber's proposal 2 by iteration, what is beyond 4 standard deviations being dropped after each pass."""
     sheets.book.put(sheet, 2, column, ["robust scale, step", *values], bold=True)
-    for place, (x, d) in enumerate(values.items(), start=column + 1):
-        letter, w = column_letters(place), weights[x]
+    for index, (x, d) in enumerate(values.items(), start=column + 1):
+        letter, w = column_letters(index), weights[x]
         row = FIRST
         kept = "1"
         for number in range(PASSES):
             start = (
                 f"=SQRT(SUMPRODUCT({w}*{kept},{d}^2)/SUMPRODUCT({w}*{kept}))" if number == 0 else f"={letter}{row - 1}"
             )
-            sheets.book.put(sheet, row, place, [start])
+            sheets.book.put(sheet, row, index, [start])
             for step in range(STEPS):
                 s = f"{letter}{row + step}"
                 below = f"({d}^2<{WINSORIZED**2:g}*{s}^2)"
                 clipped = f"({below}*{d}^2/{s}^2+(1-{below})*{WINSORIZED**2:g})"
                 mean = f"SUMPRODUCT({w}*{kept},{clipped})/SUMPRODUCT({w}*{kept})"
-                sheets.book.put(sheet, row + step + 1, place, [f"={s}*SQRT({mean}/{WINSORIZED_MEAN_SQUARE})"])
+                sheets.book.put(sheet, row + step + 1, index, [f"={s}*SQRT({mean}/{WINSORIZED_MEAN_SQUARE})"])
             row += STEPS + 1
             kept = f"({d}^2<={TRIMMED**2:g}*{letter}${row - 1}^2)"
     for step in range(PASSES * (STEPS + 1)):
         sheets.book.put(sheet, FIRST + step, column, [float(step)])
     end = FIRST + PASSES * (STEPS + 1) - 1
-    return {x: Address(sheet, end, place) for place, x in enumerate(values, start=column + 1)}
+    return {x: Address(sheet, end, index) for index, x in enumerate(values, start=column + 1)}

@@ -34,7 +34,7 @@ class Sheets:
         """A sheet with one line about it, names, and rows from row FIRST on."""
         self.book.put(sheet, 1, 1, [about])
         self.book.put(sheet, 2, 1, names, bold=True)
-        self._letters |= {(sheet, name): column_letters(place) for place, name in enumerate(names, start=1)}
+        self._letters |= {(sheet, name): column_letters(index) for index, name in enumerate(names, start=1)}
         for row, values in enumerate(rows, start=FIRST):
             self.book.put(sheet, row, 1, values)
 

@@ -75,10 +75,10 @@ class Spreadsheet:
     def put(self, sheet: str, row: int, column: int, values: Iterable[Value], bold: bool = False) -> None:
         """Write values into one row, from a column on; the values of all formulas are computed anew."""
         cells = self.sheets.setdefault(sheet, {})
-        for place, value in enumerate(values, start=column):
-            cells[row, place] = value
+        for index, value in enumerate(values, start=column):
+            cells[row, index] = value
             if bold:
-                self._bold.add(Address(sheet, row, place))
+                self._bold.add(Address(sheet, row, index))
         self._values.clear()
 
     def value(self, address: Address) -> Value:

@@ -33,9 +33,9 @@ def write_blocks(sheets: Sheets) -> None:
                 ][k]
             )
         sheets.book.put("Blocks", last + 2 + k, 1, [label, *cells])
-    for place, name in enumerate(("a", "b", "c"), start=2):
-        sheets.results[f"gain_{name}"] = Address("Blocks", last + 2, place)
-        sheets.results[f"std_{name}"] = Address("Blocks", last + 3, place)
+    for index, name in enumerate(("a", "b", "c"), start=2):
+        sheets.results[f"gain_{name}"] = Address("Blocks", last + 2, index)
+        sheets.results[f"std_{name}"] = Address("Blocks", last + 3, index)
 
 
 def write_verdict(sheets: Sheets) -> None:

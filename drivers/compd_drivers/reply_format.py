@@ -121,9 +121,9 @@ class ReplyFormat:
             value = number.value(text, self._sign_is_elsewhere(number.channel))
             if value is None:
                 return None
-            for place, words in enumerate(self._words):
+            for index, words in enumerate(self._words):
                 if words.channel == number.channel:
-                    value *= words.factors[match[f"w{place}"].decode("latin-1")]
+                    value *= words.factors[match[f"w{index}"].decode("latin-1")]
             values.append(value)
         return tuple(values)
 

@@ -32,11 +32,13 @@ from typing import Any
 
 import numpy as np
 
+from compd.compensation import Compensation
+from compd.compensation.values import Contributions
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.loop import CycleInputs, CycleState, Setpoint, step
-from compd.live.loop.setpoint import SetpointValues
 from compd.live.memory import Readings, Snapshot
 from compd.live.system import realtime
+from compd.model.kinematics import Frame
 from compd.operation_settings import LoopSettings
 from compd.setpoint_states import Mode, State
 from tests.benchmarks.bench_loop import PRIORITY, BusyDrivers, load_beside
@@ -60,6 +62,9 @@ SETTLE_S = 1.5
 WARM_UP_CYCLES = 200
 HISTOGRAM_US = 20_000
 RING_SLOTS, RING_SLOT_BYTES = 512, 1024
+# What a client is sent of a setpoint's values, and of their frame.
+VECTORS = ("tip_M_mm", "tip_B0_mm", "tip_P_mm", "link_length_mm", "scale_setpoint_mm", "correction_mm")
+FRAME_VECTORS = ("origin_M_mm", "displacement_M_mm", "rotation_M_rad")
 # Version, value, time, version: where the two versions differ, the slot is being written.
 SLOT = struct.Struct("QddQ")
 FORK = multiprocessing.get_context("fork")
@@ -135,14 +140,24 @@ def flat(setpoint: Setpoint) -> tuple[Any, ...]:
     values = setpoint.values
     assert values is not None
     names = (setpoint.state.value, setpoint.reason, setpoint.mode.value, setpoint.model)
-    return setpoint[:4], names, values[:9], tuple(values.sources_mm.items()), values.u_tip_um
+    vectors = {name: getattr(values, name).tobytes() for name in VECTORS}
+    frame = {name: getattr(values.frame, name).tobytes() for name in FRAME_VECTORS}
+    contributions = {name: part.tobytes() for name, part in values.contributions.items()}
+    return setpoint[:4], names, vectors, frame, contributions, setpoint.u_tip_um
 
 
-def unflat(head: Any, names: Any, vectors: Any, sources: Any, u_tip_um: Any) -> Setpoint:
-    arrays = [None if data is None else np.frombuffer(data) for data in (*vectors, u_tip_um)]
-    by_source = {name: np.frombuffer(data) for name, data in sources}
-    values = SetpointValues(*arrays[:9], by_source, arrays[9])
-    return Setpoint(*head, State(names[0]), names[1], Mode(names[2]), values, names[3])
+def unflat(head: Any, names: Any, vectors: Any, frame: Any, contributions: Any, u_tip_um: Any) -> Setpoint:
+    arrays, of_frame, parts = (
+        {name: np.frombuffer(data) for name, data in by_name.items()} for by_name in (vectors, frame, contributions)
+    )
+    absent = np.zeros(0)
+    values = Compensation(
+        **dict.fromkeys(Compensation._fields, absent)
+        | arrays
+        | {"frame": Frame(**dict.fromkeys(Frame._fields, absent) | of_frame)}
+        | {"contributions": Contributions(tuple(parts), np.array(list(parts.values())))}
+    )
+    return Setpoint(*head, State(names[0]), names[1], Mode(names[2]), values, names[3], u_tip_um=u_tip_um)
 
 
 def fork(function: Callable[[], Figures]) -> Callable[[], Figures]:

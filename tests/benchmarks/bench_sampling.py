@@ -181,7 +181,7 @@ def measured(configuration: Configuration, nine: Sequence[str], baud: int, trigg
             path.append(truth)
             errors = [float(np.linalg.norm(s.values.tip_M_mm - truth)) * 1e3 for s in setpoints]
             errors += [off_path_mm(s.values.tip_M_mm, path) * 1e3 for s in setpoints[:2]]
-            u_um = setpoints[1].values.u_tip_um
+            u_um = setpoints[1].u_tip_um
             ratio = errors[1] / float(np.linalg.norm(u_um)) if u_um is not None else np.nan
             results.append((world.phase == "moving", errors, setpoints[0].skew_s, ratio))
         push(now_s + PERIOD_S, lambda: tick(number + 1))

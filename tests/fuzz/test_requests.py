@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from compd.errors import Problem, StateError
 from compd.live.loop import Commands
-from compd.live.service import RequestContext, Requests, TargetKeys
+from compd.live.service import Errands, Messages, RequestContext, Requests, TargetKeys
 from compd.live.service.client_session import ClientSession
 from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError
 from compd.live.service.requests import REQUESTS, SENT_MESSAGES
@@ -59,14 +59,22 @@ def requests(tip: str, rotation: bool) -> Requests:
     commands = Commands(StateError(Problem(where="zero", what="none")))
     return Requests(
         RequestContext(
-            {"class": "VERSION", "protocol": 1, "release": "1", "machine": "test", "config_hash": "00", "links": 3},
-            TargetKeys(tip, rotation),  # type: ignore[arg-type]
-            commands,
-            lambda: {"class": "STATUS"},
-            {"class": "MACHINE"},
-            lambda: {"class": "BUDGET"},
-            lambda *_: None,
-            switch_model=lambda *_: None,
+            messages=Messages(
+                version={
+                    "class": "VERSION",
+                    "protocol": 1,
+                    "release": "1",
+                    "machine": "test",
+                    "config_hash": "00",
+                    "links": 3,
+                },
+                machine={"class": "MACHINE"},
+                status=lambda: {"class": "STATUS"},
+                budget=lambda: {"class": "BUDGET"},
+            ),
+            errands=Errands(take_zero=lambda *_: None, switch_model=lambda *_: None),
+            commands=commands,
+            target_keys=TargetKeys(tip, rotation),  # type: ignore[arg-type]
         )
     )
 

@@ -220,7 +220,7 @@ FAMILIES: Mapping[str, Family] = {
 
 def cases(names: Sequence[str], set_name: str) -> list[Case]:
     """The cases of a set, in an order in which the first part of a run contains some of every family."""
-    places = {name: place for place, name in enumerate(FAMILIES)}
+    places = {name: index for index, name in enumerate(FAMILIES)}
     groups = [
         [
             FAMILIES[name].draw(number, FIRST_SEED[set_name] + places[name] * SEEDS_PER_FAMILY + number)

@@ -76,7 +76,7 @@ def random_inputs(model: MachineModel, rows: int = 24, seed: int = 3) -> dict[st
         "movement": Movement(
             np.sign(rng.normal(size=(rows, n))), rng.normal(0, 40, (rows, n)), rng.normal(0, 1e-3, (rows, k))
         ),
-        "quantities_at_zero": {name: 22.0 + 0.1 * place for place, name in enumerate(weather)}
+        "quantities_at_zero": {name: 22.0 + 0.1 * index for index, name in enumerate(weather)}
         | dict.fromkeys(load, -4.0)
         | {"pressure_hPa": 1002.0, "humidity_pct": 44.0},
     }

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from compd.model import MachineModel, machine_model
+from compd.model import MachineModel, MachineParts, machine_model
 from compd.model.kinematics import Contact, ToolOnPlate, ToolOnPlatform
 from tests.support.paths import VECTORS
 
@@ -91,12 +91,12 @@ def hexapod_parts() -> dict[str, Any]:
 
 def tripod() -> MachineModel:
     """The coordinate measuring machine on three links."""
-    return machine_model(**tripod_parts())
+    return machine_model(MachineParts(**tripod_parts()))
 
 
 def hexapod() -> MachineModel:
     """The machine with six extending struts."""
-    return machine_model(**hexapod_parts())
+    return machine_model(MachineParts(**hexapod_parts()))
 
 
 def move_machine(parts: dict[str, Any], R: Floats, shift_mm: Floats) -> dict[str, Any]:

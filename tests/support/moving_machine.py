@@ -225,7 +225,7 @@ def told(configuration: Configuration, fault: Fault = NONE) -> list[Told]:
         setpoint, state = step(state, inputs, pipeline.settings)
         bound_um, error_um = np.nan, np.nan
         if setpoint.values is not None:
-            bound_um = setpoint.values.u_tip_um
+            bound_um = setpoint.u_tip_um
             true_mm = truth.tip_M_mm[min(round(now_s / GRID_S), len(truth.tip_M_mm) - 1)]
             error_um = 1e3 * float(np.linalg.norm(setpoint.values.tip_M_mm - true_mm))
         setpoints.append(Told(now_s, setpoint.valid, setpoint.state, setpoint.reason, bound_um, error_um))

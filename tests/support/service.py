@@ -10,13 +10,14 @@ import threading
 import numpy as np
 
 from compd.clock import MonotonicClock
-from compd.compensation import CorrectionShares
+from compd.compensation import Compensation
+from compd.compensation.values import Contributions
 from compd.errors import Problem, StateError
-from compd.live.loop import Commands, SentSetpoint, Setpoint
-from compd.live.loop.setpoint import SetpointValues
+from compd.live.loop import Commands, Setpoint
 from compd.live.memory import PollRequests, SharedRing
-from compd.live.service import Listeners, Publisher, RequestContext, Requests, TargetKeys, TcpAccess
+from compd.live.service import Errands, Listeners, Messages, Publisher, RequestContext, Requests, TargetKeys, TcpAccess
 from compd.live.service.messages import line
+from compd.model.kinematics import Frame
 from compd.operation_settings import SocketSettings
 from compd.setpoint_states import Mode, State
 
@@ -29,8 +30,9 @@ NO_ZERO = StateError(Problem(where="zero", what="none"))
 
 def setpoint(seq: int, time_s: float | None = None) -> Setpoint:
     three = np.array([1.0, 2.0, 3.0])
-    sources_mm = CorrectionShares(("joints", "frame"), np.array([three, three]))
-    numbers = SetpointValues(three, three, None, three, three, three, three, three, three, sources_mm)
+    contributions = Contributions(("joints", "frame"), np.array([three, three]))
+    frame = Frame(three, three, three, three, three, three, *(np.array(0),) * 3)
+    numbers = Compensation(*(three,) * 4, frame, *(three,) * 5, contributions, np.array(0))
     time_s = seq * PERIOD_S if time_s is None else time_s
     return Setpoint(seq, time_s, time_s + 0.1, 0.01, State.OK, "", Mode.CMM, numbers)
 
@@ -120,24 +122,34 @@ class Service:
         self.listeners = Listeners(sockets)
         self.ring = SharedRing()
         self.publisher = Publisher(
-            self.listeners, self.ring, SharedRing(), LoopIsWell(), PERIOD_S, self.clock, [self.observed.append]
+            listeners=self.listeners,
+            setpoints=self.ring,
+            cycles=SharedRing(),
+            watch=LoopIsWell(),
+            period_s=PERIOD_S,
+            clock=self.clock,
+            observers=[self.observed.append],
         )
         self.requests = Requests(
             RequestContext(
-                VERSION,
-                target_keys,
-                self.commands,
-                self.status,
-                {"class": "MACHINE"},
-                lambda: {"class": "BUDGET"},
-                lambda replace, answer: self.zeros.append((replace, answer)),
-                switch_model=lambda *arguments: self.models.append(arguments),
-                accept=self.accept,
+                messages=Messages(
+                    version=VERSION,
+                    machine={"class": "MACHINE"},
+                    status=self.status,
+                    budget=lambda: {"class": "BUDGET"},
+                ),
+                errands=Errands(
+                    take_zero=lambda replace, answer: self.zeros.append((replace, answer)),
+                    switch_model=lambda *arguments: self.models.append(arguments),
+                    accept=self.accept,
+                    poll=self.poll_requests.add,
+                    tell_order=self.publisher.tell_order,
+                ),
+                commands=self.commands,
+                target_keys=target_keys,
                 targets=sockets.target,
                 access=TcpAccess.of(sockets.tcp),
                 clock=self.clock,
-                poll=self.poll_requests.add,
-                tell_order=self.publisher.tell_order,
             )
         )
         self.stopping = threading.Event()
@@ -166,7 +178,8 @@ class Service:
         self.ring.wake_reader()
 
     def deliver(self, setpoint):
-        self.ring.put(setpoint.time_s, setpoint.state.code, SentSetpoint.of(setpoint, None).pack())
+        _, content = setpoint.pack(None)
+        self.ring.put(setpoint.time_s, setpoint.state.code, content)
 
     def unix(self, **options):
         return self._peer(Peer(socket.AF_UNIX, str(self.path), **options))

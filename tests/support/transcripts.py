@@ -158,9 +158,9 @@ class ReplayedLine:
 
     def receive_until(self, terminator: bytes, limit: int, timeout_s: float | None = None) -> bytes:
         self._check()
-        place = self._waiting.find(terminator)
-        if 0 <= place <= limit - len(terminator):
-            return self._take(place + len(terminator))
+        index = self._waiting.find(terminator)
+        if 0 <= index <= limit - len(terminator):
+            return self._take(index + len(terminator))
         raise LineFault(Quality.MISMATCH if len(self._waiting) >= limit else Quality.INCOMPLETE, repr(self._waiting))
 
     def drain(self, quiet_s: float | None = None) -> bytes:

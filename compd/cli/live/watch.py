@@ -235,11 +235,11 @@ def _position(setpoint: dict[str, Any]) -> Table:
 
 
 def _corrections(setpoint: dict[str, Any]) -> Table:
-    """One row per link, with the sources that every machine may have."""
-    sources = {name: values for name, values in setpoint["sources_mm"].items() if name in _OWN_COLUMN}
+    """One row per link, with the contributions that every machine may have."""
+    contributions = {name: values for name, values in setpoint["sources_mm"].items() if name in _OWN_COLUMN}
     corrections = setpoint["correction_mm"]
     table = Table(
-        "link", "length, mm", "correction, um", "", *(f"{name}, um" for name in sources), box=None, pad_edge=False
+        "link", "length, mm", "correction, um", "", *(f"{name}, um" for name in contributions), box=None, pad_edge=False
     )
     for column in table.columns[:3] + table.columns[4:]:
         column.justify = "right"
@@ -250,7 +250,7 @@ def _corrections(setpoint: dict[str, Any]) -> Table:
             f"{setpoint['link_length_mm'][i]:.5f}",
             _signed_um(correction),
             bar(correction, largest_mm),
-            *(_signed_um(values[i]) for values in sources.values()),
+            *(_signed_um(values[i]) for values in contributions.values()),
         )
     return table
 

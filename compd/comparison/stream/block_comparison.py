@@ -15,7 +15,7 @@ from compd.comparison.stream.block_queue import HandOver, computed_blocks
 from compd.comparison.stream.carried_effects import NOTHING_CARRIED, CarriedState, advance_effects
 from compd.comparison.stream.fixed_terms import NOTHING, BlockNuisance, FixedTerms, fixed_terms
 from compd.comparison.stream.recording_stream import Block, RecordingStream, align_block
-from compd.comparison.stream.residual_totals import BlockResiduals, ResidualTotals, SourceSquares
+from compd.comparison.stream.residual_totals import BlockResiduals, ContributionSquares, ResidualTotals
 from compd.comparison.stream.sample import Sample
 from compd.comparison.stream.streamed_comparison import StreamedComparison
 from compd.comparison.stream.time_envelope import TimeEnvelope
@@ -71,14 +71,16 @@ def _block_residuals(
     residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM - terms.explained_um(nuisance)
     outlier = fixed.limits.outliers(residual_um, known, recording.visit)
     used = known & ~outlier
-    sources: dict[str, SourceSquares] = {}
+    contributions: dict[str, ContributionSquares] = {}
     for name, added in deltas_without(aligned, by_effect).items():
         without_mm = aligned.predicted_mm(added)
         rows = used & np.isfinite(without_mm).all(axis=1)
         without_um = (aligned.measured_mm - without_mm) * UM_PER_MM - fixed.terms[name].explained_um(nuisance)
         moved_um = (predicted_mm - without_mm)[rows][:, aligned.lengths] * UM_PER_MM
         without_um = without_um[rows][:, aligned.lengths]
-        sources[name] = SourceSquares(float((moved_um**2).sum()), float((without_um**2).sum()), moved_um.size)
+        contributions[name] = ContributionSquares(
+            float((moved_um**2).sum()), float((without_um**2).sum()), moved_um.size
+        )
     used_um = residual_um[used]
     return BlockResiduals(
         rows=recording.rows,
@@ -89,7 +91,7 @@ def _block_residuals(
         registration_um=registration_um[used].sum(axis=0),
         outlier_row=recording.row[outlier],
         left_out=left_out,
-        sources=sources,
+        contributions=contributions,
     )
 
 

@@ -47,6 +47,6 @@ class MagnitudeHistogram:
         total = int(self._counts.sum())
         if not total:
             return float("nan")
-        place = int(np.searchsorted(np.cumsum(self._counts), share * (total - 1), side="right"))
-        edges = (np.array([place, place + 1], dtype=np.int64) + _FIRST) << _SHIFT
-        return float(edges.view(np.float64).mean()) if place else 0.0
+        index = int(np.searchsorted(np.cumsum(self._counts), share * (total - 1), side="right"))
+        edges = (np.array([index, index + 1], dtype=np.int64) + _FIRST) << _SHIFT
+        return float(edges.view(np.float64).mean()) if index else 0.0

@@ -18,23 +18,24 @@ from compd.comparison.stream.time_envelope import TimeEnvelope
 MOST_OUTLIERS_LISTED = 1000
 
 
-class SourceSquares(NamedTuple):
-    """Of one source, over rows and coordinates: sum of squares of what it moves, of the residual without it, um^2."""
+class ContributionSquares(NamedTuple):
+    """Of one cause, over rows and coordinates: sum of squares of what it moves, of the residual without it, um^2."""
 
     moved: float
     without: float
     values: int
 
-    def plus(self, other: SourceSquares) -> SourceSquares:
+    def plus(self, other: ContributionSquares) -> ContributionSquares:
         """Of these values and of others."""
-        return SourceSquares(self.moved + other.moved, self.without + other.without, self.values + other.values)
+        return ContributionSquares(self.moved + other.moved, self.without + other.without, self.values + other.values)
 
 
 class BlockResiduals(NamedTuple):
     """A block of N rows, of which U are used.
 
     rows : N.  row, time_s : (U,).  residual_um : (U, m).  distance_um : (U,).  registration_um : (m,) summed.
-    outlier_row : (O,).  left_out : reason -> rows.  sources : by the names of `contributions`.
+    outlier_row : (O,).  left_out : reason -> rows.  contributions : by the names of
+    `compd.comparison.contributions`.
     """
 
     rows: int
@@ -45,7 +46,7 @@ class BlockResiduals(NamedTuple):
     registration_um: FloatArray
     outlier_row: IntArray
     left_out: Mapping[str, int]
-    sources: Mapping[str, SourceSquares]
+    contributions: Mapping[str, ContributionSquares]
 
 
 class ResidualTotals:
@@ -71,7 +72,7 @@ class ResidualTotals:
         self._histograms = [MagnitudeHistogram() for _ in range(coordinates)]
         self._distance_squares, self._largest_distance = 0.0, -np.inf
         self._distances = MagnitudeHistogram()
-        self._sources: dict[str, SourceSquares] = {}
+        self._contributions: dict[str, ContributionSquares] = {}
 
     def add(self, block: BlockResiduals) -> None:
         """Count a block; blocks come in the order of time."""
@@ -79,9 +80,9 @@ class ResidualTotals:
         self.left_out.update(block.left_out)
         self.outliers += len(block.outlier_row)
         self.outlier_rows += block.outlier_row[: MOST_OUTLIERS_LISTED - len(self.outlier_rows)].tolist()
-        for name, squares in block.sources.items():
-            before = self._sources.get(name, SourceSquares(0.0, 0.0, 0))
-            self._sources[name] = before.plus(squares)
+        for name, squares in block.contributions.items():
+            before = self._contributions.get(name, ContributionSquares(0.0, 0.0, 0))
+            self._contributions[name] = before.plus(squares)
         if not len(block.row):
             return
         self.used += len(block.row)
@@ -89,9 +90,9 @@ class ResidualTotals:
         self._squares += (block.residual_um**2).sum(axis=0)
         self._registration += block.registration_um
         size_um = np.abs(block.residual_um)
-        place = size_um.argmax(axis=0)
-        largest_um = size_um[place, np.arange(size_um.shape[1])]
-        self.largest_row = np.where(largest_um > self.largest_um, block.row[place], self.largest_row)
+        index = size_um.argmax(axis=0)
+        largest_um = size_um[index, np.arange(size_um.shape[1])]
+        self.largest_row = np.where(largest_um > self.largest_um, block.row[index], self.largest_row)
         self.largest_um = np.maximum(largest_um, self.largest_um)
         for histogram, column in zip(self._histograms, size_um.T, strict=True):
             histogram.add(column)
@@ -131,6 +132,6 @@ class ResidualTotals:
         """As of a recording in memory."""
         return {
             name: Contribution(float(np.sqrt(each.moved / each.values)), float(np.sqrt(each.without / each.values)))
-            for name, each in self._sources.items()
+            for name, each in self._contributions.items()
             if each.values
         }

@@ -34,8 +34,8 @@ def moments_between_s(
     moments: Sequence[float], moment_s: float, criteria: CandidateCriteria = CandidateCriteria()
 ) -> list[float]:
     """Moments between one of those that were tried, s, and its neighbours."""
-    place = list(moments).index(moment_s)
-    ends = [moments[other] for other in (place - 1, place + 1) if 0 <= other < len(moments)]
+    index = list(moments).index(moment_s)
+    ends = [moments[other] for other in (index - 1, index + 1) if 0 <= other < len(moments)]
     return [float(new) for end in ends for new in np.linspace(moment_s, end, criteria.moments_between + 2)[1:-1]]
 
 

@@ -52,7 +52,7 @@ def refined_variants(
 
 def _between(grid: Sequence[float], value: float, count: int) -> list[float]:
     """So many values between one of a rising grid and each of its neighbours."""
-    place = grid.index(value)
-    ends = [grid[other] for other in (place - 1, place + 1) if 0 <= other < len(grid)]
+    index = grid.index(value)
+    ends = [grid[other] for other in (index - 1, index + 1) if 0 <= other < len(grid)]
     space = np.geomspace if grid[0] > 0 else np.linspace
     return [float(new) for end in ends for new in space(value, end, count + 2)[1:-1]]

@@ -179,8 +179,8 @@ class EmpiricalTerm:
         if self.form == "periodic":
             return refined_periods(value, self.unit, self.span, count, criteria)
         grid = sorted(self.grid)
-        place = grid.index(value)
-        low, high = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
+        index = grid.index(value)
+        low, high = grid[max(index - 1, 0)], grid[min(index + 1, len(grid) - 1)]
         if self.form == "lagged":
             return [float(f"{refined:.3g}") for refined in np.geomspace(low, high, count)]
         return [round_within(refined, ROUNDING * self.span) for refined in np.linspace(low, high, count).tolist()]

@@ -137,9 +137,9 @@ def explained_squares(
     explained = np.zeros(len(values))
     sizes = np.array([columns.shape[2] for columns in values], dtype=np.int64)
     for size in np.unique(sizes):
-        places = np.flatnonzero(sizes == size)
-        for begin in range(0, len(places), BATCH):
-            batch = places[begin : begin + BATCH]
+        indices = np.flatnonzero(sizes == size)
+        for begin in range(0, len(indices), BATCH):
+            batch = indices[begin : begin + BATCH]
             columns = np.concatenate([values[k] for k in batch], axis=2)
             squares = (columns**2).sum(axis=(0, 1)).reshape(-1, size)
             flat = complement(columns).reshape(residual.size, -1)

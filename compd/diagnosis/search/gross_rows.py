@@ -113,9 +113,9 @@ def _confirmed(left: FloatArray, known: BoolArray, visit: IntArray | None, limit
 
 def gross_rows(gross: BoolArray, row: IntArray, criteria: GrossCriteria = GrossCriteria()) -> GrossRows:
     """The gross rows as a person finds them; row : (N,) their numbers in a spreadsheet."""
-    places = np.flatnonzero(gross)
-    if not len(places):
+    indices = np.flatnonzero(gross)
+    if not len(indices):
         return GrossRows()
-    stretches = np.split(places, np.flatnonzero(np.diff(places) > criteria.max_gap) + 1)
+    stretches = np.split(indices, np.flatnonzero(np.diff(indices) > criteria.max_gap) + 1)
     runs = [(int(row[s[0]]), int(row[s[-1]])) for s in stretches if len(s) >= criteria.min_in_run]
-    return GrossRows(tuple(int(number) for number in row[places]), tuple(runs))
+    return GrossRows(tuple(int(number) for number in row[indices]), tuple(runs))

@@ -131,10 +131,10 @@ class NormalEquations:
         losses = np.full(len(sets), np.nan)
         sizes = np.array([len(index) for index in sets])
         for size in np.unique(sizes):
-            places = np.flatnonzero(sizes == size)
+            indices = np.flatnonzero(sizes == size)
             step = max(1, BATCH // (len(self.gram) * max(int(size), 1) ** 2))
-            for begin in range(0, len(places), step):
-                batch = places[begin : begin + step]
+            for begin in range(0, len(indices), step):
+                batch = indices[begin : begin + step]
                 losses[batch] = self._cv_losses_of_one_size(np.stack([sets[k] for k in batch]), testable[batch])
         return losses
 

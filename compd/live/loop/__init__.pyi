@@ -1,4 +1,6 @@
 from .adopted_models import AdoptedModels as AdoptedModels
+from .carried_state import CARRIED as CARRIED
+from .carried_state import with_zero_of as with_zero_of
 from .commands import Commands as Commands
 from .commands import Target as Target
 from .cycle import step as step
@@ -21,11 +23,9 @@ from .reasons import waiting_text as waiting_text
 from .ring_entries import CyclePacker as CyclePacker
 from .ring_entries import CycleUnpacker as CycleUnpacker
 from .ring_entries import SentCycle as SentCycle
-from .ring_entries import SentSetpoint as SentSetpoint
 from .setpoint import Setpoint as Setpoint
 from .setpoint import setpoint_line as setpoint_line
 from .skew import skew_of as skew_of
-from .stale_policy import ComparatorSet as ComparatorSet
 from .timing import LoopTiming as LoopTiming
 from .tip_uncertainty import stated_noise as stated_noise
 from .wired_readings import RESTED as RESTED

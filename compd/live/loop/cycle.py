@@ -17,7 +17,7 @@ from compd.arrays import FloatArray
 from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm
 from compd.errors import StateError
 from compd.live.loop.commands import Target
-from compd.live.loop.cycle_readings import Scales, read_comparators, read_scales
+from compd.live.loop.cycle_readings import judge_scales, read_comparators, read_scales
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors
 from compd.live.loop.limits import LimitedCorrection, limit_correction, slewed, stroke_problem
 from compd.live.loop.machine_zero import MachineZero
@@ -25,7 +25,7 @@ from compd.live.loop.model_loader import Models
 from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
 from compd.live.loop.reasons import shortened
 from compd.live.loop.refusal_cause import refusal_cause
-from compd.live.loop.setpoint import Setpoint, SetpointValues, ShadowResult
+from compd.live.loop.setpoint import Setpoint, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import UsableComparators
 from compd.live.loop.tip_bound import refused_bound, tip_bound, with_place
@@ -51,14 +51,17 @@ class _Outcome(NamedTuple):
 
     oldest_s : monotonic time of the oldest reading used. expires_s : from when the readings must not be used any more.
     skew_s : between the oldest and the newest length that was used; nan where that is not known.
+    values, u_tip_um, shadow : as in `Setpoint`.
     """
 
     state: State
     reason: str
-    values: SetpointValues | None = None
+    values: Compensation | None = None
     oldest_s: float = math.nan
     expires_s: float = math.nan
     skew_s: float = math.nan
+    u_tip_um: float = math.nan
+    shadow: ShadowResult | None = None
 
 
 def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tuple[Setpoint, CycleState]:
@@ -92,7 +95,7 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
     expires_s = min(now_s + settings.valid_for_s, outcome.expires_s, target_until_s)
     valid_until_s = now_s if outcome.values is None else expires_s
     age_s = now_s - outcome.oldest_s
-    # positional, as in `_setpoint_values`: keywords cost twice the time
+    # positional: keywords cost twice the time
     setpoint = Setpoint(
         inputs.tick,
         now_s,
@@ -106,6 +109,9 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
         inputs,
         state,
         outcome.skew_s,
+        outcome.u_tip_um,
+        outcome.shadow,
+        settings.wires.tool_on_plate,
     )
     return setpoint, next_state
 
@@ -129,10 +135,11 @@ def _compute(
     if comparators is None:
         return _Outcome(usable.state, usable.reason), state
 
-    scales = read_scales(snapshot, zero_vectors.scale_mm, target, state.scales_seen, settings)
-    if scales.state is not None and not scales.state.valid:
-        reason = "; ".join(filter(None, (scales.reason, usable.reason)))
-        return _Outcome(scales.state, reason), state if live is None else state._replace(last_good=live)
+    scales = read_scales(snapshot, zero_vectors.scale_mm, target, settings)
+    scales_state, scales_reason = judge_scales(scales.lost, target, state.scales_seen)
+    if not scales_state.valid:
+        reason = "; ".join(filter(None, (scales_reason, usable.reason)))
+        return _Outcome(scales_state, reason), state if live is None else state._replace(last_good=live)
     scale_mm, oldest_s = scales.values, min(comparators.oldest_s, scales.oldest_s)
     skew_s = skew_between(comparators.length_times_s, scales.oldest_s, scales.newest_s)
     if usable.state is State.OK and skew_s > settings.largest_skew_s:  # what is held instead, `hold_s` limits
@@ -206,19 +213,38 @@ def _compute(
         compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
         if code := int(compensation.reason):
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
-    reported, reason = _reported(usable, scales, limited)
-    setpoint_values = _setpoint_values(
-        compensation, limited.applied_mm, math.nan if bound is None else bound.um, shadow, wires.tool_on_plate
+    reported, reason = _reported(usable, scales_state, scales_reason, limited)
+    compensation = _with_applied(compensation, limited.applied_mm)
+    return (
+        _Outcome(
+            reported,
+            reason,
+            compensation,
+            oldest_s,
+            usable.expires_s,
+            skew_s,
+            math.nan if bound is None else bound.um,
+            shadow,
+        ),
+        next_state,
     )
-    return _Outcome(reported, reason, setpoint_values, oldest_s, usable.expires_s, skew_s), next_state
 
 
-def _reported(usable: UsableComparators, scales: Scales, limited: LimitedCorrection) -> tuple[State, str]:
+def _with_applied(compensation: Compensation, applied_mm: FloatArray) -> Compensation:
+    """The compensation with the correction (n) that is applied, and the scale setpoint that belongs to it."""
+    setpoint_mm = compensation.nominal_scale_mm + applied_mm
+    # in the order of the fields: `_replace` takes three times as long
+    return Compensation._make((*compensation[:8], setpoint_mm, applied_mm, *compensation[10:]))
+
+
+def _reported(
+    usable: UsableComparators, scales_state: State, scales_reason: str, limited: LimitedCorrection
+) -> tuple[State, str]:
     """State and reason of a valid setpoint: of what concerns it the worst state, and all reasons."""
     beyond = f"effects stay at the edge of their range: {usable.beyond.text}" if usable.beyond else ""
     at_edge = State.CLAMPED if beyond else State.OK
-    state = max(limited.state, usable.state, scales.state or State.OK, at_edge, key=lambda state: state.rank)
-    return state, "; ".join(filter(None, (usable.reason, scales.reason, limited.reason, beyond)))
+    state = max(limited.state, usable.state, scales_state, at_edge, key=lambda state: state.rank)
+    return state, "; ".join(filter(None, (usable.reason, scales_reason, limited.reason, beyond)))
 
 
 def _refused_skew(snapshot: Snapshot, skew_s: float, target: Target | None, settings: CycleSettings) -> _Outcome:
@@ -322,28 +348,4 @@ def _with_tip_as_applied(
         tip_P_mm=tip.tip_P_mm,
         link_length_mm=tip.link_length_mm,
         reason=tip.reason,
-    )
-
-
-def _setpoint_values(
-    compensation: Compensation,
-    applied_mm: FloatArray,
-    u_tip_um: float,
-    shadow: ShadowResult | None,
-    tool_on_plate: bool,
-) -> SetpointValues:
-    frame = compensation.frame
-    return SetpointValues(
-        compensation.tip_M_mm,
-        compensation.tip_B0_mm,
-        compensation.tip_P_mm if tool_on_plate else None,
-        frame.origin_M_mm,
-        frame.displacement_M_mm,
-        frame.rotation_M_rad,
-        compensation.link_length_mm,
-        compensation.nominal_scale_mm + applied_mm,
-        applied_mm,
-        compensation.sources,
-        u_tip_um,
-        shadow,
     )

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
 
 from compd.arrays import FloatArray
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings
-from compd.live.loop.degraded import GroupReadings, degraded_comparators
+from compd.live.loop.degraded import degraded_comparators
 from compd.live.loop.model_loader import LiveModel
+from compd.live.loop.reasons import Lost
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
-from compd.live.loop.wiring import Wires
+from compd.live.loop.wiring import ALL_GOOD, WiredValues
 from compd.live.memory import Snapshot
 from compd.setpoint_states import State
 
@@ -51,52 +51,31 @@ def read_comparators(
         return live, usable._replace(beyond=beyond) if beyond else usable
     if settings.loop.on_stale == "degrade":
         groups = (
-            _group(wires.joint, snapshot, zero_mm[: wires.joints], extrapolate),
-            _group(wires.frame, snapshot, zero_mm[wires.joints :], extrapolate),
-            _quantity_group(applied, snapshot),
+            wires.joint.read(snapshot, zero_mm[: wires.joints], extrapolate),
+            wires.frame.read(snapshot, zero_mm[wires.joints :], extrapolate),
+            applied.read(snapshot),
         )
         newest, usable = degraded_comparators(groups, quantities, last_good, now_s, settings.loop)
         return newest, usable._replace(beyond=beyond) if beyond and not groups[2].lost else usable
     return None, usable_comparators(None, last_good, lost, now_s, settings.loop)
 
 
-def _group(wires: Wires, snapshot: Snapshot, zero_mm: FloatArray, extrapolate: bool) -> GroupReadings:
-    values, oldest_s, newest_s, lost, _ = wires.read(snapshot, zero_mm, extrapolate)
-    return GroupReadings(values, lost, oldest_s, newest_s)
-
-
-def _quantity_group(applied: LiveModel, snapshot: Snapshot) -> GroupReadings:
-    needed = applied.read(snapshot)
-    return GroupReadings(needed.values, needed.lost, needed.oldest_s, needed.newest_s)
-
-
-class Scales(NamedTuple):
-    """The scales of a cycle: values (n) in mm since machine zero, and the times of the oldest and the newest reading.
-
-    state, reason : where they make the setpoint invalid or worse than it were; None and "" otherwise.
-    """
-
-    values: FloatArray
-    oldest_s: float
-    newest_s: float
-    state: State | None = None
-    reason: str = ""
-
-
-def read_scales(
-    snapshot: Snapshot, zero_mm: FloatArray, target: Target | None, seen: bool, settings: CycleSettings
-) -> Scales:
-    """The scales in CMM mode. In machine-tool mode they are not used, but they may be compared with the setpoints."""
+def read_scales(snapshot: Snapshot, zero_mm: FloatArray, target: Target | None, settings: CycleSettings) -> WiredValues:
+    """The scales (n). In machine-tool mode they are nan, since they are not used; what is lost of them is known where
+    they are compared with the setpoints."""
     wires = settings.wires.scale
-    if target is not None:
-        unread = Scales(settings.unread_scales_mm, math.inf, -math.inf)
-        if not (settings.scales_checked and (lost := wires.lost(snapshot))):
-            return unread
-        state = State.FAULT if lost.distrusted else State.DEGRADED
-        return unread._replace(state=state, reason=f"not compared with the setpoint: {lost}")
-    values, oldest_s, newest_s, lost, _ = wires.read(snapshot, zero_mm, settings.loop.extrapolate)
+    if target is None:
+        return wires.read(snapshot, zero_mm, settings.loop.extrapolate)
+    lost = wires.lost(snapshot) if settings.scales_checked else ALL_GOOD
+    return WiredValues(settings.unread_scales_mm, math.inf, -math.inf, lost)
+
+
+def judge_scales(lost: Lost, target: Target | None, seen: bool) -> tuple[State, str]:
+    """State and reason of a setpoint by what is lost of the scales. seen : whether they have ever been good."""
     if not lost:
-        return Scales(values, oldest_s, newest_s)
+        return State.OK, ""
+    if target is not None:
+        return State.FAULT if lost.distrusted else State.DEGRADED, f"not compared with the setpoint: {lost}"
     # no policy replaces a scale: without it the tip is not known
     state = State.FAULT if lost.distrusted else State.STOP if seen else State.STARTING
-    return Scales(values, oldest_s, newest_s, state, f"the tip is not known: {lost}")
+    return state, f"the tip is not known: {lost}"

@@ -4,34 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.live.loop.reasons import Lost
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators
+from compd.live.loop.wiring import WiredValues
 from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
 
 GROUPS = ("joints", "frame", "effects")
 
 
-class GroupReadings(NamedTuple):
-    """The joint comparators, the frame comparators, or the quantities that the effects need, in one snapshot.
-
-    values : in mm since machine zero; of quantities nothing. lost : which cannot be used.
-    oldest_s, newest_s : monotonic times of the oldest and of the newest reading.
-    """
-
-    values: FloatArray
-    lost: Lost
-    oldest_s: float
-    newest_s: float
-
-
 def degraded_comparators(
-    groups: tuple[GroupReadings, GroupReadings, GroupReadings],
+    groups: tuple[WiredValues, WiredValues, WiredValues],
     quantities: Mapping[str, FloatArray],
     last_good: ComparatorSet | None,
     now_s: float,
@@ -92,7 +78,7 @@ def degraded_comparators(
 
 
 def _length_times_s(
-    lengths: tuple[GroupReadings, ...], weights: list[float], last_good: ComparatorSet
+    lengths: tuple[WiredValues, ...], weights: list[float], last_good: ComparatorSet
 ) -> tuple[float, ...]:
     """Times of the oldest and of the newest length that counts: live, or of the last good set and not yet absent."""
     times_s = [time_s for group in lengths if not group.lost for time_s in (group.oldest_s, group.newest_s)]

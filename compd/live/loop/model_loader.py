@@ -78,11 +78,11 @@ class FittedRanges(NamedTuple):
         within = np.minimum(np.maximum(values, self.low), self.high)
         if (within == values).all() or read.lost:
             return read._replace(values=within)
-        places = np.flatnonzero(within != values).tolist()
+        indices = np.flatnonzero(within != values).tolist()
         text = ", ".join(
-            f"{names[k]} is {values[k]:.6g}, fitted from {self.low[k]:.6g} to {self.high[k]:.6g}" for k in places
+            f"{names[k]} is {values[k]:.6g}, fitted from {self.low[k]:.6g} to {self.high[k]:.6g}" for k in indices
         )
-        by = {names[k]: abs(float(values[k] - within[k])) for k in places}
+        by = {names[k]: abs(float(values[k] - within[k])) for k in indices}
         return read._replace(values=within, beyond=Beyond(text, by))
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+import pickle
 import zlib
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import orjson
 
 from compd.arrays import FloatArray
-from compd.compensation import CorrectionShares
+from compd.compensation import Compensation
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.packet_layout import (
@@ -33,6 +34,9 @@ _DECIMALS_S = 6
 # 0.1 nm, as lengths: an uncertainty is not known better.
 _DECIMALS_UM = 4
 
+_PICKLE_PROTOCOL = 5
+_STATES = {state.code: state for state in State}
+_MODES = {mode.code: mode for mode in Mode}
 _NO_VECTORS: tuple[float, ...] = (math.nan,) * (9 + 3 * PACKET_LINKS)
 
 
@@ -55,37 +59,6 @@ class ShadowResult(NamedTuple):
     tip_P_mm: FloatArray | None = None
 
 
-class SetpointValues(NamedTuple):
-    """The values of a valid setpoint; n links.
-
-    Attributes
-    ----------
-    tip_M_mm, tip_B0_mm : (3), the tool tip in {M}, and in {B0} by equation (9).
-    tip_P_mm : (3), with the tool on the plate the place on the work that the tip touches; None otherwise.
-    frame_origin_M_mm : (3), origin of {B}.
-    frame_displacement_M_mm, frame_rotation_M_rad : (3), displacement and rotation vector of {B} since machine zero.
-    link_length_mm, scale_setpoint_mm : (n).
-    correction_mm : (n), what is added to the command, within its limits.
-    sources_mm : (n) for joints, frame and each effect: what each asks for, before the limits.
-    u_tip_um : how far the tip may be from `tip_P_mm` with the tool on the plate, else from `tip_M_mm`, with 95 %; nan
-        where it is not known. Of a recording of a release up to 0.2.0 its standard uncertainty along x, y, z, or None.
-    shadow : result of the model that runs beside the applied one; None without one.
-    """
-
-    tip_M_mm: FloatArray
-    tip_B0_mm: FloatArray
-    tip_P_mm: FloatArray | None
-    frame_origin_M_mm: FloatArray
-    frame_displacement_M_mm: FloatArray
-    frame_rotation_M_rad: FloatArray
-    link_length_mm: FloatArray
-    scale_setpoint_mm: FloatArray
-    correction_mm: FloatArray
-    sources_mm: CorrectionShares
-    u_tip_um: float | FloatArray | None = math.nan
-    shadow: ShadowResult | None = None
-
-
 class Setpoint(NamedTuple):
     """Result of one cycle.
 
@@ -97,11 +70,19 @@ class Setpoint(NamedTuple):
     state : how it came about.
     reason : why the state is not ok; "" when it is.
     mode : what determined the tip.
-    values : None unless valid, so that no value can be taken for a good one.
+    values : the compensation with the correction that is applied, within its limits, and the scale setpoint that
+        belongs to it; its contributions are what each cause asks for, before the limits. None unless valid, so that no
+        value can be taken for a good one, and in a setpoint that `unpack` returned.
     model : hash of the model file that was applied; "" without effects.
-    skew_s : how much later than the oldest the newest length that was used was measured; nan where that is not known.
     inputs, state_before : what it was computed from, for READINGS messages; of them a SETPOINT has the target's time
         and id.
+    skew_s : how much later than the oldest the newest length that was used was measured; nan where that is not known.
+    u_tip_um : how far the tip may be from the place on the work with the tool on the plate, else from `tip_M_mm`, with
+        95 %; nan where it is not known. Of a recording of a release up to 0.2.0 its standard uncertainty along x, y, z,
+        or None.
+    shadow : result of the model that runs beside the applied one; None without one.
+    tool_on_plate : whether the tool stands on the plate: `tip_P_mm` of the values is the place on the work then.
+    line : its JSON, with the newline. packet : for UDP. Both are b"" but in what `unpack` returned.
     """
 
     seq: int
@@ -111,15 +92,36 @@ class Setpoint(NamedTuple):
     state: State
     reason: str
     mode: Mode
-    values: SetpointValues | None
+    values: Compensation | None
     model: str = ""
     inputs: CycleInputs | None = None
     state_before: CycleState | None = None
     skew_s: float = math.nan
+    u_tip_um: float | FloatArray | None = math.nan
+    shadow: ShadowResult | None = None
+    tool_on_plate: bool = False
+    line: bytes = b""
+    packet: bytes = b""
 
     @property
     def valid(self) -> bool:
-        return self.values is not None
+        return self.state.valid
+
+    def pack(self, config_hash: bytes | None) -> tuple[bytes, bytes]:
+        """Its line, and what clients are sent of it as the content of a ring's entry: the line among it.
+
+        config_hash : for the packet; None for no packet.
+        """
+        line, packet = self.to_json(), b"" if config_hash is None else self.to_packet(config_hash)
+        content = (*self[:4], self.state.code, self.reason, self.mode.code, line, packet)
+        return line, pickle.dumps(content, _PICKLE_PROTOCOL)
+
+    @classmethod
+    def unpack(cls, content: bytes) -> Self:
+        """From the content of an entry: with line and packet, without values and what it was computed from."""
+        seq, time_s, valid_until_s, age_s, state, reason, mode, line, packet = pickle.loads(content)
+        head = seq, time_s, valid_until_s, age_s, _STATES[state], reason, _MODES[mode]
+        return cls(*head, None, line=line, packet=packet)
 
     def to_json(self) -> bytes:
         """One line of JSON, with its newline. Keys without a value are absent; of a valid setpoint `u_tip_um` is null
@@ -146,8 +148,55 @@ class Setpoint(NamedTuple):
         if math.isfinite(self.skew_s):
             message["skew_s"] = round(self.skew_s, _DECIMALS_S)
         if self.values is not None:
-            message |= _json_values(self.values)
+            message |= self._json_values(self.values)
         return setpoint_line(message)
+
+    def _json_values(self, values: Compensation) -> dict[str, Any]:
+        """The values as rounded lists, under their keys in the message."""
+        frame, contributions = values.frame, values.contributions
+        vectors = [
+            values.tip_M_mm,
+            values.tip_B0_mm,
+            frame.origin_M_mm,
+            frame.displacement_M_mm,
+            values.link_length_mm,
+            values.scale_setpoint_mm,
+            values.correction_mm,
+        ]
+        if self.tool_on_plate:
+            vectors.append(values.tip_P_mm)
+        # rounding one long array costs as much as rounding one of three elements
+        lengths = _rounded(np.concatenate(vectors), _DECIMALS_MM)
+        n = len(values.correction_mm)
+        message: dict[str, Any] = {
+            "tip_M_mm": lengths[:3],
+            "tip_B0_mm": lengths[3:6],
+            "link_length_mm": lengths[12 : 12 + n],
+            "scale_setpoint_mm": lengths[12 + n : 12 + 2 * n],
+            "correction_mm": lengths[12 + 2 * n : 12 + 3 * n],
+            "frame": {
+                "origin_M_mm": lengths[6:9],
+                "displacement_M_mm": lengths[9:12],
+                "rotation_M_rad": _rounded(frame.rotation_M_rad, _DECIMALS_RAD),
+            },
+            "sources_mm": dict(
+                zip(contributions.causes, _rounded(contributions.by_cause_mm, _DECIMALS_MM), strict=True)
+            ),
+        }
+        if self.tool_on_plate:
+            message["tip_P_mm"] = lengths[12 + 3 * n :]
+        u_tip_um = self.u_tip_um
+        if isinstance(u_tip_um, float):
+            message["u_tip_um"] = round(u_tip_um, _DECIMALS_UM) if math.isfinite(u_tip_um) else None
+        elif u_tip_um is not None and math.isfinite(u_tip_um.sum()):
+            message["u_tip_um"] = _rounded(u_tip_um, _DECIMALS_UM)
+        if self.shadow is not None:
+            message["shadow"] = {
+                name: field if isinstance(field, str) else _rounded(field, _DECIMALS_MM)
+                for name, field in self.shadow._asdict().items()
+                if field is not None
+            }
+        return message
 
     def to_packet(self, config_hash: bytes) -> bytes:
         """`PACKET_SIZE` bytes, little-endian; the links a machine does not have are nan.
@@ -158,14 +207,14 @@ class Setpoint(NamedTuple):
         vectors = _NO_VECTORS
         links = flags = 0
         if values is not None:
-            tip_mm = values.tip_M_mm if values.tip_P_mm is None else values.tip_P_mm
+            tip_mm = values.tip_P_mm if self.tool_on_plate else values.tip_M_mm
             links = len(values.correction_mm)
-            flags = FLAG_VALID if values.tip_P_mm is None else FLAG_VALID | FLAG_TOOL_ON_PLATE
+            flags = FLAG_VALID | FLAG_TOOL_ON_PLATE if self.tool_on_plate else FLAG_VALID
             unused = (math.nan,) * (PACKET_LINKS - links)
             vectors = (
                 *tip_mm.tolist(),
-                *values.frame_displacement_M_mm.tolist(),
-                *values.frame_rotation_M_rad.tolist(),
+                *values.frame.displacement_M_mm.tolist(),
+                *values.frame.rotation_M_rad.tolist(),
                 *values.link_length_mm.tolist(),
                 *unused,
                 *values.scale_setpoint_mm.tolist(),
@@ -202,53 +251,6 @@ def _target_named(target: Target) -> dict[str, Any]:
         return {}
     named = {"target_time_s": round(target.time_s, _DECIMALS_S)}
     return named if target.id is None else named | {"target_id": target.id}
-
-
-def _json_values(values: SetpointValues) -> dict[str, Any]:
-    """The values as rounded lists, under their keys in the message."""
-    vectors = [
-        values.tip_M_mm,
-        values.tip_B0_mm,
-        values.frame_origin_M_mm,
-        values.frame_displacement_M_mm,
-        values.link_length_mm,
-        values.scale_setpoint_mm,
-        values.correction_mm,
-    ]
-    if values.tip_P_mm is not None:
-        vectors.append(values.tip_P_mm)
-    # rounding one long array costs as much as rounding one of three elements
-    lengths = _rounded(np.concatenate(vectors), _DECIMALS_MM)
-    n = len(values.correction_mm)
-    message: dict[str, Any] = {
-        "tip_M_mm": lengths[:3],
-        "tip_B0_mm": lengths[3:6],
-        "link_length_mm": lengths[12 : 12 + n],
-        "scale_setpoint_mm": lengths[12 + n : 12 + 2 * n],
-        "correction_mm": lengths[12 + 2 * n : 12 + 3 * n],
-        "frame": {
-            "origin_M_mm": lengths[6:9],
-            "displacement_M_mm": lengths[9:12],
-            "rotation_M_rad": _rounded(values.frame_rotation_M_rad, _DECIMALS_RAD),
-        },
-        "sources_mm": dict(
-            zip(values.sources_mm.causes, _rounded(values.sources_mm.shares_mm, _DECIMALS_MM), strict=True)
-        ),
-    }
-    if values.tip_P_mm is not None:
-        message["tip_P_mm"] = lengths[12 + 3 * n :]
-    u_tip_um = values.u_tip_um
-    if isinstance(u_tip_um, float):
-        message["u_tip_um"] = round(u_tip_um, _DECIMALS_UM) if math.isfinite(u_tip_um) else None
-    elif u_tip_um is not None and math.isfinite(u_tip_um.sum()):
-        message["u_tip_um"] = _rounded(u_tip_um, _DECIMALS_UM)
-    if values.shadow is not None:
-        message["shadow"] = {
-            name: field if isinstance(field, str) else _rounded(field, _DECIMALS_MM)
-            for name, field in values.shadow._asdict().items()
-            if field is not None
-        }
-    return message
 
 
 def _rounded(values: FloatArray, decimals: int) -> list[Any]:

@@ -93,7 +93,7 @@ def _absent_link_mm(wanted: Compensation, reached_mm: FloatArray, weight: float)
 
     weight : by which the corrections of the effects have been multiplied.
     """
-    effects_mm = wanted.sources.shares_mm[_GAUGED:]
+    effects_mm = wanted.contributions.by_cause_mm[_GAUGED:]
     if weight == 1.0 or not len(effects_mm):
         return None if reached_mm is wanted.correction_mm else wanted.correction_mm - reached_mm
     if weight == 0.0:
@@ -190,8 +190,8 @@ def _largest_part(bound: TipBound, snapshot: Snapshot, usable: UsableComparators
     )
 
 
-def _named(wires: MachineWires, places: list[int]) -> str:
-    return _listed([f"{wires.length_wires[k].meaning} ({wires.length_wires[k].channel})" for k in places])
+def _named(wires: MachineWires, indices: list[int]) -> str:
+    return _listed([f"{wires.length_wires[k].meaning} ({wires.length_wires[k].channel})" for k in indices])
 
 
 def _listed(names: list[str]) -> str:

@@ -1,13 +1,8 @@
-"""Readings as they are in shared memory, one slot of 256 bytes per channel:
+"""Readings as they are in shared memory, one slot of 256 bytes per channel.
 
-value      8 bytes, float64, in the channel's unit; nan where there is none
-time_s     8 bytes, float64, monotonic
-motion     80 bytes, ten float64, a `ReadingMotion`; nan where there is none
-quality    1 byte, number of the Quality
-length     1 byte, of the detail
-(unused)   2 bytes
-checksum   4 bytes, CRC-32 of all that is before and after it in the slot
-detail     152 bytes, UTF-8
+A slot has the reading's value (nan where there is none) and monotonic time, its `ReadingMotion` (nan where there is
+none), the number of its Quality, the length of its detail in bytes, a CRC-32 of all that is before and after it in the
+slot, and the detail in UTF-8. SLOT is the layout.
 """
 
 from __future__ import annotations
@@ -26,42 +21,41 @@ from numpy.typing import NDArray
 from compd.gauge import Quality, Reading, ReadingMotion
 from compd.jit import INDICES, helper, loop
 
-_SLOT = struct.Struct("=12dBBxxI152s")
-_HEAD = struct.Struct("=12dBBxxI")
-_CHECKED = struct.Struct("=12dBBxx")
-_CHECKED_BYTES = _CHECKED.size
-_LENGTH_PLACE = 97
-_HEAD_BYTES = _HEAD.size
-SLOT_BYTES = _SLOT.size
-LONGEST_DETAIL = SLOT_BYTES - _HEAD_BYTES
-_NO_MOTION = (math.nan,) * 10
-
-_QUALITIES = tuple(Quality)
-_NUMBERS = {quality: number for number, quality in enumerate(_QUALITIES)}
-OK_NUMBER = _NUMBERS[Quality.OK]
-
-# The same slot as an element of an array; for kernels.
+# Of a slot, in bytes.
+_DETAIL_BYTES = 152
+_NUMBERS = ("value", "time_s", *ReadingMotion._fields)
+# The slot as an element of an array, for kernels. It has no padding, so that it can be packed field by field.
 SLOT = np.dtype(
     [
-        ("value", np.float64),
-        ("time_s", np.float64),
-        ("speed_mm_per_s", np.float64),
-        ("braking_mm_per_s2", np.float64),
-        ("u_mm_per_s", np.float64),
-        ("horizon_s", np.float64),
-        ("mean_mm_per_s", np.float64),
-        ("window_s", np.float64),
-        ("due_s", np.float64),
-        ("scatter_mm", np.float64),
-        ("rest_s", np.float64),
-        ("late_s", np.float64),
+        *((name, np.float64) for name in _NUMBERS),
         ("quality", np.uint8),
         ("length", np.uint8),
         ("unused", np.uint16),
         ("checksum", np.uint32),
-        ("detail", np.uint8, LONGEST_DETAIL),
+        ("detail", np.uint8, _DETAIL_BYTES),
     ]
 )
+
+
+def _struct_up_to(end: str | None) -> struct.Struct:
+    """The fields of SLOT before the field `end`; None for all."""
+    names = SLOT.names or ()
+    types_ = [SLOT[name] for name in names[: None if end is None else names.index(end)]]
+    return struct.Struct("=" + "".join(f"{each.itemsize}s" if each.subdtype else each.char for each in types_))
+
+
+_SLOT, _HEAD, _CHECKED = _struct_up_to(None), _struct_up_to("detail"), _struct_up_to("checksum")
+_CHECKED_BYTES = _CHECKED.size
+_HEAD_BYTES = _HEAD.size
+_LENGTH_OFFSET = sum(SLOT[name].itemsize for name in (*_NUMBERS, "quality"))
+SLOT_BYTES = _SLOT.size
+LONGEST_DETAIL = _DETAIL_BYTES
+_NO_MOTION = (math.nan,) * len(ReadingMotion._fields)
+
+_QUALITIES = tuple(Quality)
+_QUALITY_NUMBERS = {quality: number for number, quality in enumerate(_QUALITIES)}
+OK_NUMBER = _QUALITY_NUMBERS[Quality.OK]
+
 SLOTS = types.Array(from_dtype(SLOT), 1, "C", readonly=True)
 _CONTENTS = types.Array(types.uint8, 2, "C", readonly=True)
 _KEPT = types.uint8[:, ::1]
@@ -75,9 +69,9 @@ def pack(reading: Reading) -> bytes:
     text = b""
     if detail:
         text = detail.encode(errors="replace")[:LONGEST_DETAIL].decode(errors="ignore").encode()
-    head = _CHECKED.pack(value, time_s, *moves, _NUMBERS[quality], len(text))
-    checksum = zlib.crc32(text, zlib.crc32(head))
-    return _SLOT.pack(value, time_s, *moves, _NUMBERS[quality], len(text), checksum, text)
+    number = _QUALITY_NUMBERS[quality]
+    checksum = zlib.crc32(text, zlib.crc32(_CHECKED.pack(value, time_s, *moves, number, len(text), 0)))
+    return _SLOT.pack(value, time_s, *moves, number, len(text), 0, checksum, text)
 
 
 def _crc_table() -> NDArray[np.int64]:
@@ -94,7 +88,7 @@ _CRC_TABLE = _crc_table()
 @helper
 def _is_whole(content: NDArray[np.uint8]) -> bool:
     """Whether the checksum of a slot fits."""
-    length = np.int64(content[_LENGTH_PLACE])
+    length = np.int64(content[_LENGTH_OFFSET])
     if length > LONGEST_DETAIL:
         return False
     crc = np.int64(0xFFFFFFFF)
@@ -207,7 +201,7 @@ class Readings(Sequence[Reading]):
         if isinstance(index, slice):
             return tuple(self[i] for i in range(*index.indices(len(self))))
         start = range(len(self))[index] * SLOT_BYTES
-        value, time_s, *moves, number, length, _ = _HEAD.unpack_from(self.image, start)
+        value, time_s, *moves, number, length, _, _ = _HEAD.unpack_from(self.image, start)
         motion = ReadingMotion(*moves)
         text = start + _HEAD_BYTES
         detail = self.image[text : text + length].decode() if length else ""

@@ -29,7 +29,6 @@ from compd.live.loop import (
     ModelLoader,
     Models,
     ModelText,
-    SentSetpoint,
     Setpoint,
     step,
     warn_of_datum,
@@ -162,9 +161,9 @@ class LoopProcess:
 
         def send(setpoint: Setpoint) -> None:
             time_s, state = setpoint.time_s, setpoint.state.code
-            sent = SentSetpoint.of(setpoint, self.packet_hash)
-            self.setpoints.put(time_s, state, sent.pack())
-            self.cycles.put(time_s, state, packer.pack(setpoint, sent.line))
+            line, content = setpoint.pack(self.packet_hash)
+            self.setpoints.put(time_s, state, content)
+            self.cycles.put(time_s, state, packer.pack(setpoint, line))
 
         return Loop(self.settings, self.latest, self.commands, [send], self.clock, self.timing)
 
@@ -187,9 +186,9 @@ class LoopProcess:
         packer = CyclePacker(Directions(self.settings.wires.scale.wires))
         for tick in range(1, _TRIAL_CYCLES + 1):
             setpoint, state = step(state, self._inputs(tick), self.settings)
-            sent = SentSetpoint.of(setpoint, self.packet_hash)
+            line, _ = setpoint.pack(self.packet_hash)
             # what effects remember may grow while the machine moves
-            if len(packer.pack(setpoint, sent.line)) > (most := self.cycles.longest_content // 2):
+            if len(packer.pack(setpoint, line)) > (most := self.cycles.longest_content // 2):
                 raise ValueError(f"a cycle, with what its effects remember, has more than {most} bytes")
 
     def _inputs(self, tick: int) -> CycleInputs:

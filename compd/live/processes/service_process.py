@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import structlog
 
 from compd.clock import Clock
-from compd.live.loop import SentSetpoint
+from compd.live.loop import Setpoint
 from compd.live.memory import Control, Phase
 from compd.live.processes.log_relay import LogRelay
 from compd.live.service import LastReadings, ModelSwitch, Publisher, Requests, UdpSender, ZeroCapture
@@ -29,7 +29,7 @@ class StateLog:
         self._control = control
         self._state: State | None = None
 
-    def note(self, setpoint: SentSetpoint) -> None:
+    def note(self, setpoint: Setpoint) -> None:
         """Take a setpoint; called on the publisher's thread."""
         if setpoint.state is self._state:
             return

@@ -191,7 +191,7 @@ def _former_step(state: CycleState, inputs: CycleInputs, settings: CycleSettings
     if setpoint.values is None:
         return setpoint
     former_um = None if after.tip_noise_um is None else after.tip_noise_um[:3]
-    return setpoint._replace(values=setpoint.values._replace(u_tip_um=former_um))
+    return setpoint._replace(u_tip_um=former_um)
 
 
 def _recorded_cycle(where: str, message: Message, channels: Sequence[str], links: int) -> RecordedCycle:

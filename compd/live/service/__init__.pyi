@@ -12,6 +12,8 @@ from .publisher import Publisher as Publisher
 from .readings_message import ReadingsMessage as ReadingsMessage
 from .readings_message import RecordedCycle as RecordedCycle
 from .readings_message import parse_readings as parse_readings
+from .request_context import Errands as Errands
+from .request_context import Messages as Messages
 from .request_context import RequestContext as RequestContext
 from .request_context import TargetKeys as TargetKeys
 from .requests import Requests as Requests

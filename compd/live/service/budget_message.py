@@ -1,8 +1,8 @@
 """The BUDGET message: where the newest setpoint has the moving platform, and how far each cause has moved the tip.
 
-A SETPOINT has its sources link by link, which is what the loop computes with. Here they are carried to the tip, to
-first order, with the derivatives of the tip by the lengths of the links, and so is what the shadow model asks for. It
-is computed when a client asks, in the process that serves clients: the loop has nothing to do with it.
+A SETPOINT has its contributions link by link, which is what the loop computes with. Here they are carried to the tip,
+to first order, with the derivatives of the tip by the lengths of the links, and so is what the shadow model asks for.
+It is computed when a client asks, in the process that serves clients: the loop has nothing to do with it.
 """
 
 from __future__ import annotations
@@ -52,11 +52,13 @@ class BudgetMessage:
             return {}
         tip_M_mm = np.array([setpoint["tip_M_mm"]])
         by_link = tip_by_links(self._machine, base_joints, pose, tip_M_mm)[0]
-        tip_um = {cause: _um(-by_link @ np.array(links_mm)) for cause, links_mm in setpoint["sources_mm"].items()}
+        contributions_um = {
+            cause: _um(-by_link @ np.array(links_mm)) for cause, links_mm in setpoint["sources_mm"].items()
+        }
         asked_mm = setpoint.get("shadow", {}).get("correction_mm")
         shadow = {} if asked_mm is None else {"shadow_tip_um": _um(-by_link @ np.array(asked_mm))}
         return {
-            "tip_um": tip_um,
+            "tip_um": contributions_um,
             **shadow,
             "supports_M_mm": supports.round(_DECIMALS_MM).tolist(),
             "supports_moved_um": _um(supports - self._machine.frame.zero_supports_M_mm),

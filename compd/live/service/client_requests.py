@@ -62,11 +62,11 @@ class WatchRequest(Request):
         if self.what == "setpoints":
             client.watch(self.rate_hz, Stream.SETPOINTS)
             return line(message)
-        if not client.local or context.readings is None:
+        if not client.local or context.messages.readings is None:
             # READINGS are several times a SETPOINT's size, and their times are those of this computer's clock.
             raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
         client.watch(self.rate_hz, Stream.READINGS)
-        return line(message | {"columns": context.readings.columns})
+        return line(message | {"columns": context.messages.readings.columns})
 
 
 class TargetRequest(Request):
@@ -171,7 +171,7 @@ class StatusRequest(Request):
     reply = StatusKeys
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
-        return line(context.status())
+        return line(context.messages.status())
 
 
 class VersionRequest(Request):
@@ -201,4 +201,4 @@ class BudgetRequest(Request):
     reply = BudgetKeys
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
-        return line(context.budget())
+        return line(context.messages.budget())

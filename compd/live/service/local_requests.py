@@ -51,7 +51,7 @@ class AcceptRequest(OrderRequest):
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         try:
-            context.accept(self.gauge, send_later)
+            context.errands.accept(self.gauge, send_later)
         except ValueError as error:
             raise ProtocolError(ErrorCode.BAD_MESSAGE, str(error)) from error
         return b""
@@ -81,7 +81,7 @@ class PollRequest(OrderRequest):
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         try:
-            context.poll(self.gauge)
+            context.errands.poll(self.gauge)
         except ValueError as error:
             raise ProtocolError(ErrorCode.BAD_MESSAGE, str(error)) from error
         _log.info("poll requested", gauge=self.gauge, client=client.name)
@@ -125,7 +125,7 @@ class ZeroRequest(OrderRequest):
         return "replace" if self.replace else ""
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
-        context.take_zero(self.replace, send_later)
+        context.errands.take_zero(self.replace, send_later)
         return b""
 
 
@@ -191,9 +191,11 @@ class ModelRequest(OrderRequest):
         return f"{'run as the shadow' if self.shadow else 'apply'} {self.file or 'none'}"
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
-        if context.switch_model is None:
+        if context.errands.switch_model is None:
             raise ProtocolError(ErrorCode.UNIX_ONLY, self.refusal)
         if self.is_order:
-            context.switch_model(ModelWish(self.file, self.shadow, self.hash), client.take_descriptor, send_later)
+            context.errands.switch_model(
+                ModelWish(self.file, self.shadow, self.hash), client.take_descriptor, send_later
+            )
             return b""
-        return line({"class": self.wire_name, **context.models()})
+        return line({"class": self.wire_name, **context.messages.models()})

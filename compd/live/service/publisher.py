@@ -20,7 +20,7 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock
-from compd.live.loop import CycleUnpacker, SentSetpoint, Setpoint
+from compd.live.loop import CycleUnpacker, Setpoint
 from compd.live.memory import RingReader, SharedRing
 from compd.live.service.client_session import ClientSession, Stream
 from compd.live.service.connection_limits import WRONG_TOKEN_REST_S, prepare_tcp, seat_lost, seat_refused
@@ -52,13 +52,14 @@ class Publisher:
 
     def __init__(
         self,
+        *,
         listeners: Listeners,
         setpoints: SharedRing,
         cycles: SharedRing,
         watch: LoopWatch,
         period_s: float,
         clock: Clock,
-        observers: Sequence[Callable[[SentSetpoint], None]] = (),
+        observers: Sequence[Callable[[Setpoint], None]] = (),
         packet_hash: bytes | None = None,
     ) -> None:
         """`period_s`: of the loop. `observers` are called with every setpoint that is read, on the publisher's thread:
@@ -242,12 +243,12 @@ class Publisher:
     def _forward(self) -> None:
         """Publish what is due; where there is nothing from the loop, say so."""
         for content in self._setpoints.contents(self._is_setpoint_due):
-            setpoint = SentSetpoint.unpack(content)
+            setpoint = Setpoint.unpack(content)
             if self._watch.admits(setpoint.seq, setpoint.time_s):
                 self._publish(setpoint)
         for content in self._cycles.contents(lambda time_s, _: self._is_due(Stream.READINGS, time_s)):
             cycle = self._unpacker.unpack(content)
-            readings = self._requests.context.readings
+            readings = self._requests.context.messages.readings
             assert readings is not None, "who watches them has been told their columns"
             self._send_to_watchers(Stream.READINGS, cycle.inputs.snapshot.time_s, readings.line(cycle))
         if (stop := self._watch.missing(self._clock.monotonic())) is not None:
@@ -259,7 +260,7 @@ class Publisher:
     def _is_due(self, stream: Stream, time_s: float) -> bool:
         return time_s >= self._due_s[stream] - self._half_period_s
 
-    def _publish(self, setpoint: SentSetpoint) -> None:
+    def _publish(self, setpoint: Setpoint) -> None:
         self._last_state = setpoint.state.code
         for observe in self._observers:
             observe(setpoint)
@@ -267,7 +268,8 @@ class Publisher:
             self._send_to_watchers(Stream.SETPOINTS, setpoint.time_s, setpoint.line)
 
     def _publish_in_place_of_loop(self, setpoint: Setpoint) -> None:
-        self._publish(SentSetpoint.of(setpoint, self._packet_hash))
+        _, content = setpoint.pack(self._packet_hash)
+        self._publish(Setpoint.unpack(content))
 
     def _send_to_watchers(self, stream: Stream, time_s: float, line: bytes) -> None:
         """Send a line to the clients of a stream that are due at `time_s`."""

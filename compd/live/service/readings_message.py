@@ -14,7 +14,16 @@ from typing import Any, NamedTuple
 from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading, ReadingMotion
-from compd.live.loop import CycleInputs, CycleState, MachineWires, MachineZero, SentCycle, Target, setpoint_line
+from compd.live.loop import (
+    CycleInputs,
+    CycleState,
+    MachineWires,
+    MachineZero,
+    SentCycle,
+    Target,
+    setpoint_line,
+    with_zero_of,
+)
 from compd.live.memory import Readings, Snapshot
 from compd.live.service.messages import line
 from compd.live.service.state_json import from_plain, to_plain
@@ -48,7 +57,7 @@ class ReadingsMessage:
 
     def line(self, cycle: SentCycle) -> bytes:
         """The READINGS line of a cycle, with its newline."""
-        inputs = cycle.inputs
+        inputs, state = cycle.inputs, cycle.state_before
         message: dict[str, Any] = {
             "class": "READINGS",
             "seq": inputs.tick,
@@ -69,7 +78,7 @@ class ReadingsMessage:
         message |= cycle.models.hashes
         if cycle.models.files:
             message["model_files"] = cycle.models.files
-        message["carried"] = _carried(cycle.state_before, inputs)
+        message["carried"] = to_plain(state._replace(zero=None)) | {"zero": state.zero is inputs.zero}
         return line(message)[:-2] + b',"setpoint":' + cycle.setpoint_line[:-1] + b"}\n"
 
 
@@ -105,7 +114,7 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
         None if target is None else _parsed_target(target),
         ending=message.get("ending", ""),
     )
-    return RecordedCycle(_parsed_carried(message["carried"], zero), inputs, setpoint_line(message["setpoint"]))
+    return RecordedCycle(with_zero_of(from_plain(message["carried"]), zero), inputs, setpoint_line(message["setpoint"]))
 
 
 def _reading(reading: Reading) -> dict[str, Any]:
@@ -153,16 +162,3 @@ def _parsed_target(data: Mapping[str, Any]) -> Target:
         data.get("time_s", math.nan),
         data.get("id"),
     )
-
-
-def _carried(state: CycleState, inputs: CycleInputs) -> Any:
-    """The state from the cycle before, as plain data.
-
-    Of its machine zero only whether it is this cycle's own: a cycle uses nothing that was computed with another.
-    """
-    return to_plain(state._replace(zero=None)) | {"zero": state.zero is inputs.zero}
-
-
-def _parsed_carried(data: Mapping[str, Any], zero: MachineZero | StateError) -> CycleState:
-    state: CycleState = from_plain(data)
-    return state._replace(zero=zero if state.zero and isinstance(zero, MachineZero) else None)

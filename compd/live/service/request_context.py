@@ -51,56 +51,73 @@ def _poll_nothing(gauge: str) -> None:
     return
 
 
+@dataclass(frozen=True, kw_only=True)
+class Messages:
+    """The messages that answer a request at once.
+
+    version, machine : the messages themselves.  status, budget : make theirs.
+    models : makes the summary of the models.  readings : makes READINGS messages; None where nobody records.
+    """
+
+    version: Mapping[str, Any]
+    machine: Mapping[str, Any]
+    status: Callable[[], Mapping[str, Any]]
+    budget: Callable[[], Mapping[str, Any]]
+    models: Callable[[], Mapping[str, Any]] = dict
+    readings: ReadingsMessage | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errands:
+    """What a request may have done. What takes time answers later.
+
+    take_zero : starts to take machine zero; is told whether to replace one that differs.
+    switch_model : starts to adopt a model; is given what is asked for, and what gives the descriptor that came with it.
+        Both raise ProtocolError (busy) while another such request is being worked on.
+    accept : makes the acquisition believe a gauge, "gauge.channel" or "all" again.  poll : has a gauge polled at once.
+        Both raise ValueError, with a text for the client, for a name that is none.
+    tell_order : gets an ORDER line for whoever records, from any thread.
+    """
+
+    take_zero: Callable[[bool, SendLater], None]
+    switch_model: Callable[[ModelWish, Callable[[], int | None], SendLater], None] | None = None
+    accept: Callable[[str, SendLater], None] = _accept_nothing
+    poll: Callable[[str], None] = _poll_nothing
+    tell_order: Callable[[bytes], None] = _tell_nobody
+
+
 class RequestContext:
-    """What a request may use to answer; on the publisher's thread, the only writer of `commands.target`."""
+    """What a request may use to answer; on the publisher's thread, the only writer of `commands.target`.
+
+    Attributes
+    ----------
+    version, machine : these messages as lines.
+    controller : the client that gives targets; None for none.
+    """
 
     def __init__(
         self,
-        version: Mapping[str, Any],
-        target_keys: TargetKeys,
+        *,
+        messages: Messages,
+        errands: Errands,
         commands: Commands,
-        status: Callable[[], Mapping[str, Any]],
-        machine: Mapping[str, Any],
-        budget: Callable[[], Mapping[str, Any]],
-        take_zero: Callable[[bool, SendLater], None],
-        readings: ReadingsMessage | None = None,
-        switch_model: Callable[[ModelWish, Callable[[], int | None], SendLater], None] | None = None,
-        models: Callable[[], Mapping[str, Any]] = dict,
-        accept: Callable[[str, SendLater], None] = _accept_nothing,
+        target_keys: TargetKeys,
         targets: TargetSettings | None = None,
         access: TcpAccess | None = None,
         clock: Clock | None = None,
-        poll: Callable[[str], None] = _poll_nothing,
-        tell_order: Callable[[bytes], None] = _tell_nobody,
     ) -> None:
-        """`version`, `machine`: these messages; `status`, `budget`: make theirs; `readings`: makes READINGS messages;
-        `models`: summary of the models; `targets`: how long a target may be used, and who may give one.
-
-        `take_zero` (whether to replace one that differs) starts to take machine zero, `switch_model` (what is asked
-        for, what gives the descriptor that came with it) to adopt a model; both answer later, and raise ProtocolError
-        (busy) while another such request is being worked on. `accept` makes the acquisition believe a gauge,
-        "gauge.channel" or "all" again, and answers later; it raises ValueError, with a text for the client, for a name
-        that is none. `access`: who may use TCP; None: everybody who reaches it. `poll`
-        has a gauge polled at once; it raises ValueError, with a text for the client, for a name that is none.
-        `tell_order` gets an ORDER line for whoever records, from any thread.
-        """
-        self.version = line(version)
+        """`targets`: how long a target may be used, and who may give one; `access`: who may use TCP, None for everybody
+        who reaches it."""
+        self.messages = messages
+        self.errands = errands
+        self.version = line(messages.version)
+        self.machine = line(messages.machine)
         self.target_keys = target_keys
         self.commands = commands
-        self.status = status
-        self.machine = line(machine)
-        self.budget = budget
-        self.take_zero = take_zero
-        self.readings = readings
-        self.switch_model = switch_model
-        self.models = models
-        self.accept = accept
-        self.poll = poll
         self.controller: ClientSession | None = None
         self._targets = targets or TargetSettings()
         self.access = access
         self.clock = clock or MonotonicClock()
-        self.tell_order = tell_order
 
     def authorize(self, client: ClientSession, token: str) -> None:
         """Let a client in that shows the token. Raises ProtocolError (not_authorized) for another one."""

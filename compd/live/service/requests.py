@@ -60,7 +60,7 @@ class Requests:
 
     def __init__(self, context: RequestContext) -> None:
         self.context = context
-        self._orders = OrderBook(context.tell_order, context.clock)
+        self._orders = OrderBook(context.errands.tell_order, context.clock)
 
     def greeting(self, client: ClientSession) -> bytes:
         """The first line for a client: VERSION, or AUTH where it has to show a token."""

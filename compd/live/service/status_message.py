@@ -19,7 +19,7 @@ from compd.text import omit_unknown
 from compd.units import UM_PER_MM
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StatusReport:
     """Collects the STATUS message from the daemon's parts, of which it changes none; on the publisher's thread.
 

@@ -6,7 +6,7 @@ import socket
 from typing import Any
 
 from compd.errors import DaemonError, Problem
-from compd.live.loop import SentSetpoint
+from compd.live.loop import Setpoint
 from compd.operation_settings import UdpTarget
 
 
@@ -35,7 +35,7 @@ class UdpSender:
         self.sent = 0
         self.dropped = 0
 
-    def deliver(self, setpoint: SentSetpoint) -> None:
+    def deliver(self, setpoint: Setpoint) -> None:
         """Send the packet of a setpoint, without waiting."""
         try:
             self._socket.sendto(setpoint.packet, self._address)

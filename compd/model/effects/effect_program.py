@@ -7,14 +7,13 @@ from itertools import accumulate, chain, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray
 from compd.model.effects.effect import FittedEffect, Memory, Port
 from compd.model.effects.effect_basis import machine_structure, port_sizes, program_numbers
 from compd.model.effects.effect_needs import needed_quantities
 from compd.model.effects.observations import MachineConstants
-from compd.model.kernels import EFFECT, FRAME, GIVEN, LENGTHS, MACHINE, MECHANISM
+from compd.model.kernels import EFFECT, FRAME, GIVEN, LENGTHS, MACHINE, MECHANISM, EffectArrays
 from compd.reference_conditions import standard_value
 
 # In the order in which the kernel has the ports' numbers behind one another.
@@ -38,26 +37,16 @@ class EffectProgram(NamedTuple):
 
     Attributes
     ----------
-    effects : (K,) structures, see `compd.model.kernels.solver_structures.EFFECT`.
-    machine : (1,) structure of what all rows have in common.
-    theta, numbers, code, quantity_places, targets : of all effects, behind one another. The places of an effect's
-        quantities, now and then at machine zero, in a row of `quantities` and `references` behind one another; and
-        those of its ports' numbers among all ports'.
+    arrays : what the kernel takes.
     quantities : names of all that are needed.
     references : those from which effects count: each name of `quantities`, and its value; None where that is the one at
         machine zero.
     states : where each array of each effect's memory begins and ends, by the effect's id.
     size : of all ports together.
-    given : places of the effects that are plain Python: what they add is computed outside the kernel.
+    given : indices of the effects that are plain Python: what they add is computed outside the kernel.
     """
 
-    effects: NDArray[np.void]
-    machine: NDArray[np.void]
-    theta: FloatArray
-    numbers: FloatArray
-    code: IntArray
-    quantity_places: IntArray
-    targets: IntArray
+    arrays: EffectArrays
     quantities: tuple[str, ...]
     references: tuple[tuple[str, float | None], ...]
     states: Mapping[str, tuple[tuple[int, int], ...]]
@@ -94,7 +83,7 @@ def build_program(
     sizes = port_sizes(links, joints, axes)
     begins = dict(zip(LIVE_PORTS, accumulate((sizes[port] for port in LIVE_PORTS), initial=0), strict=False))
     all_needed = (name for each in fitted for name in needed_quantities(each.effect, links))
-    quantities = {name: place for place, name in enumerate(dict.fromkeys(all_needed))}
+    quantities = {name: index for index, name in enumerate(dict.fromkeys(all_needed))}
     references: dict[tuple[str, float | None], int] = {}
     effects = np.zeros(len(fitted), dtype=EFFECT)
     parts: dict[str, list[Any]] = {"theta": [], "numbers": [], "code": [], "quantities": [], "memory": []}
@@ -131,13 +120,15 @@ def build_program(
             structure[f"{name}_end"] = structure[f"{name}_begin"] + len(values)
             parts[name].append(values)
     return EffectProgram(
-        effects,
-        np.zeros(1, dtype=MACHINE) if constants is None else machine_structure(constants),
-        np.concatenate([*parts["theta"], np.zeros(0)]),
-        np.concatenate([*parts["numbers"], np.zeros(0)]),
-        np.concatenate([*parts["code"], np.zeros((0, 2), dtype=np.int64)]),
-        np.array([place for own in parts["quantities"] for place in own], dtype=np.int64),
-        np.array(targets, dtype=np.int64),
+        EffectArrays(
+            np.zeros(1, dtype=MACHINE) if constants is None else machine_structure(constants),
+            effects,
+            np.concatenate([*parts["theta"], np.zeros(0)]),
+            np.concatenate([*parts["numbers"], np.zeros(0)]),
+            np.concatenate([*parts["code"], np.zeros((0, 2), dtype=np.int64)]),
+            np.array([index for own in parts["quantities"] for index in own], dtype=np.int64),
+            np.array(targets, dtype=np.int64),
+        ),
         tuple(quantities),
         tuple(references),
         states,

@@ -50,8 +50,8 @@ class Formula:
             {0: self.tree}, self.linear, self.constants, ColumnCodes(codes, own), 1, places, [False] * len(self.linear)
         )
         values = np.zeros((rows, places, len(self.columns)))
-        for place, name in enumerate(self.columns):
-            values[:, :, place] = columns[name]
+        for index, name in enumerate(self.columns):
+            values[:, :, index] = columns[name]
         factors = np.zeros((rows, places, len(self.linear)))
         numbers = np.concatenate([[constants[name] for name in self.constants], program.numbers])
         formula_factors(
@@ -63,4 +63,4 @@ class Formula:
             np.full(sum(program.states), np.nan),
             factors,
         )
-        return {name: factors[:, :, place] for place, name in enumerate(self.linear)}
+        return {name: factors[:, :, index] for index, name in enumerate(self.linear)}

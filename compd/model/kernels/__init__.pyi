@@ -16,6 +16,15 @@ from .motion import track_motions as track_motions
 from .octahedron_frame import edge_lengths as edge_lengths
 from .octahedron_frame import octahedron as octahedron
 from .octahedron_frame import place_base as place_base
+from .row_arguments import EffectArrays as EffectArrays
+from .row_arguments import GaugeRows as GaugeRows
+from .row_arguments import GivenRows as GivenRows
+from .row_arguments import MemoryArrays as MemoryArrays
+from .row_arguments import RowOptions as RowOptions
+from .row_arguments import SolvedRows as SolvedRows
+from .row_arguments import TipDerivativeArrays as TipDerivativeArrays
+from .row_arguments import WantedRows as WantedRows
+from .row_arguments import WarmRows as WarmRows
 from .solve_status import AMPLIFICATION_LIMIT as AMPLIFICATION_LIMIT
 from .solve_status import MEANING as MEANING
 from .solve_status import Reason as Reason

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray
 from compd.jit import helper
 from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import copy_frame, copy_pose, inverse_pose, solve_frame
 from compd.model.kernels.reason_codes import OK
+from compd.model.kernels.row_arguments import EffectArrays
 from compd.model.kernels.solver_structures import FRAME, LENGTHS
 from compd.rotation import to_outer_frame
 
@@ -66,39 +67,30 @@ def set_row(
 
 @helper
 def add_effect(
-    effect: Any,
-    row: Any,
-    machine: Any,
-    quantities: FloatArray,
-    quantity_places: IntArray,
-    code: IntArray,
-    numbers: FloatArray,
-    theta: FloatArray,
-    targets: IntArray,
-    memory: FloatArray,
-    added: FloatArray,
+    program: EffectArrays, e: int, row: Any, quantities: FloatArray, memory: FloatArray, added: FloatArray
 ) -> None:
-    """Add basis @ theta of one effect to the row of numbers `added`."""
+    """Add basis @ theta of effect e to the row of numbers `added`. memory : of all effects."""
+    effect = program.effects[e]
     needed = np.empty(effect.quantities_end - effect.quantities_begin)
     for i in range(needed.shape[0]):
-        needed[i] = quantities[quantity_places[effect.quantities_begin + i]]
+        needed[i] = quantities[program.quantity_indices[effect.quantities_begin + i]]
     parameters = effect.theta_end - effect.theta_begin
     basis = np.zeros((effect.size, parameters))
     set_basis(
         effect.number,
         row,
-        machine,
+        program.machine[0],
         needed,
-        code[effect.code_begin : effect.code_end],
-        numbers[effect.numbers_begin : effect.numbers_end],
+        program.code[effect.code_begin : effect.code_end],
+        program.numbers[effect.numbers_begin : effect.numbers_end],
         memory[effect.memory_begin : effect.memory_end],
         basis,
     )
     for i in range(effect.size):
         total = 0.0
         for p in range(parameters):
-            total += basis[i, p] * theta[effect.theta_begin + p]
-        added[targets[effect.targets_begin + i]] += total
+            total += basis[i, p] * program.theta[effect.theta_begin + p]
+        added[program.targets[effect.targets_begin + i]] += total
 
 
 @helper
@@ -156,14 +148,14 @@ def add_effects(
     attitude_M_P: FloatArray,
     work: Any,
     result: Any,
-    shares_mm: FloatArray,
+    contributions_mm: FloatArray,
     setpoint_mm: FloatArray,
 ) -> int:
     """The command that reaches the target on the machine with its effects; returns the reason.
 
-    added_mm (K, size) : what each effect adds.  every : compute each effect's share, by how much it changes the
-    setpoint of those before it; otherwise the setpoint with all of them alone.  setpoint_mm : that without effects, and
-    afterwards with them.
+    added_mm (K, size) : what each effect adds.  every : compute each effect's contribution, by how much it changes
+    the setpoint of those before it; otherwise the setpoint with all of them alone.  setpoint_mm : that without
+    effects, and afterwards with them.
     """
     n = model.links
     total_mm = np.zeros(added_mm.shape[1])
@@ -191,7 +183,7 @@ def add_effects(
         for i in range(n):
             length_mm = work.with_effects.link_length_mm[i] - altered.reading_to_length_mm[i]
             setpoint = length_mm - model.zero_link_length_mm[i] + altered.joint_shortening_mm[i]
-            shares_mm[2 + e, i] = setpoint - setpoint_mm[i]
+            contributions_mm[2 + e, i] = setpoint - setpoint_mm[i]
             setpoint_mm[i] = setpoint
         reason = max(reason, altered.joint_reason[0], result.frame.reason[0], work.with_effects.reason[0])
         level = LENGTHS

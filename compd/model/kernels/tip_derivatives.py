@@ -10,51 +10,59 @@ from typing import Any
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
-from compd.jit import INDEX_ROWS, INDICES, NUMBERS, ROWS, SCALAR, helper, loop
+from compd.arrays import FloatArray
+from compd.jit import NUMBERS, helper, loop
 from compd.model.kernels.effect_dispatch import set_basis
-from compd.model.kernels.effect_row import EFFECT_MACHINE
 from compd.model.kernels.effects_on_machine import set_row
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import forward_pose, set_contact, solve_frame
 from compd.model.kernels.reason_codes import OK
-from compd.model.kernels.solver_structures import EFFECTS, GIVEN, MODELS, RESULTS, WORKSPACES
+from compd.model.kernels.row_arguments import (
+    EFFECT_ARRAYS,
+    GAUGE_ROWS,
+    MEMORY_ARRAYS,
+    SOLVED_ROWS,
+    TIP_DERIVATIVE_ARRAYS,
+    WARM_ROWS,
+    EffectArrays,
+    GaugeRows,
+    MemoryArrays,
+    SolvedRows,
+    TipDerivativeArrays,
+    WarmRows,
+)
+from compd.model.kernels.solver_structures import GIVEN, MODELS
 from compd.model.kernels.tip_sensitivity import set_tip_by_closure, set_tip_by_ports
 
 
 @helper
 def _add_effect(
-    effect: Any,
+    program: EffectArrays,
+    e: int,
     row: Any,
-    machine: Any,
-    theta: FloatArray,
-    numbers: FloatArray,
-    code: IntArray,
-    quantity_places: IntArray,
-    targets: IntArray,
     quantities: FloatArray,
     raised: FloatArray,
     memory: FloatArray,
-    by_port: FloatArray,
-    by_theta: FloatArray,
-    by_quantity: FloatArray,
+    derivatives: TipDerivativeArrays,
 ) -> None:
-    """Add what one effect gives: its basis as it is, and with each of its quantities raised."""
-    places = quantity_places[effect.quantities_begin : effect.quantities_end]
-    needed = np.empty(places.shape[0])
+    """Add what effect e gives: its basis as it is, and with each of its quantities raised."""
+    effect, theta, targets = program.effects[e], program.theta, program.targets
+    by_port, by_theta, by_quantity = derivatives.by_port, derivatives.by_theta, derivatives.by_quantity
+    indices = program.quantity_indices[effect.quantities_begin : effect.quantities_end]
+    needed = np.empty(indices.shape[0])
     basis = np.zeros((effect.size, effect.theta_end - effect.theta_begin))
     raised_basis = np.empty_like(basis)
-    for which in range(-1, places.shape[0] // 2):  # -1: none is raised; the second half is that at machine zero
-        for i in range(places.shape[0]):
-            needed[i] = raised[places[i]] if i == which else quantities[places[i]]
+    for which in range(-1, indices.shape[0] // 2):  # -1: none is raised; the second half is that at machine zero
+        for i in range(indices.shape[0]):
+            needed[i] = raised[indices[i]] if i == which else quantities[indices[i]]
         raised_basis[:, :] = 0.0
         set_basis(
             effect.number,
             row,
-            machine,
+            program.machine[0],
             needed,
-            code[effect.code_begin : effect.code_end],
-            numbers[effect.numbers_begin : effect.numbers_end],
+            program.code[effect.code_begin : effect.code_end],
+            program.numbers[effect.numbers_begin : effect.numbers_end],
             memory[effect.memory_begin : effect.memory_end].copy(),
             raised_basis,
         )
@@ -69,61 +77,45 @@ def _add_effect(
                         by_theta[c, number] += by_port[c, target] * basis[i, p]
                     else:
                         changed = (raised_basis[i, p] - basis[i, p]) * theta[number]
-                        by_quantity[c, places[which]] += by_port[c, target] * changed
+                        by_quantity[c, indices[which]] += by_port[c, target] * changed
 
 
 @loop(
-    [
-        *[MODELS, EFFECT_MACHINE, EFFECTS, NUMBERS, NUMBERS, INDEX_ROWS, INDICES, INDICES],
-        *[NUMBERS, NUMBERS, NUMBERS, NUMBERS, SCALAR, NUMBERS],
-        *[NUMBERS, ROWS, NUMBERS, NUMBERS, WORKSPACES, RESULTS, ROWS, ROWS, ROWS],
-    ]
+    [MODELS, EFFECT_ARRAYS, GAUGE_ROWS, NUMBERS, NUMBERS, WARM_ROWS, MEMORY_ARRAYS, SOLVED_ROWS, TIP_DERIVATIVE_ARRAYS]
 )
 def set_tip_derivatives(
     models: Any,
-    machines: Any,
-    effects: Any,
-    theta: FloatArray,
-    numbers: FloatArray,
-    code: IntArray,
-    quantity_places: IntArray,
-    targets: IntArray,
-    scale_mm: FloatArray,
-    joint_mm: FloatArray,
-    frame_mm: FloatArray,
+    program: EffectArrays,
+    gauges: GaugeRows,
     quantities: FloatArray,
-    time_s: float,
     raised: FloatArray,
-    zero_origin_M_mm: FloatArray,
-    zero_rotation_M_P: FloatArray,
-    motion: FloatArray,
-    memory: FloatArray,
-    works: Any,
-    results: Any,
-    by_port: FloatArray,
-    by_theta: FloatArray,
-    by_quantity: FloatArray,
+    warm: WarmRows,
+    carried: MemoryArrays,
+    solved: SolvedRows,
+    derivatives: TipDerivativeArrays,
 ) -> None:
-    """Fill in by_port (3, size), by_theta (3, P) and by_quantity (3, q); nan where there is no pose.
+    """Fill in the derivatives at the one row of `gauges`; nan where there is no pose.
 
-    models to targets : as in `compd.model.kernels.compensation.compensate_rows`.
-    quantities : as in `compensate_rows`, those at machine zero behind them.
+    models (1,).  quantities (q + z,) : as in `compensate_rows`, those at machine zero behind them.
     raised (q,) : each quantity with what it may be wrong by; `by_quantity` is how far the tip moves with it, mm.
-    zero_ : where Newton starts, at machine zero.  motion, memory : after the snapshot.  works, results (1,) : room.
+    warm : machine zero.  carried : after the snapshot.  solved : room.
     Of effects without a kernel, by_theta and what they add to by_quantity stay 0.
     """
-    model, work, result = models[0], works[0], results[0]
+    model, work, result = models[0], solved.works[0], solved.results[0]
+    scale_mm, joint_mm, frame_mm = gauges.scale_mm[0], gauges.joint_mm[0], gauges.frame_mm[0]
+    time_s, motion, effects = gauges.time_s[0], carried.motion, program.effects
+    by_port, by_theta, by_quantity = derivatives.by_port, derivatives.by_theta, derivatives.by_quantity
     n = model.links
     by_port[:, :] = by_theta[:, :] = by_quantity[:, :] = math.nan
     frame, pose = result.bare_frame, result.bare_pose
     distances_mm, length_mm = np.empty(9), np.empty(n)
     for i in range(9):
         distances_mm[i] = model.zero_distances_mm[i] + frame_mm[i]
-    solve_frame(model, model.plate_points_M_mm, distances_mm, model.zero_supports_M_mm, frame)
+    solve_frame(model, model.plate_points_M_mm, distances_mm, warm.supports_M_mm[0], frame)
     shorten_by_joints(model.joint_weights[:n, : joint_mm.shape[0]], joint_mm, length_mm, work.altered.joint_reason)
     for i in range(n):
         length_mm[i] = model.zero_link_length_mm[i] + scale_mm[i] - length_mm[i]
-    forward_pose(model, frame.base_joints_M_mm, model, length_mm, zero_origin_M_mm, zero_rotation_M_P, pose)
+    forward_pose(model, frame.base_joints_M_mm, model, length_mm, warm.origin_M_mm[0], warm.rotation_M_P[0], pose)
     if max(frame.reason[0], work.altered.joint_reason[0], pose.reason[0]) != OK:
         return
     set_contact(model, pose, model.tool_mm, result.tip_M_mm, result.tip_P_mm)
@@ -132,23 +124,8 @@ def set_tip_derivatives(
     by_closure = np.empty((3, 6))
     if not set_tip_by_closure(model, frame.base_joints_M_mm, pose, tip_M_mm, by_closure):
         return
-    set_tip_by_ports(model, frame, pose, row, by_closure, joint_mm, frame_mm, targets, result.frame, by_port)
+    set_tip_by_ports(model, frame, pose, row, by_closure, joint_mm, frame_mm, program.targets, result.frame, by_port)
     by_theta[:, :] = by_quantity[:, :] = 0.0
     for e in range(effects.shape[0]):
         if effects[e].number != GIVEN:
-            _add_effect(
-                effects[e],
-                row,
-                machines[0],
-                theta,
-                numbers,
-                code,
-                quantity_places,
-                targets,
-                quantities,
-                raised,
-                memory,
-                by_port,
-                by_theta,
-                by_quantity,
-            )
+            _add_effect(program, e, row, quantities, raised, carried.memories, derivatives)

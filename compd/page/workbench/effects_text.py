@@ -57,11 +57,11 @@ def with_entry(text: str, declaration: Declaration, path: Path) -> str:
     entries = entries_of(text, path)
     ids = [entry.get("id") for entry in entries]
     if declaration["id"] in ids:
-        place = ids.index(declaration["id"])
-        begin, end, indent = _span(text, place, path)
+        index = ids.index(declaration["id"])
+        begin, end, indent = _span(text, index, path)
         comments = _comments(text[begin:end], indent)
         after = text[:begin] + comments + _written(declaration, indent) + text[end:]
-        wanted = [*entries[:place], declaration, *entries[place + 1 :]]
+        wanted = [*entries[:index], declaration, *entries[index + 1 :]]
     else:
         indent = _span(text, 0, path)[2] if entries else " " * 2 * text.rstrip().endswith(f"{_KEY}:")
         before = text if not text or text.endswith("\n") else f"{text}\n"
@@ -76,9 +76,9 @@ def without_entry(text: str, effect: str, path: Path) -> str:
     ids = [str(entry.get("id")) for entry in entries]
     if effect not in ids:
         raise StateError(Problem(where=str(path), what="has no such effect", value=effect, allowed=", ".join(ids)))
-    place = ids.index(effect)
-    begin, end, _ = _span(text, place, path)
-    return _checked(text[:begin] + text[end + 1 :], [*entries[:place], *entries[place + 1 :]], path)
+    index = ids.index(effect)
+    begin, end, _ = _span(text, index, path)
+    return _checked(text[:begin] + text[end + 1 :], [*entries[:index], *entries[index + 1 :]], path)
 
 
 def _written(declaration: Declaration, indent: str) -> str:
@@ -95,14 +95,14 @@ def _checked(text: str, wanted: Sequence[Declaration], path: Path) -> str:
     return text
 
 
-def _span(text: str, place: int, path: Path) -> tuple[int, int, str]:
+def _span(text: str, index: int, path: Path) -> tuple[int, int, str]:
     """Start and end of an entry in the text (whole lines), and its indentation."""
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     if isinstance(root, yaml.MappingNode):
         root = next((value for key, value in root.value if key.value == _KEY), root)
     if not isinstance(root, yaml.SequenceNode) or root.flow_style:
         raise _by_hand(path)
-    node = root.value[place]
+    node = root.value[index]
     dash = text.rfind("-", 0, node.start_mark.index)
     begin = text.rfind("\n", 0, dash) + 1
     last = len(text[: _end(node)].rstrip())

@@ -88,8 +88,8 @@ class SimulatedRegisters(SimulatedRegisterDevice):
             words = tuple((word & 0xFF) << 8 | word >> 8 for word in words)
         if channel.word_order == "low_first":
             words = tuple(reversed(words))
-        for place, word in enumerate(words, start=channel.address):
-            bank[place] |= word  # other bits may belong to other numbers
+        for index, word in enumerate(words, start=channel.address):
+            bank[index] |= word  # other bits may belong to other numbers
 
 
 def registers_of(channel: Any) -> int:

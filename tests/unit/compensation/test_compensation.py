@@ -8,7 +8,7 @@ import pytest
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import Compensation, GaugeValues, WarmStart
 from compd.errors import KinematicsError
-from compd.model import MachineModel, machine_model
+from compd.model import MachineModel, MachineParts, machine_model
 from compd.model.kernels import Reason, require
 from compd.model.kinematics import Contact, ToolOnPlate
 from compd.rotation import rotation_matrix, rotation_vector, to_inner
@@ -29,7 +29,9 @@ ROWS = 25
 def work_on_platform(parts: dict[str, object]) -> MachineModel:
     """Figure 15: the tool stands on the surface plate, the work is carried under it."""
     tool_M, place_P = np.array([0.0, 0.0, 190.0]), np.array([10.0, 5.0, -60.0])
-    return machine_model(**{**parts, "arrangement": ToolOnPlate(tool_M), "zero_contact": Contact(tool_M, place_P)})  # type: ignore[arg-type]
+    return machine_model(
+        MachineParts(**{**parts, "arrangement": ToolOnPlate(tool_M), "zero_contact": Contact(tool_M, place_P)})
+    )  # type: ignore[arg-type]
 
 
 UNDER = (rotation("x", 180), np.array([0.0, 0.0, 50.0]))
@@ -37,8 +39,8 @@ BESIDE = (rotation("y", 90), np.array([-800.0, 0.0, 300.0]))
 MACHINES = {
     "tripod": tripod(),
     "hexapod": hexapod(),
-    "tripod under the work": machine_model(**move_machine(tripod_parts(), *UNDER)),
-    "hexapod beside the work": machine_model(**move_machine(hexapod_parts(), *BESIDE)),
+    "tripod under the work": machine_model(MachineParts(**move_machine(tripod_parts(), *UNDER))),
+    "hexapod beside the work": machine_model(MachineParts(**move_machine(hexapod_parts(), *BESIDE))),
     "tripod with the work on the platform": work_on_platform(tripod_parts()),
     "hexapod with the work on the platform": work_on_platform(hexapod_parts()),
 }
@@ -93,19 +95,19 @@ def test_both_modes_mean_the_same_by_a_correction(model: MachineModel) -> None:
     found, _ = compensate_cmm(model, values._replace(scale_mm=asked.nominal_scale_mm), WarmStart.at_zero(model))
     np.testing.assert_allclose(found.correction_mm, asked.correction_mm, rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.target_B_mm, asked.target_B_mm, rtol=0, atol=1e-9)
-    for cause in asked.sources:
-        np.testing.assert_allclose(found.sources[cause], asked.sources[cause], rtol=0, atol=1e-9)
+    for cause in asked.contributions:
+        np.testing.assert_allclose(found.contributions[cause], asked.contributions[cause], rtol=0, atol=1e-9)
 
 
 @every_machine
 def test_the_shares_add_up_and_each_is_what_its_gauges_do_alone(model: MachineModel) -> None:
     values = gauges(model)
     both = machine_tool(model, values)
-    np.testing.assert_allclose(sum(both.sources.values()), both.correction_mm, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(sum(both.contributions.values()), both.correction_mm, rtol=0, atol=1e-12)
     no_frame = machine_tool(model, values._replace(frame_mm=np.zeros((ROWS, 9))))
     no_joints = machine_tool(model, values._replace(joint_mm=0 * values.joint_mm))
-    np.testing.assert_allclose(both.sources["joints"], no_frame.correction_mm, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(both.sources["frame"], no_joints.correction_mm, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(both.contributions["joints"], no_frame.correction_mm, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(both.contributions["frame"], no_joints.correction_mm, rtol=0, atol=1e-9)
     np.testing.assert_allclose(both.scale_setpoint_mm, both.nominal_scale_mm + both.correction_mm, rtol=0, atol=1e-12)
 
 
@@ -144,15 +146,15 @@ def assert_same_bits(one: Compensation, many: Compensation, i: int) -> None:
     for name in ("tip_M_mm", "tip_B0_mm", "tip_P_mm"):
         every = np.broadcast_to(getattr(many, name), (ROWS, 3))
         assert getattr(one, name).tobytes() == every[i].tobytes(), name
-    for cause, share in one.sources.items():
-        assert share.tobytes() == many.sources[cause][i].tobytes(), cause
+    for cause, contribution in one.contributions.items():
+        assert contribution.tobytes() == many.contributions[cause][i].tobytes(), cause
     assert all(a.tobytes() == b[i].tobytes() for a, b in zip(one.frame, many.frame, strict=True))
 
 
 @pytest.mark.parametrize("turn", [UNDER, BESIDE], ids=["under", "beside"])
 @pytest.mark.parametrize("parts", [tripod_parts(), hexapod_parts()], ids=["tripod", "hexapod"])
 def test_a_turned_world_asks_for_the_same_setpoint(parts: dict[str, object], turn: tuple[Floats, Floats]) -> None:
-    here, there = machine_model(**parts), machine_model(**move_machine(parts, *turn))  # type: ignore[arg-type]
+    here, there = machine_model(MachineParts(**parts)), machine_model(MachineParts(**move_machine(parts, *turn)))  # type: ignore[arg-type]
     values = gauges(here)
     upright, _ = compensate_machine_tool(here, targets(here), None, values, WarmStart.at_zero(here))
     turned, _ = compensate_machine_tool(there, targets(here), None, values, WarmStart.at_zero(there))
@@ -215,8 +217,8 @@ def test_a_gauge_without_a_number_gives_a_reason_and_no_number(model: MachineMod
 def assert_blank(result: Compensation, rows: list[int]) -> None:
     """nan in exactly these rows."""
     others = [i for i in range(ROWS) if i not in rows]
-    numbers = [value for name, value in result._asdict().items() if name not in ("frame", "sources", "reason")]
-    for value in [*numbers, *result.sources.values()]:
+    numbers = [value for name, value in result._asdict().items() if name not in ("frame", "contributions", "reason")]
+    for value in [*numbers, *result.contributions.values()]:
         assert np.isnan(value[rows]).all()
         assert np.isfinite(value[others]).all()
 

@@ -111,8 +111,8 @@ def test_snapshots_one_by_one_are_as_all_rows_together(model: MachineModel) -> N
         assert one.tip_M_mm.tobytes() == together_.tip_M_mm[i].tobytes()
         assert one.tip_P_mm.tobytes() == np.broadcast_to(together_.tip_P_mm, (ROWS, 3))[i].tobytes()
         assert one.correction_mm.tobytes() == together_.correction_mm[i].tobytes()
-        for name, share in one.sources.items():
-            assert share.tobytes() == together_.sources[name][i].tobytes(), name
+        for name, contribution in one.contributions.items():
+            assert contribution.tobytes() == together_.contributions[name][i].tobytes(), name
     for name, memory in warm.effects.memories.items():
         for a, b in zip(memory or (), after.effects.memories[name] or (), strict=True):
             assert np.array_equal(a, b, equal_nan=True), name
@@ -145,8 +145,8 @@ def test_the_shares_of_joints_frame_and_effects_add_up_to_the_correction(model: 
     asked, _ = compensate_machine_tool(machine, np.tile(target, (ROWS, 1)), None, values, start)
     for result in (found, asked):
         assert not result.reason.any()
-        assert list(result.sources) == ["joints", "frame", *(one.effect.id for one in machine.effects)]
-        assert sum(result.sources.values()) == pytest.approx(result.correction_mm, abs=1e-10)
+        assert list(result.contributions) == ["joints", "frame", *(one.effect.id for one in machine.effects)]
+        assert sum(result.contributions.values()) == pytest.approx(result.correction_mm, abs=1e-10)
 
 
 def test_a_share_is_what_the_effect_adds_to_those_before_it() -> None:
@@ -157,8 +157,8 @@ def test_a_share_is_what_the_effect_adds_to_those_before_it() -> None:
         machine = carrying(TRIPOD, *effects)
         corrections.append(compensate_cmm(machine, values, WarmStart.at_zero(machine))[0].correction_mm)
     result, _ = compensate_cmm(machine, values, WarmStart.at_zero(machine))
-    assert result.sources["link_zero"] == pytest.approx(corrections[2] - corrections[1], abs=1e-12)
-    assert result.sources["tool_offset"] == pytest.approx(corrections[3] - corrections[2], abs=1e-12)
+    assert result.contributions["link_zero"] == pytest.approx(corrections[2] - corrections[1], abs=1e-12)
+    assert result.contributions["tool_offset"] == pytest.approx(corrections[3] - corrections[2], abs=1e-12)
 
 
 def test_what_happens_at_the_reference_never_acts_on_the_machine() -> None:
@@ -167,7 +167,7 @@ def test_what_happens_at_the_reference_never_acts_on_the_machine() -> None:
     with_, after = compensate_cmm(machine, values, WarmStart.at_zero(machine))
     without, _ = compensate_cmm(TRIPOD, values, WarmStart.at_zero(TRIPOD))
     assert with_.tip_M_mm.tobytes() == without.tip_M_mm.tobytes()
-    assert list(with_.sources) == ["joints", "frame"]
+    assert list(with_.contributions) == ["joints", "frame"]
     assert after.effects.memories == {}
 
 
@@ -179,7 +179,7 @@ def test_a_pose_out_of_reach_costs_no_memory() -> None:
         _, warm = compensate_cmm(machine, row(values, i), warm)
     refused, kept = compensate_cmm(machine, row(values, 4)._replace(scale_mm=np.full(3, 1e5)), warm)
     assert refused.reason != Reason.OK
-    assert np.isnan(refused.sources["backlash"]).all()
+    assert np.isnan(refused.contributions["backlash"]).all()
     assert kept.effects.motion.direction.tolist() == warm.effects.motion.direction.tolist()
     lagged = kept.effects.memories["link_expansion_lag"]
     assert lagged is not None

@@ -80,10 +80,10 @@ def test_inches_are_converted_where_they_are_configured() -> None:
 
 
 @given(st.integers(0, 16))
-def test_a_character_with_a_wrong_parity_never_passes(place: int) -> None:
+def test_a_character_with_a_wrong_parity_never_passes(index: int) -> None:
     """The port gives NUL for it."""
     reply = bytearray(b"+   12.3456    \r\n")
-    reply[place] = 0
+    reply[index] = 0
     assert fault_of(bytes(reply)) is Quality.MISMATCH
 
 

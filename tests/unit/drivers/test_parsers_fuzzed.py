@@ -83,10 +83,10 @@ def check(make: Callable[[], Any], reply: bytes, values: Callable[[bytes], list[
     readings = outcome(make(), reply)
     if isinstance(readings, LineFault):
         return
-    for place, reading in enumerate(readings):
+    for index, reading in enumerate(readings):
         if reading.ok:
             assert expected is not None, f"{reply!r} gave {reading.value}"
-            wanted = expected[place]
+            wanted = expected[index]
             assert wanted is not None, f"{reply!r} gave {reading.value}"
             assert reading.value == pytest.approx(wanted, rel=1e-9, abs=1e-12)
 
@@ -169,8 +169,8 @@ def test_mahr_c1202(reply: bytes) -> None:
         if not end or len(features) != 3:
             return None
         numbers: list[float | None] = []
-        for place, feature in enumerate(features, start=1):
-            match = re.fullmatch(rb" *%d ([+-][0-9]{4}\.[0-9]) um(?: [<=>]){0,2} *" % place, feature)
+        for index, feature in enumerate(features, start=1):
+            match = re.fullmatch(rb" *%d ([+-][0-9]{4}\.[0-9]) um(?: [<=>]){0,2} *" % index, feature)
             numbers.append(number(match[1]) / 1000 if match else None)
         return [numbers[0], numbers[2]]
 

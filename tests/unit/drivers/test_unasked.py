@@ -56,8 +56,8 @@ class TalkingPort(ScriptedPort):
         came, due_s = b"", self._read_s
         number = max(0, int((self._read_s - 100.0) / self._period_s) - 1)
         while self.begins_s(number) <= until_s:
-            for place, byte in enumerate(self.line(number), start=1):
-                at_s = self.begins_s(number) + place * self.character_s
+            for index, byte in enumerate(self.line(number), start=1):
+                at_s = self.begins_s(number) + index * self.character_s
                 if self._read_s < at_s <= (clock.now_s if came else until_s):
                     came, due_s = came + bytes([byte]), at_s
                     clock.now_s = max(clock.now_s, at_s)

@@ -14,7 +14,7 @@ import compd
 from compd.comparison import AlignedRecording
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.configuration import load
-from compd.model import MachineModel, machine_constants, machine_model
+from compd.model import MachineModel, MachineParts, machine_constants, machine_model
 from compd.model.effects import FittedEffect
 from compd.model.kinematics import ToolOnPlate
 from tests.support.effect_rows import DETAILS, LIBRARY, all_quantities
@@ -74,7 +74,7 @@ def test_a_hidden_offset_is_fitted_in_the_plates_frame(hide: Hide, tmp_path: Pat
 def machine_with(id_: str) -> tuple[MachineModel, Floats]:
     """The tripod with its tool on the plate and this effect, and how far that moves the tool's tip in {M}, mm."""
     theta, moved_um = CASES[id_]
-    model = machine_model(**{**tripod_parts(), "arrangement": ToolOnPlate(TOOL_M_MM)})
+    model = machine_model(MachineParts(**{**tripod_parts(), "arrangement": ToolOnPlate(TOOL_M_MM)}))
     fitted = FittedEffect(LIBRARY[id_], np.array(theta))
     return replace(model, effects=(fitted,), constants=machine_constants(model, DETAILS)), 1e-3 * moved_um
 

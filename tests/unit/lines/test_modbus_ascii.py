@@ -87,9 +87,9 @@ def test_each_fault_has_its_name(answer: bytes, quality: Quality) -> None:
 
 
 @given(st.lists(st.integers(0, 0xFFFF), min_size=2, max_size=2), st.integers(0, 18), st.integers(1, 255))
-def test_no_damaged_byte_ever_passes(values: list[int], place: int, damage: int) -> None:
+def test_no_damaged_byte_ever_passes(values: list[int], index: int, damage: int) -> None:
     reply = bytearray(registers_of(values))
-    reply[place] ^= damage
+    reply[index] ^= damage
     if bytes(reply).upper() == registers_of(values):
         return  # a hexadecimal digit in lower case is the same digit
     assert fault_of(bytes(reply)).quality in {Quality.CRC, Quality.INCOMPLETE, Quality.MISMATCH}

@@ -235,9 +235,9 @@ def test_each_fault_has_its_name(answer: bytes, quality: Quality) -> None:
 
 
 @given(st.lists(st.integers(0, 0xFFFF), min_size=2, max_size=2), st.integers(0, 8), st.integers(1, 255))
-def test_no_damaged_byte_ever_passes(values: list[int], place: int, damage: int) -> None:
+def test_no_damaged_byte_ever_passes(values: list[int], index: int, damage: int) -> None:
     reply = bytearray(registers_of(UNIT, 4, values))
-    reply[place] ^= damage
+    reply[index] ^= damage
     fault = fault_of(lambda request: bytes(reply))
     assert fault.quality in {Quality.CRC, Quality.INCOMPLETE, Quality.MISMATCH}
 

@@ -34,7 +34,7 @@ def test_at_machine_zero_the_tip_is_where_the_configuration_says(tripod):
     assert setpoint.values.correction_mm == pytest.approx([0, 0, 0], abs=1e-12)
     assert setpoint.age_s == pytest.approx(0.001)
     assert setpoint.valid_until_s == pytest.approx(tripod.now_s + 0.1)
-    assert setpoint.values.tip_P_mm is None
+    assert not setpoint.tool_on_plate
 
 
 def test_before_any_reading_it_is_starting_and_names_what_is_missing(tripod):
@@ -77,7 +77,7 @@ def test_a_joint_comparator_corrects_its_link_slewing_from_nothing(tripod):
     assert np.diff([0.0, *corrections]).max() <= STEP_MM + 1e-12
     assert corrections[-1] == pytest.approx(0.02, abs=1e-6)
     assert tripod.step().state is State.OK
-    assert tripod.step().values.sources_mm["joints"][1] == pytest.approx(0.02)
+    assert tripod.step().values.contributions["joints"][1] == pytest.approx(0.02)
 
 
 def test_the_first_correction_after_the_start_slews_too(tripod):
@@ -132,7 +132,7 @@ def test_hold_keeps_joints_and_frame_as_a_set_with_live_scales_and_then_stops(tr
     assert held.state is State.HOLD
     assert held.valid
     assert "joint 1 (joints.1): timeout" in held.reason
-    assert held.values.sources_mm["joints"].tolist() == before.values.sources_mm["joints"].tolist()
+    assert held.values.contributions["joints"].tolist() == before.values.contributions["joints"].tolist()
     assert held.values.tip_M_mm.tolist() != before.values.tip_M_mm.tolist(), "the scales are live"
     last = held
     while (setpoint := tripod.step()).valid:
@@ -205,7 +205,7 @@ def test_a_clamped_correction_says_why_and_the_tip_moves_no_further(tripod):
     assert setpoint.values.correction_mm[1] == pytest.approx(0.2)
     assert at_limit is not None
     assert setpoint.values.tip_M_mm == pytest.approx(at_limit.values.tip_M_mm, abs=2e-4), "second order in 0.2 mm"
-    assert setpoint.values.sources_mm["joints"][1] == pytest.approx(0.9), "what was asked for is told"
+    assert setpoint.values.contributions["joints"][1] == pytest.approx(0.9), "what was asked for is told"
 
 
 def test_beyond_the_limit_with_refuse_there_is_no_setpoint():

@@ -41,10 +41,12 @@ def test_what_is_lost_fades_and_is_then_absent_while_the_rest_goes_on(tripod):
     assert last.state is State.DEGRADED
     assert "the correction of frame is absent" in last.reason
     assert "frame t1 to t3 (cabinet): line_lost" in last.reason
-    assert last.values.sources_mm["frame"] == pytest.approx([0, 0, 0], abs=1e-9)
-    assert last.values.sources_mm["joints"] == pytest.approx(before.values.sources_mm["joints"])
+    assert last.values.contributions["frame"] == pytest.approx([0, 0, 0], abs=1e-9)
+    assert last.values.contributions["joints"] == pytest.approx(before.values.contributions["joints"])
     tripod.change_mm["joints.1"] = 0.01
-    assert tripod.step().values.sources_mm["joints"] != pytest.approx(before.values.sources_mm["joints"], abs=1e-4)
+    assert tripod.step().values.contributions["joints"] != pytest.approx(
+        before.values.contributions["joints"], abs=1e-4
+    )
 
 
 def test_what_is_absent_counts_in_the_bound_of_the_tip_s_error(tripod):
@@ -52,7 +54,7 @@ def test_what_is_absent_counts_in_the_bound_of_the_tip_s_error(tripod):
     tripod.faults |= dict.fromkeys(FRAME, Quality.LINE_LOST)
     for setpoint in after_fade(tripod)[::50]:
         error_um = 1e3 * np.linalg.norm(setpoint.values.tip_M_mm - right.values.tip_M_mm)
-        assert error_um < setpoint.values.u_tip_um < error_um + 2 * right.values.u_tip_um
+        assert error_um < setpoint.u_tip_um < error_um + 2 * right.u_tip_um
     assert error_um > 10.0, "30 um of the frame are not corrected any more"
 
 
@@ -61,12 +63,12 @@ def test_how_far_the_machine_has_gone_since_a_group_was_read_counts_in_the_bound
     tripod = with_noise(machine(on_stale="degrade", tip_error_um=None), 0.1)
     tripod.settle()
     tripod.faults |= dict.fromkeys(FRAME, Quality.LINE_LOST)
-    there_um = after_fade(tripod)[-1].values.u_tip_um
+    there_um = after_fade(tripod)[-1].u_tip_um
     for k in range(100):
         tripod.change_mm["scale_1.position"] = 0.1 * min(k, 50)
         setpoint = tripod.step()
     assert setpoint.valid
-    assert setpoint.values.u_tip_um > there_um + 100.0
+    assert setpoint.u_tip_um > there_um + 100.0
 
 
 def test_what_a_faded_set_does_not_correct_counts_in_the_bound():
@@ -77,7 +79,7 @@ def test_what_a_faded_set_does_not_correct_counts_in_the_bound():
     for setpoint in after_fade(tripod)[10:900:50]:
         assert setpoint.state is State.FADE
         error_um = 1e3 * np.linalg.norm(setpoint.values.tip_M_mm - right.values.tip_M_mm)
-        assert error_um < setpoint.values.u_tip_um < 1.1 * error_um + 2 * right.values.u_tip_um
+        assert error_um < setpoint.u_tip_um < 1.1 * error_um + 2 * right.u_tip_um
 
 
 def test_what_a_limit_does_not_let_through_counts_in_the_bound():
@@ -88,7 +90,7 @@ def test_what_a_limit_does_not_let_through_counts_in_the_bound():
     free = with_noise(machine(correction_mm=1.0), 0.1)
     free.change_mm["joints.1"] = 0.3
     error_um = 1e3 * np.linalg.norm(clamped.values.tip_M_mm - free.settle().values.tip_M_mm)
-    assert error_um < clamped.values.u_tip_um < 1.05 * error_um + 2.0
+    assert error_um < clamped.u_tip_um < 1.05 * error_um + 2.0
 
 
 def test_the_correction_slews_on_every_change_there_and_back(tripod):
@@ -124,9 +126,9 @@ def test_effects_whose_thermometer_is_lost_count_as_what_they_corrected_and_then
     setpoints = after_fade(tripod)
     fading = setpoints[500]
     error_um = 1e3 * np.linalg.norm(fading.values.tip_M_mm - right.values.tip_M_mm)
-    assert 3.0 < error_um < fading.values.u_tip_um < 1.05 * error_um + right.values.u_tip_um
+    assert 3.0 < error_um < fading.u_tip_um < 1.05 * error_um + right.u_tip_um
     assert setpoints[-1].state is State.DEGRADED
-    assert np.isnan(setpoints[-1].values.u_tip_um), "nobody knows what they would correct now"
+    assert np.isnan(setpoints[-1].u_tip_um), "nobody knows what they would correct now"
 
 
 @pytest.mark.parametrize(

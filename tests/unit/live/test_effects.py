@@ -55,7 +55,7 @@ def test_a_model_is_adopted_between_two_ticks_slewing_never_jumping(tripod, tmp_
     tips = np.array([setpoint.values.tip_M_mm for setpoint in setpoints])
     assert np.linalg.norm(np.diff(tips, axis=0), axis=1).max() <= 5 * STEP_MM, "nor does the tip that is told"
     assert np.linalg.norm(tips[-1] - tips[0]) > 0.02
-    sources = setpoints[-1].values.sources_mm
+    sources = setpoints[-1].values.contributions
     assert list(sources) == ["joints", "frame", "link_zero", "tool_offset"]
     assert sources["link_zero"] == pytest.approx(-LINK_ZERO_UM * 1e-3, abs=1e-9)
     assert sum(sources.values()) == pytest.approx(setpoints[-1].values.correction_mm, abs=1e-12)
@@ -164,7 +164,7 @@ def test_a_thermometer_that_an_effect_uses_belongs_to_the_set(tmp_path):
     live.faults.clear()
     live.commands.models = thermal(live, tmp_path)
     good = live.settle()
-    assert np.abs(good.values.sources_mm["link_expansion"]).min() > 0.01
+    assert np.abs(good.values.contributions["link_expansion"]).min() > 0.01
     live.faults["cabinet.room"] = Quality.SENSOR_FAULT
     assert live.step().state is State.OK, "no effect uses the room's"
     live.faults["cabinet.link_2"] = Quality.SENSOR_FAULT
@@ -210,19 +210,19 @@ def test_a_shadow_changes_nothing_and_tells_what_it_would_do(tmp_path):
         for live in (alone, beside):
             live.change_mm["joints.4"] = 0.001 * (tick % 5)
         plain, both = alone.step(), beside.step()
-        assert both.values._replace(shadow=None).correction_mm.tobytes() == plain.values.correction_mm.tobytes()
+        assert both.values.correction_mm.tobytes() == plain.values.correction_mm.tobytes()
         assert both.values.tip_M_mm.tobytes() == plain.values.tip_M_mm.tobytes()
-        assert (both.state, both.model, list(both.values.sources_mm)) == (plain.state, "", ["joints", "frame"])
-    shadow_result = both.values.shadow
+        assert (both.state, both.model, list(both.values.contributions)) == (plain.state, "", ["joints", "frame"])
+    shadow_result = both.shadow
     assert shadow_result.model == models.shadow.hash
-    difference_mm = shadow_result.correction_mm - sum(both.values.sources_mm.values())
+    difference_mm = shadow_result.correction_mm - sum(both.values.contributions.values())
     expected_mm = -10e-6 * (WARM_degC - 20.0) * both.values.link_length_mm
     assert difference_mm == pytest.approx(expected_mm, rel=1e-3)
     beside.faults["cabinet.link_1"] = Quality.TIMEOUT
     lost = beside.step()
     assert lost.state is State.OK, "the applied model does not need it"
-    assert "temperature_link_1_degC" in lost.values.shadow.reason
-    assert lost.values.shadow.correction_mm is None
+    assert "temperature_link_1_degC" in lost.shadow.reason
+    assert lost.shadow.correction_mm is None
     assert b'"shadow":{"model":' in lost.to_json()
 
 
@@ -233,12 +233,12 @@ def test_what_a_shadow_has_learnt_of_the_past_is_kept_when_it_is_adopted(tmp_pat
     live.settle()
     warm(live, WARM_degC)
     live.now_s += 30.0  # half the time constant of 60 s after the step
-    before = live.step().values.shadow
+    before = live.step().shadow
     share = (before.correction_mm / (-10e-6 * 3.0 * live.settle().values.link_length_mm)).mean()
     assert 0.1 < share < 0.5, "the rods lag behind"
     live.commands.models = Models(model)
     after = live.settle()
-    assert after.values.sources_mm["link_expansion_lag"] == pytest.approx(before.correction_mm, rel=0.1)
+    assert after.values.contributions["link_expansion_lag"] == pytest.approx(before.correction_mm, rel=0.1)
 
 
 def test_cycles_with_effects_and_a_shadow_replay_bit_for_bit(tmp_path):

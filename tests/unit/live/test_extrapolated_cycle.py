@@ -84,9 +84,9 @@ def test_readings_without_a_motion_are_used_as_they_are():
 
 
 def test_the_bound_grows_with_age_and_is_larger_where_nothing_is_carried_on():
-    at_rest = with_noise(unlimited(), 0.1).step().values.u_tip_um
+    at_rest = with_noise(unlimited(), 0.1).step().u_tip_um
     carried, as_read = (
-        moving(with_noise(unlimited(), 0.1), extrapolate=extrapolate).values.u_tip_um for extrapolate in (True, False)
+        moving(with_noise(unlimited(), 0.1), extrapolate=extrapolate).u_tip_um for extrapolate in (True, False)
     )
     assert at_rest < carried < as_read - 1500.0, "50 mm/s for 0.02 s and 30 mm/s for 0.05 s are not carried on"
 
@@ -94,7 +94,7 @@ def test_the_bound_grows_with_age_and_is_larger_where_nothing_is_carried_on():
 @pytest.mark.parametrize("name", ["tripod-cmm.yaml", "hexapod.yaml"])
 def test_the_bound_by_age_is_that_of_the_worst_signs_of_the_scales(name):
     live, step_mm = with_noise(unlimited(name), 0.1), 1e-3
-    bound_um = moving(live).values.u_tip_um - 1.2 * live.state.tip_noise_um[3]
+    bound_um = moving(live).u_tip_um - 1.2 * live.state.tip_noise_um[3]
     lengths_mm, _ = live.wires.lengths.age_bound_mm(live.latest.snapshot(live.now_s), live.model.links, True, 0.4)
     moved = []
     for channel in live.wires.length_channels:
@@ -116,7 +116,7 @@ def test_the_age_of_the_scales_does_not_count_where_they_are_not_used():
     live = with_noise(unlimited(), 0.1)
     tip_mm = tuple(live.step().values.tip_B0_mm.tolist())
     live.commands.target = Target(tip_mm)
-    bound_um = moving(live, extrapolate=False).values.u_tip_um
+    bound_um = moving(live, extrapolate=False).u_tip_um
     assert bound_um < 500.0, "the joints alone: the oldest is 0.17 s old"
 
 
@@ -170,8 +170,8 @@ def test_the_bound_grows_while_a_set_of_comparators_is_held():
     live = with_noise(unlimited(on_stale="hold"), 0.1)
     live.change_mm = dict.fromkeys(live.change_mm, 0.0)
     standing(live)
-    at_rest_um = standing(live).values.u_tip_um
-    bounds_um = [held(live).values.u_tip_um for _ in range(3)]
+    at_rest_um = standing(live).u_tip_um
+    bounds_um = [held(live).u_tip_um for _ in range(3)]
     assert at_rest_um < bounds_um[0] < bounds_um[1] < bounds_um[2]
     assert bounds_um[2] < 100.0, "nothing moves but by what the last readings leave open"
 
@@ -179,10 +179,10 @@ def test_the_bound_grows_while_a_set_of_comparators_is_held():
 def test_what_joints_and_frame_may_do_counts_while_a_set_is_held_and_the_machine_moves():
     live = with_noise(unlimited(on_stale="hold"), 0.1)
     standing(live)
-    still_um = held(live).values.u_tip_um
+    still_um = held(live).u_tip_um
     live = with_noise(unlimited(on_stale="hold"), 0.1)
     standing(live)
-    moved_um = held(live, elsewhere_mm=5.0).values.u_tip_um
+    moved_um = held(live, elsewhere_mm=5.0).u_tip_um
     assert moved_um > still_um + 100.0
 
 

@@ -67,11 +67,11 @@ def test_nothing_is_corrected_where_machine_zero_was_taken(tmp_path, name, links
     assert answer["class"] == "ZERO"
     assert list(answer["quantities"].values()) == pytest.approx([degC] * len(live.wires.quantity_names))
     live.commands.models = expansion(live, tmp_path, name, links)
-    assert live.settle().values.sources_mm["link_expansion"] == pytest.approx(np.zeros(links), abs=1e-12)
+    assert live.settle().values.contributions["link_expansion"] == pytest.approx(np.zeros(links), abs=1e-12)
     live.latest.put = cold
     warm(live, degC + 1.0)
     grown = live.settle().values
-    assert grown.sources_mm["link_expansion"] == pytest.approx(-1e-6 * PPM_PER_K * grown.link_length_mm, rel=1e-4)
+    assert grown.contributions["link_expansion"] == pytest.approx(-1e-6 * PPM_PER_K * grown.link_length_mm, rel=1e-4)
     assert live.settings.model.zero.link_length_mm == pytest.approx(grown.link_length_mm, abs=0.1)
     again = load_zero(tmp_path, live.configuration.zero_hash, live.wires.length_channels)
     assert again == live.commands.zero, "the file has the quantities, too"
@@ -92,7 +92,7 @@ def test_a_model_of_an_old_file_counts_from_20_degC_and_says_so(tmp_path, name, 
     assert old.summary["from_20_degC"] == ["link_expansion"]
     live.commands.models = Models(old)
     values = live.settle().values
-    assert values.sources_mm["link_expansion"] == pytest.approx(-3e-6 * PPM_PER_K * values.link_length_mm, rel=1e-4)
+    assert values.contributions["link_expansion"] == pytest.approx(-3e-6 * PPM_PER_K * values.link_length_mm, rel=1e-4)
 
 
 @MACHINES
@@ -110,9 +110,9 @@ def test_a_zero_without_the_quantities_is_no_zero_for_such_a_model(tmp_path, nam
     live.commands.models = Models(live.loader.without_effects, live.commands.models.applied)
     beside = live.step()
     assert beside.valid
-    assert "machine zero has no temperature_link_1_degC" in beside.values.shadow.reason
+    assert "machine zero has no temperature_link_1_degC" in beside.shadow.reason
     take_zero(live, tmp_path)
-    assert not live.step().values.shadow.reason
+    assert not live.step().shadow.reason
 
 
 def test_zero_is_taken_without_a_thermometer_that_is_broken_and_says_so(tmp_path):

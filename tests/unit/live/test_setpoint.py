@@ -10,31 +10,47 @@ import zlib
 import numpy as np
 import pytest
 
-from compd.compensation import CorrectionShares
+from compd.compensation import Compensation
+from compd.compensation.values import Contributions
 from compd.live.loop.packet_layout import PACKET_SIZE
-from compd.live.loop.setpoint import Setpoint, SetpointValues
+from compd.live.loop.setpoint import Setpoint
+from compd.model.kinematics import Frame
 from compd.setpoint_states import Mode, State
 
 HASH = bytes.fromhex("0123456789abcdef")
 
 
-def numbers(links: int = 3, tip_P_mm=None) -> SetpointValues:
+UNUSED = np.full(3, math.nan)
+
+
+def numbers(links: int = 3) -> Compensation:
     each = np.arange(1, links + 1, dtype=float)
-    return SetpointValues(
+    frame = Frame(
+        UNUSED,
+        np.array([0.001, 0.002, 700.003]),
+        UNUSED,
+        UNUSED,
+        np.array([0.001, 0.002, 0.003]),
+        np.array([1e-6, 2e-6, -3e-6]),
+        *(np.array(0),) * 3,
+    )
+    return Compensation(
         tip_M_mm=np.array([1.123456789123, -2.5, 190.0]),
         tip_B0_mm=np.array([1.0, -2.0, -510.0]),
-        tip_P_mm=tip_P_mm,
-        frame_origin_M_mm=np.array([0.001, 0.002, 700.003]),
-        frame_displacement_M_mm=np.array([0.001, 0.002, 0.003]),
-        frame_rotation_M_rad=np.array([1e-6, 2e-6, -3e-6]),
+        tip_P_mm=np.array([5.0, 6.0, 7.0]),
+        rotation_M_P=UNUSED,
+        frame=frame,
         link_length_mm=400 + each,
+        target_B_mm=UNUSED,
+        nominal_scale_mm=UNUSED,
         scale_setpoint_mm=10 + each,
         correction_mm=each / 100,
-        sources_mm=CorrectionShares(("joints", "frame"), np.array([each / 300, each / 150])),
+        contributions=Contributions(("joints", "frame"), np.array([each / 300, each / 150])),
+        reason=np.array(0),
     )
 
 
-def setpoint(values: SetpointValues | None, state: State = State.OK, mode: Mode = Mode.CMM) -> Setpoint:
+def setpoint(values: Compensation | None, state: State = State.OK, mode: Mode = Mode.CMM) -> Setpoint:
     return Setpoint(42, 1234.5678901, 1234.6678901, 0.0123456, state, "" if values else "why", mode, values)
 
 
@@ -75,7 +91,7 @@ def test_json_of_an_invalid_setpoint_has_no_number_that_looks_alive():
 
 
 def test_json_with_the_tool_on_the_plate_tells_the_touched_place():
-    message = json.loads(setpoint(numbers(tip_P_mm=np.array([5.0, 6.0, 7.0]))).to_json())
+    message = json.loads(setpoint(numbers())._replace(tool_on_plate=True).to_json())
     assert message["tip_P_mm"] == [5.0, 6.0, 7.0]
     assert message["tip_M_mm"] == [1.1234568, -2.5, 190.0]
 
@@ -133,6 +149,6 @@ def test_packet_of_an_invalid_setpoint_is_all_nan():
 
 
 def test_packet_with_the_tool_on_the_plate_carries_the_touched_place_and_says_so():
-    packet = setpoint(numbers(tip_P_mm=np.array([5.0, 6.0, 7.0]))).to_packet(HASH)
+    packet = setpoint(numbers())._replace(tool_on_plate=True).to_packet(HASH)
     assert struct.unpack_from("<H", packet, 40) == (3,)
     assert struct.unpack_from("<3d", packet, 48) == (5.0, 6.0, 7.0)

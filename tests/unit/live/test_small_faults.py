@@ -67,8 +67,8 @@ class Machine:
         for k in range(self.ticks, self.ticks + round(duration_s / TICK_S)):
             self.ticks = k + 1
             self.now_s += TICK_S
-            for place, channel in enumerate(self.channels):
-                if (k + place) % (SCALE_TICKS if channel in self.scales else OTHER_TICKS) == 0:
+            for index, channel in enumerate(self.channels):
+                if (k + index) % (SCALE_TICKS if channel in self.scales else OTHER_TICKS) == 0:
                     self._poll(channel)
             if k % looks == 0:
                 self.votes.look(self.now_s)

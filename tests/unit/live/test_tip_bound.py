@@ -106,7 +106,7 @@ def test_at_rest_the_bound_is_that_of_the_scatter(name):
         zero_mm, now_mm = rng.uniform(-1, 1, len(kinds)) * digit_mm, rng.uniform(-1, 1, len(kinds)) * size_mm
         mean_zero_mm = np.mean([shown(zero_mm) for _ in range(30)], axis=0)
         errors_um.append(1e3 * np.linalg.norm(tip_mm(shown(now_mm) - mean_zero_mm) - tip_mm(now_mm - zero_mm)))
-    ratio = live.settle().values.u_tip_um / np.quantile(errors_um, 0.95)
+    ratio = live.settle().u_tip_um / np.quantile(errors_um, 0.95)
     assert 1.0 <= ratio <= 2.0
 
 

@@ -14,7 +14,7 @@ from compd.model.kinematics.instantaneous import (
     instantaneous_frame,
     inverse_frame_jacobian,
 )
-from compd.model.machine import machine_model
+from compd.model.machine import MachineParts, machine_model
 from compd.rotation import rotation_matrix
 from tests.support.model_machines import Floats, hexapod, move_machine, ring, rotation, tripod, tripod_parts
 
@@ -89,7 +89,7 @@ def test_rows_alone_are_as_all_together() -> None:
 @pytest.mark.parametrize("turn", [rotation("x", 180), rotation("x", 90), rotation("y", -60) @ rotation("z", 25)])
 def test_a_base_under_or_beside_the_work_is_the_same_frame_turned(turn: Floats) -> None:
     shift = np.array([100.0, -50.0, 400.0])
-    turned = machine_model(**move_machine(tripod_parts(), turn, shift))
+    turned = machine_model(MachineParts(**move_machine(tripod_parts(), turn, shift)))
     changes = np.random.default_rng(4).normal(0, 0.05, (20, 9))
     here, there = solve_frame(FRAME, ZERO_MM + changes), solve_frame(turned.frame, ZERO_MM + changes)
     require(there.reason, "turned frame")
@@ -116,7 +116,7 @@ def test_derivatives_against_differences() -> None:
 
 
 @pytest.mark.parametrize(
-    "model", [tripod(), machine_model(**move_machine(tripod_parts(), rotation("x", 100), np.ones(3)))]
+    "model", [tripod(), machine_model(MachineParts(**move_machine(tripod_parts(), rotation("x", 100), np.ones(3))))]
 )
 def test_instantaneous_frame_is_right_to_first_order(model: object) -> None:
     """Half the deformation leaves a quarter of the difference: it is of second order."""

@@ -291,7 +291,9 @@ def test_the_live_correction_is_that_of_the_rows(model: MachineModel, machine_to
             result, _ = compensate_machine_tool(live, target_mm, None, values, warm)
         else:
             result, _ = compensate_cmm(live, values, warm)
-        shares[warmer_K] = {name: share for name, share in result.sources.items() if name not in ("joints", "frame")}
+        shares[warmer_K] = {
+            name: share for name, share in result.contributions.items() if name not in ("joints", "frame")
+        }
     for name, share in shares[0.0].items():
         assert (np.abs(share).max() > 1e-5) if name == old.id else (np.abs(share).max() < 1e-12), name
     rows = row_at_zero(model, {n: v + 1.3 for n, v in at_zero.items()}, quantities_at_zero=at_zero)

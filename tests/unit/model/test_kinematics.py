@@ -11,7 +11,7 @@ from scipy.optimize import fsolve
 from compd.model.kernels.solve_status import AMPLIFICATION_LIMIT, Reason, require
 from compd.model.kinematics.frame import solve_frame
 from compd.model.kinematics.link_kinematics import Mechanism, Pose, closure_at, forward_kinematics, inverse_kinematics
-from compd.model.machine import MachineModel, machine_model
+from compd.model.machine import MachineModel, MachineParts, machine_model
 from compd.rotation import rotation_matrix, rotation_vector
 from tests.support.model_machines import (
     Floats,
@@ -118,7 +118,7 @@ def test_rows_alone_are_as_all_together(model: MachineModel) -> None:
 @pytest.mark.parametrize("parts", [tripod_parts(), hexapod_parts()], ids=["tripod", "hexapod"])
 def test_a_turned_world_changes_no_length(parts: dict[str, object], turn: Floats) -> None:
     shift = np.array([-300.0, 20.0, 150.0])
-    here, there = machine_model(**parts), machine_model(**move_machine(parts, turn, shift))  # type: ignore[arg-type]
+    here, there = machine_model(MachineParts(**parts)), machine_model(MachineParts(**move_machine(parts, turn, shift)))  # type: ignore[arg-type]
     tip = tips(here, 50, 4)
     upright = inverse(here, tip)
     turned = inverse(there, tip @ turn.T + shift)

@@ -11,7 +11,7 @@ from compd.configuration import Geometry, load
 from compd.errors import KinematicsError
 from compd.machine_builder import build_model, joint_weights
 from compd.model.kinematics.tool import Contact, ToolOnPlate
-from compd.model.machine import MachineModel, machine_model
+from compd.model.machine import MachineModel, MachineParts, machine_model
 from compd.rotation import rotation_matrix
 from tests.support.model_machines import hexapod, hexapod_parts, rotation, tripod, tripod_parts
 from tests.support.paths import CONFIG
@@ -93,15 +93,15 @@ def test_nobody_changes_a_model() -> None:
 )
 def test_a_machine_zero_that_cannot_be(changes: dict[str, object], match: str) -> None:
     with pytest.raises(KinematicsError, match=match):
-        machine_model(**{**tripod_parts(), **changes})
+        machine_model(MachineParts(**{**tripod_parts(), **changes}))
 
 
 def test_a_hexapod_zeroed_in_its_singular_pose_is_refused() -> None:
     with pytest.raises(KinematicsError, match="NEAR_SINGULAR"):
-        machine_model(**{**hexapod_parts(), "zero_rotation_M_P": rotation("z", 90)})
+        machine_model(MachineParts(**{**hexapod_parts(), "zero_rotation_M_P": rotation("z", 90)}))
 
 
 @pytest.mark.parametrize("key", ["supports_M_mm", "plate_points_M_mm", "platform_joints_P_mm", "joint_weights"])
 def test_wrong_shapes_are_refused(key: str) -> None:
     with pytest.raises(ValueError, match=key):
-        machine_model(**{**tripod_parts(), key: np.ones((2, 3))})
+        machine_model(MachineParts(**{**tripod_parts(), key: np.ones((2, 3))}))

@@ -67,7 +67,7 @@ def results(machine: MachineModel, machine_tool: bool) -> list[Floats]:
         else:
             result, warm = compensate_cmm(machine, values, warm)
         assert not result.reason
-        rows.append(np.concatenate([result.scale_setpoint_mm, result.tip_M_mm, *result.sources.values()]))
+        rows.append(np.concatenate([result.scale_setpoint_mm, result.tip_M_mm, *result.contributions.values()]))
     return rows
 
 
@@ -84,7 +84,7 @@ def test_python_effects_among_compiled_ones_give_the_same(model: MachineModel, m
         "backlash",
     )
     effects = [LIBRARY[id_] for id_ in ids]
-    mixed = [in_python(effect) if place % 2 == 0 else effect for place, effect in enumerate(effects)]
+    mixed = [in_python(effect) if index % 2 == 0 else effect for index, effect in enumerate(effects)]
     compiled = results(carrying(model, *effects), machine_tool)
     np.testing.assert_allclose(results(carrying(model, *mixed), machine_tool), compiled, rtol=0, atol=1e-12)
     without = results(carrying(model), machine_tool)

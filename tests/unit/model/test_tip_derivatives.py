@@ -100,10 +100,10 @@ def test_the_kernel_gives_what_numpy_gives_for_every_port_and_effect(name: str) 
         memory = effects.memories[fitted.effect.id]
         basis, _ = evaluate_basis(fitted.effect, row, fitted.constants, memory)
         by_theta.append(effect_sensitivity(fitted.effect, row, basis, by_port).tip[0])
-        for place, quantity in enumerate(model.program.quantities):
+        for index, quantity in enumerate(model.program.quantities):
             raised = replace(row, quantities={**row.quantities, quantity: row.quantities[quantity] + SIGMA})
             moved, _ = evaluate_basis(fitted.effect, raised, fitted.constants, memory)
-            by_quantity[:, place] += (
+            by_quantity[:, index] += (
                 effect_sensitivity(fitted.effect, row, moved - basis, by_port).tip[0] @ fitted.theta
             )
     np.testing.assert_allclose(found.by_theta, np.concatenate(by_theta, axis=1), rtol=1e-6, atol=1e-8)

@@ -12,7 +12,7 @@ from compd.model.kinematics.frame import solve_frame
 from compd.model.kinematics.link_kinematics import forward_kinematics, inverse_kinematics
 from compd.model.kinematics.statics import link_forces
 from compd.model.kinematics.tool import Contact, ToolOnPlatform
-from compd.model.machine import MachineModel, machine_model
+from compd.model.machine import MachineModel, MachineParts, machine_model
 from tests.support.model_machines import TRIPOD_WEIGHTS, Floats, column, worked_cases
 
 LENGTH_MM = 1e-9
@@ -38,18 +38,20 @@ def tripod(tripod_cases: dict[str, Any]) -> MachineModel:
     geometry = {key: np.array(value, dtype=float) for key, value in tripod_cases["geometry"].items()}
     supports = geometry["base_points_B"] + geometry["origin_B0_in_M"]
     return machine_model(
-        supports_M_mm=supports,
-        base_joints_M_mm=supports,
-        support_of_joint=[0, 1, 2],
-        plate_points_M_mm=geometry["plate_points_M"],
-        platform_joints_P_mm=geometry["platform_joints_P"],
-        revolute_axes_P=geometry["revolute_axes_P"],
-        arrangement=ToolOnPlatform(geometry["tool_P"]),
-        zero_contact=Contact(geometry["zero_tip_M"], geometry["tool_P"]),
-        zero_rotation_M_P=None,
-        joint_weights=TRIPOD_WEIGHTS,
-        weight_N=80.0,
-        weight_at_P_mm=np.zeros(3),
+        MachineParts(
+            supports_M_mm=supports,
+            base_joints_M_mm=supports,
+            support_of_joint=[0, 1, 2],
+            plate_points_M_mm=geometry["plate_points_M"],
+            platform_joints_P_mm=geometry["platform_joints_P"],
+            revolute_axes_P=geometry["revolute_axes_P"],
+            arrangement=ToolOnPlatform(geometry["tool_P"]),
+            zero_contact=Contact(geometry["zero_tip_M"], geometry["tool_P"]),
+            zero_rotation_M_P=None,
+            joint_weights=TRIPOD_WEIGHTS,
+            weight_N=80.0,
+            weight_at_P_mm=np.zeros(3),
+        )
     )
 
 
@@ -58,18 +60,20 @@ def hexapod(hexapod_cases: dict[str, Any]) -> MachineModel:
     geometry = {key: np.array(value, dtype=float) for key, value in hexapod_cases["geometry"].items()}
     origin = geometry["origin_B0_in_M"]
     return machine_model(
-        supports_M_mm=geometry["support_points_B"] + origin,
-        base_joints_M_mm=geometry["base_joints_B"] + origin,
-        support_of_joint=geometry["support_of_leg"].astype(int) - 1,
-        plate_points_M_mm=geometry["plate_points_M"],
-        platform_joints_P_mm=geometry["platform_joints_P"],
-        revolute_axes_P=np.empty((0, 3)),
-        arrangement=ToolOnPlatform(geometry["tool_P"]),
-        zero_contact=Contact(geometry["zero_platform_origin_M"] + geometry["tool_P"], geometry["tool_P"]),
-        zero_rotation_M_P=np.eye(3),
-        joint_weights=np.zeros((6, 0)),
-        weight_N=120.0,
-        weight_at_P_mm=np.zeros(3),
+        MachineParts(
+            supports_M_mm=geometry["support_points_B"] + origin,
+            base_joints_M_mm=geometry["base_joints_B"] + origin,
+            support_of_joint=geometry["support_of_leg"].astype(int) - 1,
+            plate_points_M_mm=geometry["plate_points_M"],
+            platform_joints_P_mm=geometry["platform_joints_P"],
+            revolute_axes_P=np.empty((0, 3)),
+            arrangement=ToolOnPlatform(geometry["tool_P"]),
+            zero_contact=Contact(geometry["zero_platform_origin_M"] + geometry["tool_P"], geometry["tool_P"]),
+            zero_rotation_M_P=np.eye(3),
+            joint_weights=np.zeros((6, 0)),
+            weight_N=120.0,
+            weight_at_P_mm=np.zeros(3),
+        )
     )
 
 

@@ -53,7 +53,7 @@ def errors_um(world: World, geometry: Geometry, wires: Wiring) -> FloatArray:
             run(world, 5.0)
         result, warm = compensate_machine_tool(model, target_M - origin_M, None, gauge_values(world, wires), warm)
         nominal_mm = result.nominal_scale_mm
-        commands = (nominal_mm, nominal_mm + result.sources["joints"], result.scale_setpoint_mm)
+        commands = (nominal_mm, nominal_mm + result.contributions["joints"], result.scale_setpoint_mm)
         errors.append([1e3 * np.linalg.norm(world.tip_for(command.tolist()) - target_M) for command in commands])
     return np.asarray(np.median(errors, axis=0))
 

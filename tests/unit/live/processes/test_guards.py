@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.live.loop.ring_entries import SentSetpoint
+from compd.live.loop.setpoint import Setpoint
 from compd.live.loop_succession import LoopSuccession
 from compd.live.memory.control import Control, Phase
 from compd.live.memory.shared_ring import SharedRing
@@ -175,7 +175,7 @@ def test_a_state_whose_reason_names_every_gauge_is_logged_and_told_in_one_line()
     """A hexapod with all its lines lost: the reason has thousands of characters."""
     control = Control()
     reason = ", ".join(f"joint {k} (joints.{k}): line_lost ({'cannot open ' * 12})" for k in range(1, 41))
-    StateLog(control).note(SentSetpoint(1, 1.0, State.STOP, reason, Mode.CMM, b""))
+    StateLog(control).note(Setpoint(1, 1.0, 1.0, math.nan, State.STOP, reason, Mode.CMM, None))
     assert control.headline.read().startswith("stop: joint 1 (joints.1): line_lost")
     assert len(control.headline.read()) <= 500
     control.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 
@@ -30,7 +31,8 @@ def test_a_setpoint_goes_out_before_the_next_request_of_a_flood_is_answered(serv
         service.deliver(setpoint(len(before_answer), now_s + len(before_answer) * PERIOD_S))
         return {"class": "STATUS"}
 
-    service.requests.context.status = status
+    context = service.requests.context
+    context.messages = replace(context.messages, status=status)
     for flooder in flooders:
         flooder.send(STATUS * 100)
     for seq in range(1, 100 * clients + 1):
@@ -51,7 +53,8 @@ def test_a_client_waits_for_one_request_of_each_other_and_not_for_their_floods(s
         answered.append("STATUS")
         return {"class": "STATUS"}
 
-    service.requests.context.status = status
+    context = service.requests.context
+    context.messages = replace(context.messages, status=status)
     for flooder in others:
         flooder.send(STATUS * 150)
     assert entered.wait(TIMEOUT_S)

@@ -8,6 +8,7 @@ import os
 import socket
 import struct
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -357,7 +358,8 @@ def test_the_client_opens_the_file_as_itself(service, tmp_path, file):
         os.close(opened)
         answer(b'{"class":"MODEL","applied":{"effects":[]}}\n')
 
-    service.requests.context.switch_model = take
+    context = service.requests.context
+    context.errands = replace(context.errands, switch_model=take)
     with connect(service.path, by="anna (operate) from 10.0.0.5") as client:
         for none in (tmp_path / "none.yaml", tmp_path, "/dev/zero"):
             with pytest.raises(DaemonError, match="cannot be read"):

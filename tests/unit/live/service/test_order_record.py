@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 
 import pytest
 import structlog
@@ -23,7 +24,8 @@ def log():
 @pytest.fixture
 def recorder(service):
     """A client that watches READINGS; of these only the orders come here."""
-    service.requests.context.readings = type("Readings", (), {"columns": [], "line": None})
+    context = service.requests.context
+    context.messages = replace(context.messages, readings=type("Readings", (), {"columns": [], "line": None}))
     peer = service.unix()
     assert peer.ask({"class": "WATCH", "what": "readings"})["class"] == "WATCH"
     return peer

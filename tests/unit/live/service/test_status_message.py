@@ -28,7 +28,21 @@ def test_scatter_and_warning_stand_beside_their_channel() -> None:
     commands: Any = SimpleNamespace(target=None, zero=NO_ZERO)
     wires: Any = SimpleNamespace(length_wires=[], all_wires=[])
     adopted: Any = SimpleNamespace(summary={})
-    report = StatusReport({}, latest, wires, commands, adopted, nothing, control, nothing, None, dict, trust, clock, {})
+    report = StatusReport(
+        version={},
+        latest=latest,
+        wires=wires,
+        commands=commands,
+        adopted=adopted,
+        timing=nothing,
+        control=control,
+        publisher=nothing,
+        packets=None,
+        lines=dict,
+        trust=trust,
+        clock=clock,
+        ports={},
+    )
     first, second = report.message()["gauges"]
     assert first["scatter_um"] == 3.54
     assert first["warning"].startswith("scatters by 3.5 um")
