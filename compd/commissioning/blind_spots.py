@@ -21,7 +21,7 @@ from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_
 from compd.configuration import Configuration
 from compd.errors import KinematicsError
 from compd.live.acquisition import LEAST_MOTION, LEAST_WAY_MM, UNIT_LIMITS, WAY_SHARE
-from compd.live.loop import RESTED
+from compd.live.machine import RESTED
 from compd.machine_builder import build_model
 from compd.model import MachineModel
 from compd.model.kinematics import ToolOnPlate

@@ -15,19 +15,8 @@ from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.configuration import Configuration
 from compd.errors import Problem
 from compd.gauge import good
-from compd.live.loop import (
-    Commands,
-    CyclePacker,
-    Directions,
-    Loop,
-    LoopTiming,
-    MachineZero,
-    Models,
-    ModelText,
-    Setpoint,
-    build_pipeline,
-    try_model,
-)
+from compd.live.loop import Commands, CyclePacker, Directions, Loop, LoopTiming, Setpoint, build_pipeline
+from compd.live.machine import MachineZero, Models, ModelText, try_model
 from compd.model import MachineModel
 
 _CYCLES = 200

@@ -21,8 +21,9 @@ from compd.compensation.values import Compensation, Contributions, GaugeValues, 
 from compd.errors import KinematicsError, Problem
 from compd.model import EffectInputs, EffectMemory, MachineModel, PackedMemory, python_effects
 from compd.model.effects import Memory
-from compd.model.kernels import RESULT, WORKSPACE, GivenRows, RowOptions, SolvedRows, compensate_rows
+from compd.model.kernels import GivenRows, RowOptions, SolvedRows, compensate_rows
 from compd.model.kinematics import Frame, Pose
+from compd.model.structures import RESULT, WORKSPACE
 from compd.rotation import compose, rotation_matrix
 
 # In machine-tool mode effects are computed at the scale setpoint, which they shift themselves. After the first pass the

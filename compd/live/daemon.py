@@ -24,19 +24,8 @@ from compd.configuration import Configuration, listed_code
 from compd.errors import DaemonError, StateError
 from compd.line_settings import PushedLineSettings, powered
 from compd.live.acquisition import Acquisition, Votes
-from compd.live.loop import (
-    AdoptedModels,
-    Commands,
-    LoopTiming,
-    MachineZero,
-    ModelLoader,
-    Models,
-    Setpoint,
-    build_pipeline,
-    load_zero,
-    try_model,
-    warn_of_datum,
-)
+from compd.live.loop import AdoptedModels, Commands, LoopTiming, Setpoint, build_pipeline
+from compd.live.machine import MachineZero, ModelLoader, Models, load_zero, try_model, warn_of_datum
 from compd.live.memory import Control, PollRequests, SharedRing, TrustMemory
 from compd.live.processes import AcquisitionProcess, LoopProcess, ServiceProcess, StateLog
 from compd.live.service import (

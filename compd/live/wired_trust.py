@@ -16,7 +16,7 @@ from compd.live.acquisition import (
     WiredLength,
     quantity_limits,
 )
-from compd.live.loop import MachineWires, Wire
+from compd.live.machine import MachineWires, Wire
 from compd.live.memory import TrustMemory
 from compd.model import MachineModel
 from compd.operation_settings import FRAME_DISTANCES

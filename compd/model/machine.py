@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
 from compd.model.effects import AtZero, EffectProgram, FittedEffect, MachineConstants, MachineDetails, build_program
-from compd.model.kernels import MODEL, require
+from compd.model.kernels import require
 from compd.model.kinematics import (
     Arrangement,
     Contact,
@@ -25,6 +25,7 @@ from compd.model.kinematics import (
     link_forces,
     solve_frame,
 )
+from compd.model.structures import MODEL
 from compd.rotation import compose, to_inner, to_outer
 
 
@@ -94,7 +95,7 @@ class MachineModel:
 
     @cached_property
     def structure(self) -> NDArray[np.void]:
-        """(1,) The machine as the compensation's kernel reads it; see `compd.model.kernels.solver_structures.MODEL`."""
+        """(1,) The machine as the compensation's kernel reads it; see `compd.model.structures.solver_structures.MODEL`."""
         structure = np.zeros(1, dtype=MODEL)
         model, n, k = structure[0], self.links, self.joint_weights.shape[1]
         model["links"], model["joints"], model["axes"] = n, k, len(self.revolute_axes_P)

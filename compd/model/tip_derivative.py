@@ -11,18 +11,11 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.model.effect_memory import EffectMemory
 from compd.model.effects import Observations, evaluate_basis
-from compd.model.kernels import (
-    RESULT,
-    WORKSPACE,
-    GaugeRows,
-    SolvedRows,
-    TipDerivativeArrays,
-    WarmRows,
-    set_tip_derivatives,
-)
+from compd.model.kernels import GaugeRows, SolvedRows, TipDerivativeArrays, WarmRows, set_tip_derivatives
 from compd.model.kinematics import Movement
 from compd.model.machine import MachineModel
 from compd.model.observer import observe
+from compd.model.structures import RESULT, WORKSPACE
 
 
 class TipDerivatives(NamedTuple):

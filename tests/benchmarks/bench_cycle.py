@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from compd.gauge import good
-from compd.live.loop import LiveModel, Models, Target
+from compd.live.loop import Target
+from compd.live.machine import LiveModel, Models
 from compd.live.system import QuietCollector
 from compd.model import GaugeNoise
 from compd.model.effects import FittedEffect, needed_quantities

@@ -30,8 +30,8 @@ from compd.client import connect
 from compd.configuration import Configuration, load
 from compd.gauge import good
 from compd.live import daemon as daemon_module
-from compd.live.loop import MachineZero
 from compd.live.loop.timing import BIN_US
+from compd.live.machine import MachineZero
 from compd.live.memory import Latest
 from compd.operation_settings import SocketSettings, StateSettings
 from tests.benchmarks.figures import quiet, show

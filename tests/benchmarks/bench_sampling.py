@@ -27,7 +27,8 @@ from compd.gauge import Quality, Reading, bad, good
 from compd.line_settings import Pace, serial_pace
 from compd.live.acquisition.motion_estimate import estimated_motion
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
-from compd.live.loop import CycleInputs, CycleSettings, CycleState, MachineZero, Models, build_pipeline, step
+from compd.live.loop import CycleInputs, CycleSettings, CycleState, build_pipeline, step
+from compd.live.machine import MachineZero, Models
 from compd.live.memory import Readings, Snapshot
 from compd.simulation import World
 from compd.stated_noise import tolerance_mm

@@ -8,7 +8,7 @@ import pytest
 
 from compd.comparison import open_recording
 from compd.configuration import load
-from compd.live.loop import load_zero
+from compd.live.machine import load_zero
 from compd.machine_builder import build_model
 from compd.model_file import read_model_file
 from tests.support.live_machine import Machine

@@ -20,7 +20,8 @@ from compd.configuration import Configuration, load
 from compd.gauge import Channel, Gauge, Quality, Reading, good
 from compd.live.acquisition import LOOK_EVERY_S, Votes
 from compd.live.acquisition.polled_gauge import PolledGauge
-from compd.live.loop import Commands, CycleInputs, CycleState, MachineZero, build_pipeline, step
+from compd.live.loop import Commands, CycleInputs, CycleState, build_pipeline, step
+from compd.live.machine import MachineZero
 from compd.live.memory import Doubt
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.simulation import World

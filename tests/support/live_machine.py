@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from compd.configuration import Configuration, load
 from compd.gauge import Quality, bad, good
-from compd.live.loop import Commands, CycleInputs, CycleState, MachineZero, build_pipeline, step
+from compd.live.loop import Commands, CycleInputs, CycleState, build_pipeline, step
+from compd.live.machine import MachineZero
 from compd.setpoint_states import State
 from tests.support.paths import CONFIG
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.live.loop import Models
+from compd.live.machine import Models
 from compd.model.effects import FittedEffect
 from compd.model.library import find_effect
 from compd.model_file import ModelFile

@@ -17,7 +17,8 @@ from compd.configuration import Configuration, load
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import MotionEstimate
 from compd.live.acquisition.possible_motion import WINDOW_S, GaugeSample
-from compd.live.loop import CycleInputs, CycleState, MachineZero, build_pipeline, step
+from compd.live.loop import CycleInputs, CycleState, build_pipeline, step
+from compd.live.machine import MachineZero
 from compd.live.memory import Readings, Snapshot
 from compd.setpoint_states import State
 from compd.simulation import World

@@ -11,7 +11,7 @@ import numpy as np
 
 from compd.gauge import Channel, Gauge, GaugeOptions, Reading, good
 from compd.live.acquisition.polled_gauge import PolledGauge
-from compd.live.loop import Models
+from compd.live.machine import Models
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from tests.support.live_machine import PERIOD_S, RAW_AT_ZERO_MM, Machine, machine
 from tests.support.live_models import file_with

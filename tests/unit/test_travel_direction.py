@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from compd.arrays import FloatArray
 from compd.gauge import good
-from compd.live.loop import Directions, Wire
+from compd.live.loop import Directions
+from compd.live.machine import Wire
 from compd.model.kinematics import track_motion
 from compd.travel_direction import row_directions
 

@@ -38,7 +38,7 @@ from compd.model import (
     sum_deltas,
 )
 from compd.model.effects import ConstantValues, Effect, FittedEffect, Observations, Port, evaluate_basis, unmet_needs
-from compd.model.kernels import MEANING, Reason
+from compd.model.kernels import Reason
 from compd.recording import Recording, UsableRows
 from compd.result_tables import Columns, data_frame, html_table
 from compd.statistics import filled
@@ -334,7 +334,7 @@ class AlignedRecording:
         if self.model is None:
             return "the model's prediction is empty"
         reasons = predict(self.model, self.rows, {}).reason[rows]
-        return "no pose: " + "; ".join(MEANING[Reason(int(code))] for code in np.unique(reasons[reasons > 0]))
+        return "no pose: " + "; ".join(Reason(int(code)).meaning for code in np.unique(reasons[reasons > 0]))
 
 
 def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[str, Deltas], Deltas]:

@@ -9,7 +9,7 @@ A hum that the polls alias to less than three periods in a window looks like mot
 
 Windows take seconds. Until they tell, the last readings do, where they turn round from one to the next: a machine does
 so at the end of a way, noise and hum again and again. So does a joint or the frame that changes while the scales stand:
-it is no faster than the links (`compd.live.loop.wired_readings`).
+it is no faster than the links (`compd.live.machine.wired_readings`).
 """
 
 from __future__ import annotations

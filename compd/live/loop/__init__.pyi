@@ -9,17 +9,8 @@ from .cycle_state import CycleSettings as CycleSettings
 from .cycle_state import CycleState as CycleState
 from .directions import Directions as Directions
 from .loop import Loop as Loop
-from .machine_zero import MachineZero as MachineZero
-from .machine_zero import load_zero as load_zero
-from .model_loader import LiveModel as LiveModel
-from .model_loader import ModelLoader as ModelLoader
-from .model_loader import Models as Models
-from .model_loader import ModelText as ModelText
-from .model_loader import try_model as try_model
-from .model_loader import warn_of_datum as warn_of_datum
 from .pipeline import Pipeline as Pipeline
 from .pipeline import build_pipeline as build_pipeline
-from .reasons import waiting_text as waiting_text
 from .ring_entries import CyclePacker as CyclePacker
 from .ring_entries import CycleUnpacker as CycleUnpacker
 from .ring_entries import SentCycle as SentCycle
@@ -28,6 +19,3 @@ from .setpoint import setpoint_line as setpoint_line
 from .skew import skew_of as skew_of
 from .timing import LoopTiming as LoopTiming
 from .tip_uncertainty import stated_noise as stated_noise
-from .wired_readings import RESTED as RESTED
-from .wiring import MachineWires as MachineWires
-from .wiring import Wire as Wire

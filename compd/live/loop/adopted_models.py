@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from compd.live.loop.model_loader import ModelLoader, Models, ModelText
+from compd.live.machine import ModelLoader, Models, ModelText
 from compd.live.memory import SharedMessage
 
 # Two model files with ledgers of years; memory that is not used costs nothing.

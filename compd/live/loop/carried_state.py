@@ -15,8 +15,8 @@ import numpy as np
 from compd.compensation import WarmStart
 from compd.errors import StateError
 from compd.live.loop.cycle_state import CycleState
-from compd.live.loop.machine_zero import MachineZero
 from compd.live.loop.stale_policy import ComparatorSet
+from compd.live.machine import MachineZero
 from compd.model import EffectMemory
 from compd.model.kinematics import Motion
 

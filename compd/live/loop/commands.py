@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 
 from compd.errors import StateError
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import Models
+from compd.live.machine import MachineZero, Models
 from compd.live.memory import SharedMessage
 
 _TARGET_BYTES = 1024

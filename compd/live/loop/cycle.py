@@ -20,20 +20,17 @@ from compd.live.loop.commands import Target
 from compd.live.loop.cycle_readings import judge_scales, read_comparators, read_scales
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors
 from compd.live.loop.limits import LimitedCorrection, limit_correction, slewed, stroke_problem
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import Models
 from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
-from compd.live.loop.reasons import shortened
 from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import UsableComparators
 from compd.live.loop.tip_bound import refused_bound, tip_bound, with_place
 from compd.live.loop.tip_uncertainty import TipUncertainty, has_grown, noise_now, tip_uncertainty
-from compd.live.loop.wiring import MachineWires
+from compd.live.machine import MachineWires, MachineZero, Models, shortened
 from compd.live.memory import Snapshot
 from compd.model import MachineModel
-from compd.model.kernels import MEANING, Reason
+from compd.model.kernels import Reason
 from compd.setpoint_states import Mode, State
 
 TARGET_TOO_OLD = (
@@ -212,7 +209,7 @@ def _compute(
     if tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
         compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
         if code := int(compensation.reason):
-            return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {MEANING[Reason(code)]}"), next_state
+            return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {Reason(code).meaning}"), next_state
     reported, reason = _reported(usable, scales_state, scales_reason, limited)
     compensation = _with_applied(compensation, limited.applied_mm)
     return (
@@ -263,7 +260,7 @@ def _refusal(
     """Why the compensation cannot be computed, with the gauge or effect to which it is due."""
     what = "this pose" if target is None else "this target"
     cause = refusal_cause(machine, values, target, warm_start, wires)
-    return f"{what} cannot be computed: {MEANING[Reason(code)]}" + (f"; {cause}" if cause else "")
+    return f"{what} cannot be computed: {Reason(code).meaning}" + (f"; {cause}" if cause else "")
 
 
 def _explanation(zero: MachineZero | StateError, models: Models) -> str:

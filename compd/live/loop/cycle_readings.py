@@ -9,10 +9,8 @@ from compd.arrays import FloatArray
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings
 from compd.live.loop.degraded import degraded_comparators
-from compd.live.loop.model_loader import LiveModel
-from compd.live.loop.reasons import Lost
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators, held_comparators, usable_comparators
-from compd.live.loop.wiring import ALL_GOOD, WiredValues
+from compd.live.machine import ALL_GOOD, LiveModel, Lost, WiredValues
 from compd.live.memory import Snapshot
 from compd.setpoint_states import State
 

@@ -13,11 +13,9 @@ from compd.arrays import FloatArray
 from compd.compensation import WarmStart
 from compd.errors import StateError
 from compd.live.loop.commands import Target
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import Models
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.live.loop.tip_uncertainty import scatter_limits_mm
-from compd.live.loop.wiring import MachineWires
+from compd.live.machine import MachineWires, MachineZero, Models
 from compd.live.memory import Snapshot
 from compd.model import EffectMemory, GaugeNoise, MachineModel
 from compd.operation_settings import LimitSettings, LoopSettings

@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators
-from compd.live.loop.wiring import WiredValues
+from compd.live.machine import WiredValues
 from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
 

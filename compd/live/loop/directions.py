@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from compd.gauge import Quality
 from compd.live.loop.setpoint import Setpoint
-from compd.live.loop.wiring import Wire
+from compd.live.machine import Wire
 from compd.travel_direction import Travel, advance
 
 

@@ -7,11 +7,11 @@ import numpy as np
 from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleState
-from compd.live.loop.model_loader import LiveModel, Models
 from compd.live.loop.setpoint import ShadowResult
+from compd.live.machine import LiveModel, Models
 from compd.live.memory import Snapshot
 from compd.model import EffectMemory, MachineModel, carry_over
-from compd.model.kernels import MEANING, Reason
+from compd.model.kernels import Reason
 
 
 def adopt_models(state: CycleState, models: Models) -> CycleState:
@@ -73,7 +73,7 @@ def evaluate_shadow(
     values = values._replace(quantities=shadow.by_name(quantities))
     compensation, after = compensate(shadow.machine, values, target, warm_start._replace(effects=memory))
     if code := int(compensation.reason):
-        return ShadowResult(shadow.hash, MEANING[Reason(code)]), after.effects
+        return ShadowResult(shadow.hash, Reason(code).meaning), after.effects
     tip_P_mm = compensation.tip_P_mm if tool_on_plate else None
     result = ShadowResult(shadow.hash, "", compensation.correction_mm, compensation.tip_M_mm, tip_P_mm)
     return result, after.effects

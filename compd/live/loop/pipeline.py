@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 from compd.configuration import Configuration
 from compd.gauge import Gauge
 from compd.live.loop.cycle_state import CycleSettings
-from compd.live.loop.model_loader import ModelLoader, Models
 from compd.live.loop.tip_uncertainty import stated_noise
-from compd.live.loop.wiring import MachineWires
+from compd.live.machine import MachineWires, ModelLoader, Models
 from compd.live.memory import Latest
 from compd.machine_builder import build_model
 from compd.plugins import OWN_CODE, Code

@@ -9,7 +9,7 @@ import numpy as np
 from compd.compensation import GaugeValues, WarmStart
 from compd.live.loop.commands import Target
 from compd.live.loop.models import compensate
-from compd.live.loop.wiring import MachineWires
+from compd.live.machine import MachineWires
 from compd.model import MachineModel, carry_over
 
 # A joint runs out and a frame grows by some hundredths of a millimetre: a change beyond this, mm, is no measurement.

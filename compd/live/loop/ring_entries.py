@@ -14,9 +14,8 @@ from compd.errors import StateError
 from compd.live.loop.carried_state import pack_state, unpack_state
 from compd.live.loop.cycle_state import CycleInputs, CycleState
 from compd.live.loop.directions import Directions
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.model_loader import ModelNames, Models
 from compd.live.loop.setpoint import Setpoint
+from compd.live.machine import MachineZero, ModelNames, Models
 from compd.live.memory import Readings, Snapshot
 
 _PICKLE_PROTOCOL = 5

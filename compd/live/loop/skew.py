@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from compd.gauge import Reading
-from compd.live.loop.wiring import Wire
+from compd.live.machine import Wire
 from compd.live.memory import Snapshot
 
 

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.live.loop.reasons import Lost
-from compd.live.loop.wiring import Beyond
+from compd.live.machine import Beyond, Lost
 from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
 

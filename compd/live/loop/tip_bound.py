@@ -5,7 +5,7 @@ It has three parts, which are added (GUM, JCGM 100:2008, F.2.4.5, for what is kn
 - Noise of the gauges and errors of the fitted numbers: the radius of the sphere in which the tip is with 95 %, by its
   covariance (`compd.live.loop.tip_uncertainty`). The coverage factor of the distance's standard uncertainty is 1.61 for
   an even scatter, and 1.96 for one along a line.
-- Age: how far each length may have gone since it was read (`compd.live.loop.wired_readings`), which holds the skew.
+- Age: how far each length may have gone since it was read (`compd.live.machine.wired_readings`), which holds the skew.
   Links move together, so the scales count with the signs that displace the tip most. What joints and frame may do
   they do each by itself: they count as independent, beside the noise.
 - What is absent: a correction that fades, is degraded or clamped, or slews to another model, is a displacement of known
@@ -27,8 +27,7 @@ from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleSettings
 from compd.live.loop.stale_policy import ComparatorSet, UsableComparators
 from compd.live.loop.tip_uncertainty import TipUncertainty
-from compd.live.loop.wired_readings import tip_bound_um
-from compd.live.loop.wiring import MachineWires
+from compd.live.machine import MachineWires, tip_bound_um
 from compd.live.memory import Snapshot
 from compd.units import UM_PER_MM
 

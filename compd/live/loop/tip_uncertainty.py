@@ -12,7 +12,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation import GaugeValues
 from compd.configuration import Configuration
-from compd.live.loop.wiring import Beyond, MachineWires
+from compd.live.machine import Beyond, MachineWires
 from compd.live.memory import Snapshot
 from compd.model import EffectMemory, GaugeNoise, MachineModel, parameter_variance, tip_derivatives
 from compd.stated_noise import SCATTER_RATIO

@@ -22,17 +22,12 @@ from compd.live.loop import (
     CycleState,
     CycleUnpacker,
     Directions,
-    LiveModel,
     Loop,
     LoopTiming,
-    MachineZero,
-    ModelLoader,
-    Models,
-    ModelText,
     Setpoint,
     step,
-    warn_of_datum,
 )
+from compd.live.machine import LiveModel, MachineZero, ModelLoader, Models, ModelText, warn_of_datum
 from compd.live.memory import Control, Latest, SharedRing
 from compd.live.system import limit_wake_latency, lock_memory, sharpen_timers, use_fifo
 from compd.operation_settings import LoopSettings

@@ -16,14 +16,13 @@ from compd.live.loop import (
     CycleInputs,
     CycleSettings,
     CycleState,
-    LiveModel,
-    Models,
     Pipeline,
     Setpoint,
     build_pipeline,
     stated_noise,
     step,
 )
+from compd.live.machine import LiveModel, Models
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER
 from compd.live.record.table_rows import Message
 from compd.live.service import FORMER_TIP_NOISE, RecordedCycle, parse_readings

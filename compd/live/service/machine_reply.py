@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from compd.configuration import Configuration
-from compd.live.loop import MachineWires, Wire
+from compd.live.machine import MachineWires, Wire
 
 
 def machine_message(configuration: Configuration, wires: MachineWires) -> dict[str, Any]:

@@ -17,7 +17,7 @@ import structlog
 from compd.clock import Clock
 from compd.documents import LARGEST_BYTES
 from compd.files import read_descriptor
-from compd.live.loop import ModelText
+from compd.live.machine import ModelText
 from compd.live.memory import Control
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 

@@ -14,16 +14,8 @@ from typing import Any, NamedTuple
 from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading, ReadingMotion
-from compd.live.loop import (
-    CycleInputs,
-    CycleState,
-    MachineWires,
-    MachineZero,
-    SentCycle,
-    Target,
-    setpoint_line,
-    with_zero_of,
-)
+from compd.live.loop import CycleInputs, CycleState, SentCycle, Target, setpoint_line, with_zero_of
+from compd.live.machine import MachineWires, MachineZero
 from compd.live.memory import Readings, Snapshot
 from compd.live.service.messages import line
 from compd.live.service.state_json import from_plain, to_plain

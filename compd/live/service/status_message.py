@@ -10,7 +10,8 @@ from typing import Any
 from compd.clock import Clock
 from compd.errors import StateError
 from compd.gauge import Quality
-from compd.live.loop import AdoptedModels, Commands, LoopTiming, MachineWires, skew_of, waiting_text
+from compd.live.loop import AdoptedModels, Commands, LoopTiming, skew_of
+from compd.live.machine import MachineWires, waiting_text
 from compd.live.memory import Control, Latest, TrustMemory
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender

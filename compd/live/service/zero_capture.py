@@ -15,7 +15,8 @@ import structlog
 from compd.clock import Clock
 from compd.errors import Problem, StateError
 from compd.gauge import Quality
-from compd.live.loop import Commands, MachineWires, MachineZero
+from compd.live.loop import Commands
+from compd.live.machine import MachineWires, MachineZero
 from compd.live.memory import Latest
 from compd.live.service.background_job import BackgroundJob
 from compd.live.service.messages import ErrorCode, ProtocolError, line

@@ -14,7 +14,8 @@ from compd.errors import CompdError, Problem
 from compd.model.effects.effect import Basis, BasisProgram, ConstantValues, Effect, Memory, Port
 from compd.model.effects.effect_needs import is_measured, needed_quantities
 from compd.model.effects.observations import MachineConstants, Observations
-from compd.model.kernels import MACHINE, MOST_LINKS, ROW, basis_of_rows
+from compd.model.kernels import basis_of_rows
+from compd.model.structures import MACHINE, MOST_LINKS, ROW
 from compd.reference_conditions import standard_value
 
 # Rows whose structures exist at the same time: of 4000, they take 8 MB.

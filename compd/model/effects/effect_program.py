@@ -13,7 +13,8 @@ from compd.model.effects.effect import FittedEffect, Memory, Port
 from compd.model.effects.effect_basis import machine_structure, port_sizes, program_numbers
 from compd.model.effects.effect_needs import needed_quantities
 from compd.model.effects.observations import MachineConstants
-from compd.model.kernels import EFFECT, FRAME, GIVEN, LENGTHS, MACHINE, MECHANISM, EffectArrays
+from compd.model.kernels import EffectArrays
+from compd.model.structures import EFFECT, FRAME, GIVEN, LENGTHS, MACHINE, MECHANISM
 from compd.reference_conditions import standard_value
 
 # In the order in which the kernel has the ports' numbers behind one another.

@@ -2,9 +2,6 @@ from . import formula as formula
 from .compensation import compensate_rows as compensate_rows
 from .effect_dispatch import FORMULA as FORMULA
 from .effect_dispatch import kernel_number as kernel_number
-from .effect_row import MACHINE as MACHINE
-from .effect_row import MOST_LINKS as MOST_LINKS
-from .effect_row import ROW as ROW
 from .effect_rows import basis_of_rows as basis_of_rows
 from .formula import formula_factors as formula_factors
 from .forward_solver import forward as forward
@@ -26,15 +23,6 @@ from .row_arguments import TipDerivativeArrays as TipDerivativeArrays
 from .row_arguments import WantedRows as WantedRows
 from .row_arguments import WarmRows as WarmRows
 from .solve_status import AMPLIFICATION_LIMIT as AMPLIFICATION_LIMIT
-from .solve_status import MEANING as MEANING
 from .solve_status import Reason as Reason
 from .solve_status import require as require
-from .solver_structures import EFFECT as EFFECT
-from .solver_structures import FRAME as FRAME
-from .solver_structures import GIVEN as GIVEN
-from .solver_structures import LENGTHS as LENGTHS
-from .solver_structures import MECHANISM as MECHANISM
-from .solver_structures import MODEL as MODEL
-from .solver_structures import RESULT as RESULT
-from .solver_structures import WORKSPACE as WORKSPACE
 from .tip_derivatives import set_tip_derivatives as set_tip_derivatives

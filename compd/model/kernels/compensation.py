@@ -40,7 +40,7 @@ from compd.model.kernels.row_arguments import (
     WantedRows,
     WarmRows,
 )
-from compd.model.kernels.solver_structures import GIVEN, MODELS
+from compd.model.structures import GIVEN, MODELS
 from compd.rotation import to_inner_frame
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from compd.arrays import FloatArray, IntArray
 from compd.jit import COUNT, INDEX_ROWS, NUMBERS, ROW_MATRICES, ROWS, loop
 from compd.model.kernels.effect_dispatch import set_basis
-from compd.model.kernels.effect_row import EFFECT_MACHINE, EFFECT_ROWS
+from compd.model.structures import EFFECT_MACHINE, EFFECT_ROWS
 
 
 @loop([COUNT, EFFECT_ROWS, EFFECT_MACHINE, ROWS, INDEX_ROWS, NUMBERS, NUMBERS, ROW_MATRICES])
@@ -24,7 +24,7 @@ def basis_of_rows(
     """Fill basis (N, size, P), zero on entry; `memory` is that before the first row, and after the last.
 
     number, code, numbers : of the effect, see `compd.model.effects.effect.BasisProgram`.
-    rows (N,), machine (1,) : structures of `compd.model.kernels.effect_row`.
+    rows (N,), machine (1,) : structures of `compd.model.structures.effect_row`.
     quantities (N, 2 q) : those that the effect needs, then the same at machine zero; see
         `compd.model.kernels.effects`.
     """

@@ -17,7 +17,7 @@ from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import copy_frame, copy_pose, inverse_pose, solve_frame
 from compd.model.kernels.reason_codes import OK
 from compd.model.kernels.row_arguments import EffectArrays
-from compd.model.kernels.solver_structures import FRAME, LENGTHS
+from compd.model.structures import FRAME, LENGTHS
 from compd.rotation import to_outer_frame
 
 

@@ -24,9 +24,9 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.jit import INDEX_ROWS, NUMBERS, ROW_MATRICES, helper, loop
-from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.model.kernels.link_forces import axial_force_at_zero, set_axial_forces
 from compd.model.kernels.memory import lag_step
+from compd.model.structures import EffectMachine, EffectRow
 
 # Operations: each takes its operands from the stack, the last one on top, and leaves its result there. The argument of
 # the first seven is the place of a number, a column, a register, a lag or a parameter. Those since zero are of values

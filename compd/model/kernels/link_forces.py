@@ -9,10 +9,10 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
 from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve
-from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.model.kernels.loop_closure import evaluate_closure, platform_radius, pose_is_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NOT_FINITE, OK
 from compd.model.kernels.solve_status import AMPLIFICATION_LIMIT
+from compd.model.structures import EffectMachine, EffectRow
 
 
 @helper

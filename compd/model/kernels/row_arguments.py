@@ -15,8 +15,7 @@ from compd.jit import (
     ROWS,
     structure,
 )
-from compd.model.kernels.effect_row import EFFECT_MACHINE
-from compd.model.kernels.solver_structures import EFFECTS, RESULTS, WORKSPACES
+from compd.model.structures import EFFECT_MACHINE, EFFECTS, RESULTS, WORKSPACES
 
 
 class EffectArrays(NamedTuple):
@@ -24,8 +23,8 @@ class EffectArrays(NamedTuple):
 
     Attributes
     ----------
-    machine : (1,), of `compd.model.kernels.effect_row.MACHINE`: what all rows have in common.
-    effects : (K,), of `compd.model.kernels.solver_structures.EFFECT`.
+    machine : (1,), of `compd.model.structures.effect_row.MACHINE`: what all rows have in common.
+    effects : (K,), of `compd.model.structures.solver_structures.EFFECT`.
     theta, numbers, code : of all effects, behind one another.
     quantity_indices : of each effect's quantities, now and then at machine zero, in a row of the program's `quantities`
         and `references` behind one another.

@@ -25,8 +25,13 @@ class Reason(IntEnum):
     NEAR_SINGULAR = 4  # a small error of length is a large error of pose
     OTHER_ASSEMBLY = 5  # a pose with the right lengths, but in another assembly than the guess
 
+    @property
+    def meaning(self) -> str:
+        """In words; "" of a pose that was found."""
+        return _MEANING.get(self, "")
 
-MEANING: dict[Reason, str] = {
+
+_MEANING: dict[Reason, str] = {
     Reason.NOT_FINITE: "an input is nan or infinite",
     Reason.UNREACHABLE: "no pose has these lengths",
     Reason.NO_CONVERGENCE: "no pose was found from this guess",
@@ -66,7 +71,7 @@ def require(reason: NDArray[np.int64] | np.int64 | int, what: str, next_step: st
     problems = [
         Problem(
             where=what if single else f"{what}, row {', '.join(str(i) for i in index)}",
-            what=f"{Reason(int(codes[index])).name}: {MEANING[Reason(int(codes[index]))]}",
+            what=f"{Reason(int(codes[index])).name}: {Reason(int(codes[index])).meaning}",
             next_step=next_step,
         )
         for index in failed[:10]

@@ -31,8 +31,8 @@ from compd.model.kernels.row_arguments import (
     TipDerivativeArrays,
     WarmRows,
 )
-from compd.model.kernels.solver_structures import GIVEN, MODELS
 from compd.model.kernels.tip_sensitivity import set_tip_by_closure, set_tip_by_ports
+from compd.model.structures import GIVEN, MODELS
 
 
 @helper

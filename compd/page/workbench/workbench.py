@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from compd.configuration import Machine
 from compd.errors import CompdError, Problem, RecordingError, StateError
 from compd.files import file_stamp, write_files
-from compd.live.loop import ModelText
+from compd.live.machine import ModelText
 from compd.model.effects import can_concern
 from compd.model.library import load_library
 from compd.page.recording_machine import machine_of

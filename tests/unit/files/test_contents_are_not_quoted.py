@@ -28,8 +28,8 @@ from compd.gauge_description import read_capture
 from compd.gauge_tools import gauge_of_file
 from compd.instruments import ReadOptions, instrument_formats, preview_export, read_export
 from compd.lines import PortArguments
-from compd.live.loop import load_zero
-from compd.live.loop.machine_zero import FILE_NAME as ZERO_NAME
+from compd.live.machine import load_zero
+from compd.live.machine.machine_zero import FILE_NAME as ZERO_NAME
 from compd.live.memory import TrustMemory
 from compd.live.record import RecordedCycles
 from compd.live.record.replay import CYCLES_SUFFIX

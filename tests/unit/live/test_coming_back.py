@@ -11,7 +11,7 @@ import pytest
 from compd.configuration import Configuration, load
 from compd.gauge import Quality, Reading, good
 from compd.live.acquisition.possible_motion import GaugeSample
-from compd.live.loop.wiring import MachineWires
+from compd.live.machine.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import Doubt
 from compd.live.service import last_readings

@@ -13,7 +13,7 @@ from compd.errors import Problem, StateError
 from compd.gauge import Quality
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
-from compd.live.loop.machine_zero import MachineZero
+from compd.live.machine.machine_zero import MachineZero
 from compd.live.service.state_json import to_plain
 from compd.setpoint_states import Mode, State
 from tests.support.live_machine import CONFIG, HOLD_S, PERIOD_S, RAW_AT_ZERO_MM, STEP_MM, Machine, machine

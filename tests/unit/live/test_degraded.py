@@ -9,7 +9,7 @@ import pytest
 
 from compd.gauge import Quality
 from compd.live.loop.commands import Target
-from compd.live.loop.reasons import LONGEST_REASON_BYTES
+from compd.live.machine.reasons import LONGEST_REASON_BYTES
 from compd.setpoint_states import State
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine
 from tests.support.live_models import thermal, warm, with_noise

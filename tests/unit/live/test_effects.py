@@ -19,8 +19,8 @@ from compd.live.daemon import Daemon
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
 from compd.live.loop.directions import Directions
-from compd.live.loop.model_loader import Models
 from compd.live.loop.ring_entries import CyclePacker, CycleUnpacker
+from compd.live.machine.model_loader import Models
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
 from compd.setpoint_states import State
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine

@@ -13,8 +13,8 @@ from compd.cli.live.adopt import adopt
 from compd.errors import DaemonError
 from compd.gauge import Quality
 from compd.live import daemon as daemon_module
-from compd.live.loop.machine_zero import MachineZero, load_zero
-from compd.live.loop.model_loader import Models
+from compd.live.machine.machine_zero import MachineZero, load_zero
+from compd.live.machine.model_loader import Models
 from compd.live.service.zero_capture import ZeroCapture
 from compd.setpoint_states import State
 from tests.support.live_machine import PERIOD_S, Machine, machine

@@ -15,8 +15,8 @@ from compd.errors import Problem, StateError
 from compd.files import checksum_of
 from compd.gauge import Quality, bad, good
 from compd.live.loop.commands import Commands
-from compd.live.loop.machine_zero import FILE_NAME, OLD_FILE_NAME, MachineZero, load_zero
-from compd.live.loop.wiring import MachineWires
+from compd.live.machine.machine_zero import FILE_NAME, OLD_FILE_NAME, MachineZero, load_zero
+from compd.live.machine.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.service.zero_capture import REST_TOLERANCE_MM, ZeroCapture
 from tests.support.paths import ROOT

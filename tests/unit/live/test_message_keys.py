@@ -7,7 +7,7 @@ import json
 import pytest
 from pydantic import ValidationError
 
-from compd.live.loop.model_loader import ModelLoader, Models
+from compd.live.machine.model_loader import ModelLoader, Models
 from compd.live.service.message_keys.message import Keys
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import SENT_MESSAGES

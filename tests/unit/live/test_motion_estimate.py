@@ -10,7 +10,7 @@ import pytest
 from compd.gauge import Quality, Reading, bad, good
 from compd.live.acquisition.motion_estimate import MotionEstimate, estimated_motion
 from compd.live.acquisition.possible_motion import GaugeSample
-from compd.live.loop.wiring import Wire, Wires
+from compd.live.machine.wiring import Wire, Wires
 from compd.live.memory.latest import Snapshot
 from compd.live.memory.readings import Readings
 

@@ -15,7 +15,7 @@ import typer
 from compd.cli.live.replay import replay as replay_command
 from compd.errors import Problem, RecordingError, StateError
 from compd.live.loop.cycle import step
-from compd.live.loop.model_loader import Models
+from compd.live.machine.model_loader import Models
 from compd.live.record.compared_table import differing_cells
 from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.live.service.readings_message import parse_readings

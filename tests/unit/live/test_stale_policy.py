@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from compd.gauge import Quality
-from compd.live.loop.reasons import WAITS_FOR_PERSON, Lost
 from compd.live.loop.stale_policy import ComparatorSet, usable_comparators
+from compd.live.machine.reasons import WAITS_FOR_PERSON, Lost
 from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
 from tests.support.live_machine import PERIOD_S, machine

@@ -12,8 +12,8 @@ import pytest
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.configuration import load
 from compd.gauge import ReadingMotion
-from compd.live.loop.model_loader import Models
 from compd.live.loop.tip_uncertainty import radius_95
+from compd.live.machine.model_loader import Models
 from compd.setpoint_states import State
 from tests.support.live_machine import Machine, machine
 from tests.support.live_models import file_with, thermal, with_noise

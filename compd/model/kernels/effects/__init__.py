@@ -5,7 +5,7 @@ number; see `compd.model.effects.effect.Effect`::
 
     kernel(row, machine, quantities, constants, memory, basis)
 
-row, machine : structures of `compd.model.kernels.effect_row`.
+row, machine : structures of `compd.model.structures.effect_row`.
 quantities (2 q,) : those that the effect needs, in the order of `compd.model.effects.needed_quantities`; then the
     same at machine zero, or under the standard conditions where the effect counts from these.
 constants (c,) : the nonlinear constants in the order of the effect's entry.

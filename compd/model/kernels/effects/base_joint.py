@@ -6,7 +6,7 @@ import math
 
 from compd.arrays import FloatArray
 from compd.jit import helper
-from compd.model.kernels.effect_row import EffectMachine, EffectRow
+from compd.model.structures import EffectMachine, EffectRow
 
 UM = 1e-3  # mm
 

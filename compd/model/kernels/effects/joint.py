@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from compd.arrays import FloatArray
 from compd.jit import helper
-from compd.model.kernels.effect_row import EffectMachine, EffectRow
+from compd.model.structures import EffectMachine, EffectRow
 
 UM = 1e-3  # mm
 

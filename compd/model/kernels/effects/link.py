@@ -8,9 +8,9 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.jit import helper
-from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.model.kernels.link_forces import axial_force_at_zero, set_axial_forces
 from compd.model.kernels.memory import lag_step
+from compd.model.structures import EffectMachine, EffectRow
 
 PPM = 1e-6
 UM = 1e-3  # mm

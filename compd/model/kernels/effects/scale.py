@@ -6,8 +6,8 @@ import math
 
 from compd.arrays import FloatArray
 from compd.jit import helper
-from compd.model.kernels.effect_row import EffectMachine, EffectRow
 from compd.model.kernels.memory import friction_step
+from compd.model.structures import EffectMachine, EffectRow
 from compd.reference_conditions import REFERENCE_TEMPERATURE_degC
 from compd.travel_direction import REVERSAL_MM
 

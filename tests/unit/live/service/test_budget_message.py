@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
-from compd.live.loop.model_loader import Models
+from compd.live.machine.model_loader import Models
 from compd.live.service.budget_message import BudgetMessage
 from compd.rotation import rotation_matrix
 from tests.support.live_machine import machine

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import from_dtype
 
-from compd.model.kernels.effect_row import ROW
+from compd.model.structures.effect_row import ROW
 
 MOST_LINKS = 6
 MOST_JOINTS = 4 * MOST_LINKS

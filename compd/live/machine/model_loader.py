@@ -17,8 +17,8 @@ from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensat
 from compd.documents import LARGEST_BYTES
 from compd.errors import Problem, StateError
 from compd.files import read_small_file
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.wiring import Beyond, MachineWires, WiredValues, Wires
+from compd.live.machine.machine_zero import MachineZero
+from compd.live.machine.wiring import Beyond, MachineWires, WiredValues, Wires
 from compd.live.memory import Snapshot
 from compd.model import MachineModel
 from compd.model.effects import FittedEffect, available_settings, needed_quantities, unmet_needs

@@ -11,9 +11,9 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.configuration import Configuration, resolve_channel
 from compd.gauge import Quality, Reading
-from compd.live.loop.machine_zero import MachineZero
-from compd.live.loop.reasons import GaugeFault, Lost, lost
-from compd.live.loop.wired_readings import age_bounds_mm, read_values, speed_bounds_mm_per_s
+from compd.live.machine.machine_zero import MachineZero
+from compd.live.machine.reasons import GaugeFault, Lost, lost
+from compd.live.machine.wired_readings import age_bounds_mm, read_values, speed_bounds_mm_per_s
 from compd.live.memory import Latest, Snapshot
 from compd.operation_settings import FRAME_DISTANCES, FrameWire
 from compd.stated_noise import NOT_STATED, StatedNoise, tolerance_mm
