@@ -237,7 +237,7 @@ LineT = TypeVar("LineT")
 LineKind = Literal["bytes", "registers", "nodes", "topics"]
 
 # Bytes of damage before a reply on a serial line: of a single edge one, rarely two.
-MOST_SKIPPED_BYTES = 3
+MAX_SKIPPED_BYTES = 3
 
 
 class DataSheetNoise(NamedTuple):

@@ -11,7 +11,7 @@ from compd.jit import helper
 LARGEST = 1e12
 
 # What is factored here holds direction cosines, near 1, or arms in mm: a pivot below this is rounding.
-SMALLEST_PIVOT = 1e-12
+MIN_PIVOT = 1e-12
 
 
 @helper
@@ -59,7 +59,7 @@ def lu_factor(A: FloatArray, pivot: IntArray) -> float:
             if abs(A[i, k]) > pivot_size:
                 pivot_size = abs(A[i, k])
                 row = i
-        if not pivot_size > SMALLEST_PIVOT:
+        if not pivot_size > MIN_PIVOT:
             return 0.0
         pivot[k] = row
         if row != k:

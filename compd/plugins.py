@@ -29,7 +29,7 @@ _KIND = {GAUGES: "driver", SIMULATED_GAUGES: "simulated device", EFFECTS: "effec
 # Placeholder in a refusal for the hash of a file, which the reader computes.
 HASH_PLACE = "HASH"
 # Far above any hand-written file.
-_LARGEST_CODE_BYTES = 10_000_000
+_MAX_CODE_BYTES = 10_000_000
 _PATH = re.compile(r"^(?P<file>/.+\.py):(?P<name>[A-Za-z_]\w*)$")
 
 
@@ -184,7 +184,7 @@ class ListedCode:
                 )
             )
         try:
-            content = read_small_file(file, _LARGEST_CODE_BYTES)
+            content = read_small_file(file, _MAX_CODE_BYTES)
         except OSError as error:
             raise PluginError(
                 Problem(
@@ -217,7 +217,7 @@ class ListedCode:
 
 def hash_of_code(file: Path) -> str:
     """The hash with which a file is listed. Raises OSError where it cannot be read."""
-    return hashlib.sha256(read_small_file(file, _LARGEST_CODE_BYTES)).hexdigest()
+    return hashlib.sha256(read_small_file(file, _MAX_CODE_BYTES)).hexdigest()
 
 
 def _module_name(file: Path) -> str:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Columns: TypeAlias = Mapping[str, Sequence[Any] | NDArray[Any]]
 
 # More rows than this are not shown in a notebook; the data frame has all.
-MOST_ROWS = 12
+MAX_ROWS = 12
 # Lines in a grey that is seen on white and on black: notebooks have both.
 _ROW = '<tr style="border-bottom:1px solid rgba(128,128,128,.4);vertical-align:top">'
 
@@ -50,13 +50,13 @@ def html_table(verdict: str, columns: Columns, remarks: Iterable[str] = ()) -> s
     head = "".join(_cell("th", name, numeric=_is_numeric(values)) for name, values in columns.items())
     body = "".join(
         _ROW + "".join(_cell("td", _text(value), numeric=_is_number(value)) for value in row) + "</tr>"
-        for row in rows[:MOST_ROWS]
+        for row in rows[:MAX_ROWS]
     )
     table = (
         '<table style="border-collapse:collapse;font-variant-numeric:tabular-nums">'
         f"<thead>{_ROW}{head}</tr></thead><tbody>{body}</tbody></table>"
     )
-    more = [f"{len(rows) - MOST_ROWS} more rows; to_dataframe() has all of them"] if len(rows) > MOST_ROWS else []
+    more = [f"{len(rows) - MAX_ROWS} more rows; to_dataframe() has all of them"] if len(rows) > MAX_ROWS else []
     return (
         f'<div style="overflow-x:auto"><p style="max-width:50em"><strong>{escape(verdict)}</strong></p>'
         + (table if rows else "")

@@ -20,7 +20,7 @@ from compd.commissioning.line_budget import LineBudget, line_budgets
 from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.configuration import Configuration
 from compd.errors import KinematicsError
-from compd.live.acquisition import LEAST_MOTION, LEAST_WAY_MM, UNIT_LIMITS, WAY_SHARE
+from compd.live.acquisition import MIN_MOTION, MIN_WAY_MM, UNIT_LIMITS, WAY_SHARE
 from compd.live.machine import RESTED
 from compd.machine_builder import build_model
 from compd.model import MachineModel
@@ -311,7 +311,7 @@ def _gap(figures: Figures) -> str:
     counting = [j.gauge for j in jumps if not _is_absolute(figures.configuration, j.gauge)]
     if not counting:
         return ""
-    error_mm = WAY_SHARE * GAP_WAY_MM + LEAST_WAY_MM
+    error_mm = WAY_SHARE * GAP_WAY_MM + MIN_WAY_MM
     return (
         f"in a gap in which the links move by {GAP_WAY_MM:g} mm, {error_mm:.2g} mm of a scale: "
         f"{error_mm * figures.leverage('scale'):.2f} mm at the tip; at rest {_at_rest(figures)}"
@@ -325,7 +325,7 @@ def _at_rest(figures: Figures) -> str:
         names = {j.gauge.partition(".")[0] for j in figures.jumps if any(x.startswith(kind) for x in j.measures)}
         if names:
             lost_um = (
-                LEAST_MOTION * max(tolerance_mm(figures.configuration.noise_of(name).um) for name in names) * UM_PER_MM
+                MIN_MOTION * max(tolerance_mm(figures.configuration.noise_of(name).um) for name in names) * UM_PER_MM
             )
             parts.append(f"{kind} {lost_um:.3g} um, {lost_um * figures.leverage(kind):.3g} um at the tip")
     return "; ".join(parts)

@@ -23,7 +23,7 @@ _CYCLES = 200
 # Period (s) of the measured cycles: half a second in all, with other work of the processor in between.
 _PERIOD_S = 2.5e-3
 # Largest share of the period for a cycle; more leaves too little time for drivers, clients and other programs.
-LARGEST_SHARE = 0.5
+MAX_SHARE = 0.5
 _RAW_MM = 10.0
 _NOISE_MM = 1e-4
 _QUANTITY = 20.0
@@ -115,9 +115,9 @@ def _compensation_time(machine: MachineModel, quantities: Sequence[str], clock: 
 def cycle_warnings(configuration: Configuration, cycle: CycleTime) -> list[Problem]:
     """A warning about a rate that leaves the loop no time."""
     rate_hz = configuration.loop.rate_hz
-    if cycle.median_s * rate_hz <= LARGEST_SHARE:
+    if cycle.median_s * rate_hz <= MAX_SHARE:
         return []
-    fastest_hz = LARGEST_SHARE / cycle.median_s
+    fastest_hz = MAX_SHARE / cycle.median_s
     return [
         Problem(
             where=configuration.where("loop", "rate_hz"),

@@ -13,7 +13,7 @@ from compd.setpoint_states import State, state_named
 
 # Rate (Hz) of setpoints for a look; the daemon makes hundreds a second.
 _RATE_HZ = 10.0
-_MOST_GAUGES = 5
+_MAX_GAUGES = 5
 
 
 class Health(IntEnum):
@@ -106,12 +106,12 @@ def worst_gauges(gauges: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     for (name, quality, detail), channels in bad.items():
         who = f"{name}.{channels[0]}" if len(channels) == 1 else f"{name}, {len(channels)} channels"
         words.append(f"{who}: {quality}" + (f" ({detail})" if detail else ""))
-    more = [f"and {len(words) - _MOST_GAUGES} more"] if len(words) > _MOST_GAUGES else []
-    return (*words[:_MOST_GAUGES], *more)
+    more = [f"and {len(words) - _MAX_GAUGES} more"] if len(words) > _MAX_GAUGES else []
+    return (*words[:_MAX_GAUGES], *more)
 
 
 def warnings_of(gauges: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     """Warnings about gauges that are believed nevertheless."""
     words = [f"{gauge['channel']}: warning: {gauge['warning']}" for gauge in gauges if gauge.get("warning")]
-    more = [f"and {len(words) - _MOST_GAUGES} more warnings"] if len(words) > _MOST_GAUGES else []
-    return (*words[:_MOST_GAUGES], *more)
+    more = [f"and {len(words) - _MAX_GAUGES} more warnings"] if len(words) > _MAX_GAUGES else []
+    return (*words[:_MAX_GAUGES], *more)

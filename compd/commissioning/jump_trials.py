@@ -18,7 +18,7 @@ from compd.configuration import Configuration, resolve_channel
 from compd.errors import Problem
 from compd.gauge import GaugeOptions
 from compd.lines import definition_of
-from compd.live.acquisition import FASTEST_ROUND_S, MotionLimits, unseen_jump_mm
+from compd.live.acquisition import MIN_ROUND_S, MotionLimits, unseen_jump_mm
 from compd.stated_noise import tolerance_mm
 
 # Delay (s) of the next reading, and perhaps of its sampling, against the plan. Measured on the shipped tripod,
@@ -167,7 +167,7 @@ def _without_identity(identities: Mapping[str, str | None]) -> list[str]:
 
 
 def _poll_s(budget: LineBudget) -> float:
-    return max(budget.usual_s, budget.line.poll_every_s, FASTEST_ROUND_S) if budget.known else math.nan
+    return max(budget.usual_s, budget.line.poll_every_s, MIN_ROUND_S) if budget.known else math.nan
 
 
 def _jump(gauge: str, measures: tuple[str, ...], poll_s: float, options: GaugeOptions, noise_um: float) -> FeignedJump:

@@ -11,7 +11,7 @@ from compd.lines import polled_definition
 
 # Largest skew (s) of lengths without a warning, if neither limited nor latched: at 1 mm/s, slow for a moving machine,
 # it makes 20 um, and a comparator shows a hundredth of that.
-LARGEST_SPREAD_S = 0.02
+MAX_SPREAD_S = 0.02
 
 
 def budget_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) -> list[Problem]:
@@ -44,13 +44,13 @@ def _skew_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) 
                     next_step="raise it, or the baud rate, or spread the gauges over more lines",
                 )
             )
-        elif allowed_s is None and budget.spread_s > LARGEST_SPREAD_S:
+        elif allowed_s is None and budget.spread_s > MAX_SPREAD_S:
             problems.append(
                 Problem(
                     where=configuration.where("lines", budget.name),
                     what=f"its lengths are measured {budget.spread_s * 1e3:.0f} ms apart within a round: on the move "
                     "they do not belong together, and no setpoint is refused for it",
-                    allowed=f"{LARGEST_SPREAD_S * 1e3:g} ms, or a limit",
+                    allowed=f"{MAX_SPREAD_S * 1e3:g} ms, or a limit",
                     next_step="set `round_trigger` where the devices can latch, or say by `loop.skew_s` how far apart "
                     "lengths may be",
                 )

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 NO_QUANTITY = "a quantity that an effect needs is empty"
 OUTLIER = "beyond all noise"
 # Trends that a notebook shows.
-MOST_TRENDS = 4
+MAX_TRENDS = 4
 
 
 class Size(NamedTuple):
@@ -266,7 +266,7 @@ class Comparison:
             f"{self.rows_used} rows used, {self.rows - self.rows_used} not. Noise floor: {self.floor.how}.",
             *([self.basis] if self.basis else []),
             *([self.floor.contradiction] if self.floor.contradiction else []),
-            *(trend.text for trend in self.trends[:MOST_TRENDS]),
+            *(trend.text for trend in self.trends[:MAX_TRENDS]),
         ]
         return html_table(self.verdict, table, remarks)
 

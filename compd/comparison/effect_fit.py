@@ -48,7 +48,7 @@ ROUNDS = 8
 # A step that changes the prediction by less than this share of the residual ends the iteration.
 CONVERGED = 1e-6
 # um; below this a residual is rounding.
-LEAST_RMS_UM = 1e-9
+MIN_RMS_UM = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,6 +204,6 @@ def _gauss_newton(
         step = solve_least_squares(G, whitened.ravel(), weights)
         theta, nuisance = theta + step[:P], nuisance + step[P:]
         change_um = rms(G_um[use] @ step)
-        if change_um <= CONVERGED * max(rms(residual_um[use]), LEAST_RMS_UM):
+        if change_um <= CONVERGED * max(rms(residual_um[use]), MIN_RMS_UM):
             break
     return theta, nuisance, residual_um

@@ -15,11 +15,11 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.initial_states import initial_state_columns
 from compd.model.effects import FittedEffect
-from compd.statistics import LEAST_SIGMA, column_norms, robust_regression, solve_least_squares, trimmed_scale
+from compd.statistics import MIN_SIGMA, column_norms, robust_regression, solve_least_squares, trimmed_scale
 from compd.units import UM_PER_MM
 
 # What is fitted along is an effect's own where the effect leaves less of it than this share.
-LEAST_SHARE = 1e-4
+MIN_SHARE = 1e-4
 
 
 class FittedAlong(NamedTuple):
@@ -58,7 +58,7 @@ def nuisance_beside(
     norms = column_norms(R)
     R = R / norms
     _, sizes, combinations = np.linalg.svd(R - A @ solve_least_squares(A, R), full_matrices=False)
-    return np.asarray((columns_um / norms) @ combinations[sizes > LEAST_SHARE].T)
+    return np.asarray((columns_um / norms) @ combinations[sizes > MIN_SHARE].T)
 
 
 def nuisance_parameters(
@@ -89,5 +89,5 @@ def _fitted_parameters(aligned: AlignedRecording, G: FloatArray, residual_um: Fl
     if not G.shape[2] or not use.any():
         return np.zeros(G.shape[2])
     # of attitudes beside lengths each coordinate counts in its own scatter: urad and um have no size in common
-    size_um = np.maximum(trimmed_scale(residual_um[use]), LEAST_SIGMA) if aligned.with_attitude else np.ones(1)
+    size_um = np.maximum(trimmed_scale(residual_um[use]), MIN_SIGMA) if aligned.with_attitude else np.ones(1)
     return robust_regression(G[use] / size_um[:, None], residual_um[use] / size_um, huber=aligned.criteria.huber_sigmas)

@@ -8,7 +8,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.criteria import ComparisonCriteria
-from compd.statistics import LEAST_SIGMA, replicate_pairs, robust_sigma, trimmed_scale
+from compd.statistics import MIN_SIGMA, replicate_pairs, robust_sigma, trimmed_scale
 
 
 class OutlierLimits(NamedTuple):
@@ -47,13 +47,13 @@ def outlier_limits(
         return OutlierLimits(np.zeros_like(nowhere), nowhere, None)
     middle_um = np.median(residual_um[use], axis=0)
     sigma_um = robust_sigma(residual_um[use] - middle_um)
-    limit_um = criteria.outlier_sigmas * np.maximum(sigma_um, LEAST_SIGMA)
+    limit_um = criteria.outlier_sigmas * np.maximum(sigma_um, MIN_SIGMA)
     pairs = replicate_pairs(use & np.isfinite(residual_um).all(axis=1), visit, criteria.max_rows_of_visit)
     if pairs is None:
         return OutlierLimits(middle_um, limit_um, None)
     # of few repeats, an outlier among them makes most of the scatter, which then must not be its own measure
     noise_um = np.minimum(trimmed_scale(pairs.difference(residual_um), pairs.weight), sigma_um)
-    near_um = criteria.outlier_sigmas * np.sqrt(2.0) * np.maximum(noise_um, LEAST_SIGMA)
+    near_um = criteria.outlier_sigmas * np.sqrt(2.0) * np.maximum(noise_um, MIN_SIGMA)
     return OutlierLimits(middle_um, limit_um, near_um)
 
 

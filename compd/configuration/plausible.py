@@ -15,8 +15,8 @@ from compd.errors import Problem
 from compd.gauge import GaugeOptions
 
 # Smallest size (mm) of a machine: if all coordinates of a list are below it, they are probably in metres.
-_SMALLEST_MACHINE_MM = 5.0
-_LARGEST_MACHINE_MM = 1e5
+_MIN_MACHINE_MM = 5.0
+_MAX_MACHINE_MM = 1e5
 # Longest rotation vector (rad): pi, rounded up.
 _PI = 3.15
 _DEGREES = "a rotation vector is no longer than pi. In degrees?"
@@ -195,14 +195,14 @@ def _points_out_of_scale(document: Document, sections: Mapping[str, Any]) -> Ite
         points = [value for _, value in _values(sections, [*map(str, location), "*", "*"], ())]
         points = points or [value for _, value in _values(sections, [*map(str, location), "*"], ())]
         largest_mm = max(map(abs, points), default=math.nan)
-        if 0 < largest_mm < _SMALLEST_MACHINE_MM:
+        if 0 < largest_mm < _MIN_MACHINE_MM:
             yield Problem(
                 where=document.where(location),
                 what="is not plausible: no coordinate is larger than a few millimetres",
                 value=f"at most {largest_mm:g} mm",
                 next_step="in metres? then multiply every number by 1000",
             )
-        elif largest_mm > _LARGEST_MACHINE_MM:
+        elif largest_mm > _MAX_MACHINE_MM:
             yield Problem(
                 where=document.where(location),
                 what="is not plausible: no machine is a hundred metres large",

@@ -22,7 +22,7 @@ NO_NUMBER = DAMAGED | NO_ANSWER | NO_VALUE
 
 BY_TCP = "TCP's own checksum keeps it from the driver"
 IN_VIRTUAL_TIME = "in virtual time"
-MOST_EXCHANGES = 64  # most exchanges of a driver in one poll
+MAX_EXCHANGES = 64  # most exchanges of a driver in one poll
 REAL_TIME_TRIES = 3
 
 Verdict = Literal["pass", "FAIL", "-"]
@@ -100,7 +100,7 @@ def violations_of(poll: Poll, allowed: frozenset[Quality]) -> list[str]:
 
 def every_reply(fault: Fault) -> Sequence[Fault]:
     """The fault for each of the replies of one poll."""
-    return [fault] * MOST_EXCHANGES
+    return [fault] * MAX_EXCHANGES
 
 
 def one_poll_each(*tried_faults: Fault) -> list[Sequence[Fault]]:

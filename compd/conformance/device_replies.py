@@ -19,7 +19,7 @@ SLACK_DIGITS = 0.25
 ROUNDING = 1e-9  # share of the value or the range: floating point
 NEAR = 1e-6  # share of the value or the range: distance of values of another channel, or beyond an end
 PART_OF_A_DIGIT = 1 / 4096  # accuracy of the search for the ends of a digit
-SMALLEST_STEP = 1e-10  # share of the range: start of the search for a digit
+MIN_STEP = 1e-10  # share of the range: start of the search for a digit
 BEYOND = 1e3  # multiple of the value or the range at which an unchanged display shows the device's end
 _LEADING = re.compile(rb"(?<!\d)(?<!\d[.,])( *)([+-]?)([ 0]*)(?=\d)")
 _EXPONENT_OF_ZERO = re.compile(rb"(?<=\d[eE])-(?=0+(?!\d))")
@@ -108,7 +108,7 @@ class DeviceReplies:
         value = self._sensors.values[channel]
         ends = []
         for direction in (-1.0, 1.0):
-            step = max(self.digit.get(channel, 0.0) / 4, SMALLEST_STEP * self._scale(channel))
+            step = max(self.digit.get(channel, 0.0) / 4, MIN_STEP * self._scale(channel))
             alike = 0.0
             while self._shows(exchanges, {channel: value + direction * step}):
                 alike, step = step, 2 * step

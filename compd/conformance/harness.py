@@ -17,7 +17,7 @@ from compd.live.acquisition import NO_REPLY_PENDING
 LOOKS = 24  # fault-free polls at the start
 DIGITS_FROM = 2  # number of the first of them for learning the device's digit
 STAMP_ROUNDING_S = 1e-9
-MOST_RECOVERING_POLLS = 4
+MAX_RECOVERING_POLLS = 4
 SETTLING_DRAINS = 3  # each waits for a timeout of silence, longer than any reply here is late
 # Time after a request without an answer, in line timeouts: the wait for the reply, and one for draining.
 ASKED_AGAIN_TIMEOUTS = 2.0
@@ -112,7 +112,7 @@ class ConformanceSession:
     def recover(self) -> tuple[int, Poll]:
         """Poll without faults until all is good; return the number of polls and the last one."""
         polls = [self.poll()]
-        while polls[-1].qualities != {Quality.OK} and len(polls) < MOST_RECOVERING_POLLS:
+        while polls[-1].qualities != {Quality.OK} and len(polls) < MAX_RECOVERING_POLLS:
             polls.append(self.poll())
         last = polls[-1]
         wrong = tuple(text for poll in polls for text in poll.wrong + poll.undetectable)

@@ -35,10 +35,10 @@ ENCODINGS: Mapping[str, Encoding] = {
     "decimal": lambda check: f"{int.from_bytes(check, 'big'):03d}".encode(),
     "decimal, two digits": lambda check: f"{int.from_bytes(check, 'big') % 100:02d}".encode(),
 }
-MOST_BEFORE = 3  # most bytes of a head outside the checksum
-MOST_BETWEEN = 1  # most bytes between the covered part and the checksum: NMEA's *
-MOST_BEHIND = 3  # most bytes of a terminator
-FEWEST_SAMPLES = 4  # fewest different samples: n of them fit a wrong algorithm by chance once in 256^n
+MAX_BEFORE = 3  # most bytes of a head outside the checksum
+MAX_BETWEEN = 1  # most bytes between the covered part and the checksum: NMEA's *
+MAX_BEHIND = 3  # most bytes of a terminator
+MIN_SAMPLES = 4  # fewest different samples: n of them fit a wrong algorithm by chance once in 256^n
 
 
 class ReplyChecksum(NamedTuple):
@@ -68,9 +68,9 @@ class ReplyChecksum(NamedTuple):
 def checksum_in(samples: Sequence[bytes]) -> ReplyChecksum | None:
     """The checksum of all replies; None if no known one fits."""
     different = list(dict.fromkeys(samples))
-    if len(different) < FEWEST_SAMPLES:
+    if len(different) < MIN_SAMPLES:
         return None
-    places = itertools.product(range(MOST_BEFORE + 1), range(MOST_BETWEEN + 1), range(MOST_BEHIND + 1))
+    places = itertools.product(range(MAX_BEFORE + 1), range(MAX_BETWEEN + 1), range(MAX_BEHIND + 1))
     for (first, between, behind), algorithm, encoding in itertools.product(places, ALGORITHMS, ENCODINGS):
         checksum = ReplyChecksum(algorithm, encoding, first, between, behind)
         if all(len(reply) > behind + 4 and checksum.repaired(reply) == reply for reply in different):
@@ -78,7 +78,7 @@ def checksum_in(samples: Sequence[bytes]) -> ReplyChecksum | None:
     return None
 
 
-FEWEST_ALIKE = 6  # fewest replies of the same length for learning the constant parts
+MIN_ALIKE = 6  # fewest replies of the same length for learning the constant parts
 SUBSTITUTES = b"XQZ"  # letters without a meaning as unit or judgement
 # mm in one of them
 UNIT_WORDS = {b"mm": 1.0, b"um": 1e-3, b"nm": 1e-6, b"cm": 10.0, b"in": 25.4, b"inch": 25.4, b"mil": 0.0254, b"m": 1e3}
@@ -113,7 +113,7 @@ class ReplyText:
         self._request = request
         self._alike = [reply for reply in replies if len(reply) == len(base)]
         self._constant = [
-            len(self._alike) >= FEWEST_ALIKE and all(reply[index] == byte for reply in self._alike)
+            len(self._alike) >= MIN_ALIKE and all(reply[index] == byte for reply in self._alike)
             for index, byte in enumerate(base)
         ]
         self._checksum: ReplyChecksum | None = checksum_in([base, *self._alike])

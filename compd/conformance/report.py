@@ -106,7 +106,7 @@ def run_case(case: Case, session: ConformanceSession, subject: Subject) -> CaseR
     return result
 
 
-SLOWEST_BAUD = 1200  # slowest rate of all devices in the shipped table
+MIN_BAUD = 1200  # slowest rate of all devices in the shipped table
 SLOW_TIMEOUT_S = 0.3
 
 
@@ -221,7 +221,7 @@ def driver_under_test(
 def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iterator[tuple[str, CaseResult]]:
     """Results of every case on every kind of wire, as they arrive: (wire, result).
 
-    First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; once at SLOWEST_BAUD. A driver that fails
+    First in virtual time, then, with `on_real_wires`, on ptys and TCP ports; once at MIN_BAUD. A driver that fails
     in one of FIRST_CASES is tried no further.
     """
     with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
@@ -229,8 +229,8 @@ def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iter
             yield wire, result
             if result.verdict == "FAIL" and result.case in FIRST_CASES:
                 return
-        slow = driver.virtual(CHARACTER_BITS / SLOWEST_BAUD)
-        yield "virtual time", slowest_line(slow, SLOWEST_BAUD)
+        slow = driver.virtual(CHARACTER_BITS / MIN_BAUD)
+        yield "virtual time", slowest_line(slow, MIN_BAUD)
         if driver.unsolicited:
             yield "virtual time", opened_within_a_line(*driver.virtual_with_wire(CHARACTER_S))
             yield "virtual time", seldom_read(*driver.virtual_with_wire())
@@ -244,9 +244,9 @@ def run_conformance(driver: DriverUnderTest, on_real_wires: bool = True) -> Iter
             session = driver.real(kind, Path(temporary))
             subject = driver.subject(polled_kind(kind).over_network, False)
             yield from _cases_on(kind, session, subject)
-        session = driver.real(driver.kinds()[0], Path(temporary), baud=SLOWEST_BAUD, timeout_s=SLOW_TIMEOUT_S)
+        session = driver.real(driver.kinds()[0], Path(temporary), baud=MIN_BAUD, timeout_s=SLOW_TIMEOUT_S)
         try:
-            yield driver.kinds()[0], slowest_line(session, SLOWEST_BAUD)
+            yield driver.kinds()[0], slowest_line(session, MIN_BAUD)
         finally:
             session.close()
 

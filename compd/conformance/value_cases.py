@@ -24,11 +24,11 @@ from compd.conformance.peer import GOLDEN
 LARGEST = 1e7  # in the channel's unit; above the range of every gauge
 STEPS_PER_DECADE = (1.0, 2.0, 5.0)
 BISECTIONS = 60  # between two steps of a decade, down to the last digit
-MOST_POWERS = 32  # of 2 digits, where counters and signs roll over
+MAX_POWERS = 32  # of 2 digits, where counters and signs roll over
 MANY_EXCHANGES = 10_000
-FEWEST_POLLS = 3000  # a driver that fails every thousandth time fails three times
+MIN_POLLS = 3000  # a driver that fails every thousandth time fails three times
 WATCHED_POLLS = 300  # number of them in which no clock may be called
-MOST_WITHOUT_VALUE = 0.02  # share of them: single numbers with another meaning, such as 85.0 degC of a DS18B20
+MAX_WITHOUT_VALUE = 0.02  # share of them: single numbers with another meaning, such as 85.0 degC of a DS18B20
 SMALL_STEPS = 20
 
 
@@ -139,7 +139,7 @@ def _violations_at(session: ConformanceSession, channel: str, value: float) -> t
 def _special_values(digit: float, lowest: float, highest: float) -> Iterator[float]:
     """0, and numbers of digits at which a carry, a counter or a sign rolls over, inside the range."""
     numbers = {0.0, 1.0, 2.0}
-    for power in range(MOST_POWERS):
+    for power in range(MAX_POWERS):
         numbers |= {2.0**power - 1, 2.0**power, 10.0**power - 1, 10.0**power, 5 * 10.0**power}
     for number in sorted(numbers):
         for value in (number * digit, -number * digit):
@@ -170,7 +170,7 @@ def _many_polls(session: ConformanceSession, subject: Subject) -> CaseResult:
     violations: list[str] = []
     without = 0
     session.recover()
-    polls = max(FEWEST_POLLS, MANY_EXCHANGES // max(1, len(session.exchanges)))
+    polls = max(MIN_POLLS, MANY_EXCHANGES // max(1, len(session.exchanges)))
     for number in range(polls):
         for index, name in enumerate(session.sensors.values):
             share = (number * GOLDEN + index * 0.0719) % 1.0
@@ -184,7 +184,7 @@ def _many_polls(session: ConformanceSession, subject: Subject) -> CaseResult:
         violations += [f"poll {number + 1}: {text}" for text in violations_of(poll, GOOD | NO_VALUE)]
         violations += [f"poll {number + 1}: {text}" for text in poll.undetectable]
         without += poll.qualities != GOOD
-    if without > MOST_WITHOUT_VALUE * polls:
+    if without > MAX_WITHOUT_VALUE * polls:
         violations.append(f"{without} of them without a value, in a range where each number was read before")
     session.recover()
     return result_of(case, GOOD | NO_VALUE, f"ok; {without} of {polls} without a value", violations)

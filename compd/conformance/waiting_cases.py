@@ -18,10 +18,10 @@ from compd.conformance.harness import ConformanceSession
 from compd.conformance.virtual import GAP_S, TURNAROUND_S
 
 LOOKS = 5
-LONGEST_BLOCK_S = 0.05  # by the computer's clock, in each of LOOKS polls; above the share of other threads
+MAX_BLOCK_S = 0.05  # by the computer's clock, in each of LOOKS polls; above the share of other threads
 IDLE_TIMEOUTS = 0.5  # in line timeouts: wait in a poll with immediate replies
 EXCHANGE_S = GAP_S + TURNAROUND_S  # duration of an exchange on a virtual line
-LONGEST_WAIT_S = 10.0  # longest wait for a missing reply
+MAX_WAIT_S = 10.0  # longest wait for a missing reply
 FAULTS = (
     faults.SILENT, faults.cut(0.5), faults.garbage_before(), faults.garbage_inside(), faults.late(1.5),
     faults.replaced(b"ERR\r\n"),
@@ -48,7 +48,7 @@ def waits(session: ConformanceSession, subject: Subject) -> CaseResult:
         if poll.ok and idle_s > IDLE_TIMEOUTS * session.wire.timeout_s:
             text = f"a poll takes {poll.duration_s:.3g} s although its replies come at once: it waits {idle_s:.3g} s"
             return CaseResult(case, required, text, "FAIL")
-    if min(blocked_s) > LONGEST_BLOCK_S:
+    if min(blocked_s) > MAX_BLOCK_S:
         text = f"`read` stands still for {min(blocked_s):.3g} s while the line does not wait"
         return CaseResult(case, required, text, "FAIL")
     return CaseResult(case, required, f"{poll.duration_s:.3g} s on the line's clock", "pass")
@@ -68,7 +68,7 @@ def waits_after_faults(session: ConformanceSession, subject: Subject) -> CaseRes
         longest_s = max(longest_s, poll.duration_s)
         session.settle()
         session.recover()
-    if longest_s > LONGEST_WAIT_S:
+    if longest_s > MAX_WAIT_S:
         return CaseResult(case, required, f"waits {longest_s:.3g} s longest wait for a missing reply", "FAIL")
     return CaseResult(case, required, f"at most {longest_s:.3g} s on the line's clock", "pass")
 

@@ -11,7 +11,7 @@ from compd.diagnosis.verdict import Diagnosis
 from compd.planning import measurement_of_constant, measurement_to_test, next_measurement
 
 # Covariates that the proposal names.
-MOST_COVARIATES = 2
+MAX_COVARIATES = 2
 
 
 def propose_measurement(
@@ -58,7 +58,7 @@ def propose_measurement(
         ]
     follows = [finding for finding in diagnosis.depends_on if not finding.effect and finding.covariate != "time_s"]
     if follows:
-        return [_to_vary(finding) for finding in follows[:MOST_COVARIATES]]
+        return [_to_vary(finding) for finding in follows[:MAX_COVARIATES]]
     constant = diagnosis.constant
     causes = [candidate.effect for candidate in problem.same_as_nuisance]
     if constant is not None and len(causes) > 1:

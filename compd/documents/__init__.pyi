@@ -15,7 +15,7 @@ from .section import unknown_key as unknown_key
 from .section import validate as validate
 from .section import validation_problems as validation_problems
 from .section import value_text as value_text
-from .yaml_reader import LARGEST_BYTES as LARGEST_BYTES
+from .yaml_reader import MAX_BYTES as MAX_BYTES
 from .yaml_reader import Location as Location
 from .yaml_reader import decode as decode
 from .yaml_reader import parse_yaml as parse_yaml

@@ -57,7 +57,7 @@ _PATTERNS = {
     r"^[A-Za-z0-9_]+(\.[A-Za-z0-9_]+)?$": "gauge or gauge.channel, of letters, digits and _",
 }
 # Longest list or mapping (characters) repeated in a message; the line is enough to find a longer one.
-_LONGEST_VALUE = 80
+_MAX_VALUE = 80
 
 
 class Section(BaseModel):
@@ -219,9 +219,9 @@ def value_text(value: Any, location: Location = ()) -> str:
     if holds_secret(location) or has_secret(value):
         return ""
     text = repr(value)
-    if len(text) <= _LONGEST_VALUE:
+    if len(text) <= _MAX_VALUE:
         return text
-    return "" if isinstance(value, dict | list) else f"{text[:_LONGEST_VALUE]} ..."
+    return "" if isinstance(value, dict | list) else f"{text[:_MAX_VALUE]} ..."
 
 
 def _location_in_file(document: Document, root: Location, loc: Location) -> Location:

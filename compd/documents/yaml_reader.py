@@ -28,14 +28,14 @@ Location = tuple[str | int, ...]
 
 # Largest file (bytes). A configuration has 20 kB, a sidecar and a model less; a device or a recording given by mistake
 # has more.
-LARGEST_BYTES = 1_000_000
+MAX_BYTES = 1_000_000
 # Most levels and nodes, aliases unfolded. A configuration has 6 levels and 2000 nodes, so that these fit every file
 # written by a person.
 DEEPEST_LEVEL = 50
-MOST_NODES = 100_000
+MAX_NODES = 100_000
 # Message of PyYAML 6.0.4 at its own limit (1000 levels), since it reads ahead of the levels counted here.
 _LIBRARYS_LIMIT = "maximum nesting depth"
-_LONGEST_KEY = 60
+_MAX_KEY = 60
 # Quoted parts of a file in PyYAML's messages: an alias, a tag, a character.
 _QUOTED = re.compile(r"\s*(?:'[^']*'|\"[^\"]*\")")
 
@@ -83,10 +83,10 @@ def read_text(path: Path, kind: str) -> str:
     """The text of a UTF-8 file. kind : of file, for the message that there is none.
 
     Raises ConfigurationError for what is no such file: it does not exist, is a directory, a device or a pipe, has more
-    than LARGEST_BYTES, is in another encoding.
+    than MAX_BYTES, is in another encoding.
     """
     try:
-        content = read_small_file(path, LARGEST_BYTES)
+        content = read_small_file(path, MAX_BYTES)
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise _unusable(path, f"cannot be read: {why}", next_step=f"give the path of {kind}") from error
@@ -95,8 +95,8 @@ def read_text(path: Path, kind: str) -> str:
 
 def decode(content: bytes, path: Path) -> str:
     """The text of a file's content. Raises ConfigurationError for too large a file or another encoding."""
-    if len(content) > LARGEST_BYTES:
-        raise _unusable(path, "is too large for a file that a person writes", allowed=f"{LARGEST_BYTES} bytes")
+    if len(content) > MAX_BYTES:
+        raise _unusable(path, "is too large for a file that a person writes", allowed=f"{MAX_BYTES} bytes")
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _unusable(f"{path}:1", "is in UTF-16", allowed="UTF-8", next_step="save the file as UTF-8")
     try:
@@ -291,7 +291,7 @@ def _check_structure(text: str, path: Path) -> None:
 
 
 def _check_size(root: yaml.Node, path: Path) -> None:
-    """Raise ConfigurationError if aliases unfold into more than MOST_NODES nodes, counted without unfolding them."""
+    """Raise ConfigurationError if aliases unfold into more than MAX_NODES nodes, counted without unfolding them."""
     sizes: dict[int, int] = {}
 
     def size(node: yaml.Node) -> int:
@@ -300,16 +300,16 @@ def _check_size(root: yaml.Node, path: Path) -> None:
             sizes[id(node)] = 1 + sum(size(child) for child in children)
         return sizes[id(node)]
 
-    if size(root) <= MOST_NODES:
+    if size(root) <= MAX_NODES:
         return
     node = root
-    while large := [child for child in _children(node) if size(child) > MOST_NODES]:
+    while large := [child for child in _children(node) if size(child) > MAX_NODES]:
         node = large[0]
     raise _unusable(
         f"{path}:{node.start_mark.line + 1}",
         "more values than a person writes, aliases unfolded",
         value=f"{float(size(root)):.3g}",
-        allowed=str(MOST_NODES),
+        allowed=str(MAX_NODES),
         next_step="use fewer aliases (`*name`) of aliases",
     )
 
@@ -334,7 +334,7 @@ def _key_text(key: object) -> str:
 
 
 def _shortened(text: str) -> str:
-    return text if len(text) <= _LONGEST_KEY else f"{text[:_LONGEST_KEY]} ..."
+    return text if len(text) <= _MAX_KEY else f"{text[:_MAX_KEY]} ..."
 
 
 def _too_deep(path: Path, line: int) -> Exception:

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 # Longest time (s) of a cluster without workers; dead ones are restarted within it or never.
-LONGEST_WITHOUT_WORKERS_S = 60.0
+MAX_WITHOUT_WORKERS_S = 60.0
 # Fewest tasks for each worker, so that the last ones are shared evenly.
-_FEWEST_BATCHES = 8
+_MIN_BATCHES = 8
 # Interval (s) of checks for a worker while no result comes.
 LOOK_EVERY_S = 5.0
 
@@ -69,7 +69,7 @@ def outcomes(
         One for each item. Where the caller leaves the loop, or Ctrl-C does, what is not done yet is cancelled.
     """
     workers = max(1, len(client.nthreads()))
-    size = max(1, min(batch, len(items) // (workers * _FEWEST_BATCHES)))
+    size = max(1, min(batch, len(items) // (workers * _MIN_BATCHES)))
     lost: list[Item] = []
     # every nth: neighbours, which may all be long, are in different tasks
     batches = math.ceil(len(items) / size)
@@ -109,7 +109,7 @@ def _run(
         future.add_done_callback(done.put)
     without_workers_s = 0.0
     try:
-        while waiting and without_workers_s < LONGEST_WITHOUT_WORKERS_S:
+        while waiting and without_workers_s < MAX_WITHOUT_WORKERS_S:
             try:
                 future = done.get(timeout=LOOK_EVERY_S)
             except Empty:
@@ -182,7 +182,7 @@ def _no_worker(item: object) -> CompdError:
     return _NoWorker(
         Problem(
             where=str(item),
-            what=f"was not worked on: for {LONGEST_WITHOUT_WORKERS_S:g} s the cluster had no worker",
+            what=f"was not worked on: for {MAX_WITHOUT_WORKERS_S:g} s the cluster had no worker",
             next_step="start workers: `dask worker tcp://HOST:PORT`",
         )
     )

@@ -15,16 +15,16 @@ from compd.report import COLOURS, COLUMNS, SERIES_COLOURS, PageTable, style_figu
 
 NO_DRIFTS = PageTable(("",), [("no parameter has been determined on enough campaigns of one machine",)])
 # Most small figures of a page; the table has all numbers.
-MOST_PANELS = 9
+MAX_PANELS = 9
 PANEL_PX = 260
 # Most machines with a colour of their own in one small figure; beyond it only drifting ones have one.
-MOST_COLOURED = len(SERIES_COLOURS)
+MAX_COLOURED = len(SERIES_COLOURS)
 
 
 def plot_drifts(overview: Overview) -> Figure | PageTable:
     """A small figure for each parameter: its value on each campaign of each machine, and the lines of drifts.
 
-    Those that drift come first, then those that most machines have; at most MOST_PANELS, and only parameters with
+    Those that drift come first, then those that most machines have; at most MAX_PANELS, and only parameters with
     enough campaigns to show a drift. NO_DRIFTS where there is none.
     """
     by_name = _panels(overview)
@@ -70,7 +70,7 @@ def _panels(overview: Overview) -> dict[tuple[str, str], list[Drift]]:
         for key, series in by_name.items()
         if (tried := [drift for drift in series if not math.isnan(drift.p_value)])
     ]
-    return {key: by_name[key] for _, _, key in sorted(shown)[:MOST_PANELS]}
+    return {key: by_name[key] for _, _, key in sorted(shown)[:MAX_PANELS]}
 
 
 def plot_errors(overview: Overview) -> Figure | PageTable:
@@ -103,7 +103,7 @@ def plot_errors(overview: Overview) -> Figure | PageTable:
 def _coloured(overview: Overview) -> dict[str, str]:
     """Machine -> its colour: all where they are few, else those that drift or differ, as far as colours go."""
     machines = overview.machines
-    if len(machines) > MOST_COLOURED:
+    if len(machines) > MAX_COLOURED:
         named = [drift.machine for drift in overview.drifts if drift.named]
         named += [outlying.machine for outlying in overview.outlying]
         machines = list(dict.fromkeys(named))

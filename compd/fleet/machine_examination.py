@@ -31,7 +31,7 @@ from compd.recording import EXTERNAL
 from compd.release import __version__
 
 # Most configurations, and models, in a process's cache: a fleet has hundreds of recordings of a few machines.
-MOST_KEPT = 64
+MAX_KEPT = 64
 # number of links -> kinematics
 KINEMATICS = {links: kinematics for kinematics, links in LINKS.items()}
 
@@ -231,13 +231,13 @@ def _wherever(effects: str | Path) -> str:
     return str(Path(effects).absolute()) if Path(effects).exists() else str(effects)
 
 
-@lru_cache(MOST_KEPT)
+@lru_cache(MAX_KEPT)
 def _configuration(path: Path, stamp: tuple[int, int] | None) -> Configuration:
     """The configuration; stamp : of the file, so that it is read again where that has changed."""
     return load(path)
 
 
-@lru_cache(MOST_KEPT)
+@lru_cache(MAX_KEPT)
 def _model(path: Path, stamp: tuple[int, int] | None, machine: str, links: int) -> ModelFile:
     """The model; stamp : of the file, so that it is read again where that has changed."""
     return read_model_file(path, machine, links)

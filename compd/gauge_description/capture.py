@@ -14,7 +14,7 @@ from compd.gauge_tools import open_tapped_stream
 from compd.line_settings import PolledLineSettings
 from compd.lines import StreamLine
 
-LONGEST_REPLY = 1024
+MAX_REPLY = 1024
 # Line ends of devices: CR, LF, ETX, EOT.
 LINE_ENDS = b"\r\n\x03\x04"
 
@@ -131,16 +131,14 @@ def _reply_until_silence(line: StreamLine, request: bytes) -> bytes:
     """The reply to a request, until the line is quiet. Raises LineFault: TIMEOUT without a reply."""
     line.send(request)
     reply = b""
-    while len(reply) < LONGEST_REPLY:
+    while len(reply) < MAX_REPLY:
         try:
             reply += line.receive(1)
         except LineFault as fault:
             if fault.quality is not Quality.TIMEOUT or not reply:
                 raise
             return reply
-    raise LineFault(
-        Quality.MISMATCH, f"no silence within {LONGEST_REPLY} bytes: leave out --out for unsolicited readings"
-    )
+    raise LineFault(Quality.MISMATCH, f"no silence within {MAX_REPLY} bytes: leave out --out for unsolicited readings")
 
 
 def _line_unsolicited(line: StreamLine) -> bytes:
@@ -150,7 +148,7 @@ def _line_unsolicited(line: StreamLine) -> bytes:
     """
     line.listen()
     text, from_its_beginning = b"", False
-    for _ in range(2 * LONGEST_REPLY):
+    for _ in range(2 * MAX_REPLY):
         try:
             byte = line.receive(1)
         except LineFault as fault:
@@ -164,4 +162,4 @@ def _line_unsolicited(line: StreamLine) -> bytes:
         if from_its_beginning:
             return text
         text, from_its_beginning = byte, True
-    raise LineFault(Quality.MISMATCH, f"no end of a line within {2 * LONGEST_REPLY} bytes")
+    raise LineFault(Quality.MISMATCH, f"no end of a line within {2 * MAX_REPLY} bytes")

@@ -15,7 +15,7 @@ from compd.gauge_description.unit_words import unit_before, unit_behind
 from compd.lines import CHECKSUMS, ChecksumField
 
 # Most bytes left out in front (STX, $) and behind (ETX, *); manuals leave out none to three.
-MOST_LEFT_OUT = 3
+MAX_LEFT_OUT = 3
 # Least evidence (bits) for a checksum: a chance fit to all replies below 2^-18, as some 300 are tried.
 ENOUGH_BITS = 18.0
 
@@ -43,7 +43,7 @@ def checksum_end(bodies: Sequence[bytes]) -> ChecksumEnd | None:
 def _fields() -> Iterator[ChecksumField]:
     """Every checksum in every form; the longest ones with the fewest omitted bytes first."""
     digits: tuple[Literal["", "0", "#"], ...] = ("0", "#", "")
-    left_out = sorted(itertools.product(range(MOST_LEFT_OUT + 1), repeat=2), key=sum)
+    left_out = sorted(itertools.product(range(MAX_LEFT_OUT + 1), repeat=2), key=sum)
     fields = [
         ChecksumField("", kind, start, behind, form)
         for start, behind in left_out
@@ -80,7 +80,7 @@ def _converter(field: ChecksumField) -> str:
     return f"%{field.digits}{field.start or ''}{behind}<{field.kind}>"
 
 
-FEWEST_REPLIES = 3
+MIN_REPLIES = 3
 
 
 class ObservedExchange:
@@ -96,13 +96,13 @@ class ObservedExchange:
 
         Raises DescriptionError for too few that differ, and for one that is built differently.
         """
-        if len(set(bodies)) < FEWEST_REPLIES:
+        if len(set(bodies)) < MIN_REPLIES:
             raise DescriptionError(
                 Problem(
                     where=f"replies to {request!r}" if request else "replies",
                     what="too few that differ",
                     value=str(len(set(bodies))),
-                    allowed=f"{FEWEST_REPLIES} or more",
+                    allowed=f"{MIN_REPLIES} or more",
                     next_step="move the gauge between two captures: near zero, far out, and to the other side",
                 )
             )

@@ -34,12 +34,12 @@ _SHOWN_GROUPS = 20
 _SHOWN_MARKERS = 2
 _HALF_DAY = frozenset(("AM", "PM"))
 # Shortest interval (s) of rows: trackers and interferometers write up to 10 000 timed positions a second.
-FASTEST_ROWS_S = 1e-4
+MIN_ROWS_S = 1e-4
 # Serial days of spreadsheets for the years 1954 to 2119. A second has five decimals; rows of one measurement are less
 # than half an hour apart.
 SERIAL_DAYS = (20_000.0, 80_000.0)
 _DAY_DECIMALS = 5
-_LONGEST_DAY_STEP = 0.02
+_MAX_DAY_STEP = 0.02
 _LENGTH_UNITS = "mm, um, nm, cm, m, inch, ft"
 
 
@@ -319,10 +319,10 @@ def _is_doubtful(values: FloatArray, cells: Sequence[str]) -> bool:
     or the days that a spreadsheet counts."""
     steps = np.abs(np.diff(values))
     step = float(np.median(steps[steps > 0])) if steps.any() else 0.0
-    if step < FASTEST_ROWS_S:
+    if step < MIN_ROWS_S:
         return len(values) > 1
     fine = all(len(cell.partition(".")[2]) >= _DAY_DECIMALS for cell in cells if cell)
-    return fine and step < _LONGEST_DAY_STEP and bool(SERIAL_DAYS[0] <= values.min() <= values.max() <= SERIAL_DAYS[1])
+    return fine and step < _MAX_DAY_STEP and bool(SERIAL_DAYS[0] <= values.min() <= values.max() <= SERIAL_DAYS[1])
 
 
 def _time_of_numbers(

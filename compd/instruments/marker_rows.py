@@ -20,7 +20,7 @@ _ZERO = re.compile(r"[-+]?0*\.?0*(?:[eE][-+]?\d+)?")
 # Least distance from the others, as a share of the longest side of their bounding box.
 _FAR = 0.5
 # Fewest other rows for judging a distance from them.
-_FEWEST_OTHERS = 3
+_MIN_OTHERS = 3
 
 
 def marker_rows(cells: Sequence[Sequence[str]], values: FloatArray) -> BoolArray:
@@ -60,7 +60,7 @@ def _is_outlying(values: FloatArray) -> BoolArray:
 def _is_far(values: FloatArray, candidates: BoolArray) -> BoolArray:
     """(N,) which rows are far beyond the box around those that are no candidates."""
     others = values[~candidates & np.isfinite(values).all(axis=1)]
-    if len(others) < _FEWEST_OTHERS or not candidates.any():
+    if len(others) < _MIN_OTHERS or not candidates.any():
         return np.zeros(len(values), dtype=bool)
     low, high = others.min(axis=0), others.max(axis=0)
     with np.errstate(invalid="ignore"):

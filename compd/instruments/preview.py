@@ -21,8 +21,8 @@ from compd.instruments.text_file import decode_text, read_content
 SHOWN_ROWS = 20
 # Longer lines and cells, more columns and groups than these are not shown whole.
 _CELL_WIDTH = 200
-_MOST_COLUMNS = 200
-_MOST_GROUPS = 200
+_MAX_COLUMNS = 200
+_MAX_GROUPS = 200
 
 
 @dataclass(frozen=True)
@@ -68,16 +68,16 @@ def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
     except RecordingError as error:
         problems = error.problems
     role_of = {column: role for role, column in roles.column.items()}
-    columns = table.columns[:_MOST_COLUMNS]
+    columns = table.columns[:_MAX_COLUMNS]
     return ExportPreview(
         export,
         shape=table.shape,
         line=table.line[:SHOWN_ROWS].tolist(),
         rows=_cut(zip(*(cells[:SHOWN_ROWS] for cells in columns), strict=True)),
-        header=[name[:_CELL_WIDTH] for name in (table.header or ())[:_MOST_COLUMNS]],
+        header=[name[:_CELL_WIDTH] for name in (table.header or ())[:_MAX_COLUMNS]],
         roles=[role_of.get(k, "-") for k in range(len(columns))],
         assumed=table.assumed if export is None else export.taken,
-        groups=list(dict.fromkeys(group_labels(table, roles) or ()))[:_MOST_GROUPS],
+        groups=list(dict.fromkeys(group_labels(table, roles) or ()))[:_MAX_GROUPS],
         sheets=_sheets(path, instrument_formats()[table.shape], options.limits),
         problems=problems,
     )

@@ -13,7 +13,7 @@ from compd.instruments.time_stamps import is_stamp
 
 _LOOKED_AT = 500
 # Least share of numbers among a table's cells without dates; more than this share in a short table.
-_LEAST_SHARE = 1 / 2
+_MIN_SHARE = 1 / 2
 _LONGER_ROWS = 3
 _BETWEEN = re.compile(r"[;\t,]|\s+")
 _COMMENT = ("#", "%", "//")
@@ -47,5 +47,5 @@ def no_table(path: Path) -> Problem:
 
 def _has_numbers(cells: Iterable[str], rows: int) -> bool:
     filled = [cell for cell in cells if cell and not is_stamp(cell)]
-    numbers, least = sum(map(is_number, filled)), _LEAST_SHARE * len(filled)
+    numbers, least = sum(map(is_number, filled)), _MIN_SHARE * len(filled)
     return numbers > least or (numbers == least and rows >= _LONGER_ROWS)

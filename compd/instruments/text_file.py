@@ -12,7 +12,7 @@ from compd.instruments.export_problems import ExportProblems
 from compd.instruments.read_limits import ReadLimits
 
 # Largest file (bytes): some four million rows, a day of a tracker with 50 samples a second.
-MOST_BYTES = 256 * 2**20
+MAX_BYTES = 256 * 2**20
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _CONTROL_BYTES = bytes([*range(9), *range(14, 32), 127])
 _UTF8_MARK, _UTF16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
@@ -38,7 +38,7 @@ def read_content(path: Path) -> bytes:
     """The bytes of a regular file. Raises RecordingError if it cannot be read, is empty or too long."""
     problems = ExportProblems(path)
     try:
-        content = read_small_file(path, MOST_BYTES)
+        content = read_small_file(path, MAX_BYTES)
     except OSError as error:
         problems.add(0, f"cannot be read: {error.strerror}", next_step="give the path of the instrument's export")
         raise RecordingError(problems.problems) from error

@@ -20,7 +20,7 @@ DATE_ORDERS = ("dmy", "mdy", "ymd")
 DAY_S = 86400.0
 # Step (s) of a clock in autumn, and the longest interval (s) of the rows around it.
 SET_BACK_S = 3600.0
-_LONGEST_PAUSE_S = 600.0
+_MAX_PAUSE_S = 600.0
 # Two-digit years from here on are of the last century, as POSIX has it.
 _CENTURY = 69
 _ONE_DATE = "all rows of one date"
@@ -140,7 +140,7 @@ def set_back_at(time_s: FloatArray) -> int | None:
     rows = np.flatnonzero(~np.isnan(time_s))
     steps_s = np.diff(time_s[rows])
     falls = np.flatnonzero(steps_s < 0)
-    if len(falls) != 1 or not -SET_BACK_S <= steps_s[falls[0]] <= _LONGEST_PAUSE_S - SET_BACK_S:
+    if len(falls) != 1 or not -SET_BACK_S <= steps_s[falls[0]] <= _MAX_PAUSE_S - SET_BACK_S:
         return None
     return int(rows[falls[0] + 1])
 

@@ -18,12 +18,12 @@ from compd.instruments.time_stamps import set_back_at
 LENGTH = "length"
 # 1 / 0.6745: the standard deviation of a normal distribution over its median absolute deviation.
 _STD_PER_MEDIAN = 1.4826
-LEAST_ROWS = 3
+MIN_ROWS = 3
 # Two tracks in one: least distance (mm) of rows from the next, factor by which the one after is nearer, fewest such
 # rows, and their least share of the rows in between. Two in turn make it of every row, two at random of a quarter.
 _FAR_MM = 0.1
 _BACK = 0.1
-_FEWEST_MIXED = 20
+_MIN_MIXED = 20
 _SHARE_MIXED = 0.15
 
 
@@ -120,7 +120,7 @@ def track_of(export: InstrumentExport) -> Track:
             next_step="export it again and do not sort it: a clock that was set back gives the same times twice, which "
             "--clock-set-back takes apart",
         )
-    if len(export.time_s) < LEAST_ROWS:
+    if len(export.time_s) < MIN_ROWS:
         problems.add(
             0,
             f"{len(export.time_s)} rows have a time and {', '.join(export.axes)}",
@@ -152,7 +152,7 @@ def _mixed_rows(position_mm: FloatArray) -> tuple[int, int] | None:
     next_mm = np.linalg.norm(np.diff(position_mm, axis=0), axis=1)
     second_mm = np.linalg.norm(position_mm[2:] - position_mm[:-2], axis=1)
     to_and_fro = np.flatnonzero((next_mm[:-1] > _FAR_MM) & (second_mm < _BACK * next_mm[:-1]))
-    if len(to_and_fro) < _FEWEST_MIXED:
+    if len(to_and_fro) < _MIN_MIXED:
         return None
     first, last = int(to_and_fro[0]), int(to_and_fro[-1])
     return (first, last) if len(to_and_fro) >= _SHARE_MIXED * (last - first) else None

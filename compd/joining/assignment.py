@@ -19,7 +19,7 @@ LIMIT_SIGMAS = 6.0
 OTHER_SHARE = 0.9
 CLEARLY_WORSE = 2.0
 # Share of the points, or one, that may be without a dwell.
-MOST_WITHOUT = 0.05
+MAX_WITHOUT = 0.05
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.joining.assignment import (
     CLEARLY_WORSE,
     LIMIT_SIGMAS,
-    MOST_WITHOUT,
+    MAX_WITHOUT,
     OTHER_SHARE,
     Assignment,
     NoAssignment,
@@ -32,7 +32,7 @@ from compd.joining.assignment import (
 from compd.joining.distances import RigidMotion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
 
 # Fewest different points; fewer fit among many dwells by chance.
-LEAST_POINTS = 5
+MIN_POINTS = 5
 # Points far apart from which triangles are made: some of them may be at no dwell.
 _CORNERS = 8
 # Triangles that must find the dwells of nearly all points to end the search.
@@ -61,14 +61,14 @@ def assign_by_distance(
     place_of = _places(expected_mm, near_mm)
     place_mm = expected_mm[np.unique(place_of, return_index=True)[1]]
     different_mm = measured_mm[np.unique(_places(measured_mm, near_mm), return_index=True)[1]]
-    if not is_spread(different_mm) and len(different_mm) >= LEAST_POINTS and not in_M:
+    if not is_spread(different_mm) and len(different_mm) >= MIN_POINTS and not in_M:
         return on_one_line(measured_mm)
-    few = min(len(place_mm), len(different_mm)) < LEAST_POINTS
+    few = min(len(place_mm), len(different_mm)) < MIN_POINTS
     if few and not in_M:
         return NoAssignment(
             "too few different places to tell by their distances",
             f"{len(place_mm)} of the machine, {len(different_mm)} of the instrument",
-            f"{LEAST_POINTS} or more that are not on one line",
+            f"{MIN_POINTS} or more that are not on one line",
         )
     if in_M:
         results = _distinct([_grown(place_mm, measured_mm, RigidMotion(np.eye(3), np.zeros(3)), near_mm, in_M)])
@@ -154,7 +154,7 @@ def _grown(
     for _ in range(_ROUNDS):
         distance_mm, now = tree.query(frame(measured_mm), k=2)
         at_place = distance_mm[:, 0] <= limit_mm
-        if at_place.sum() < max(min(LEAST_POINTS, count), count / 2):
+        if at_place.sum() < max(min(MIN_POINTS, count), count / 2):
             return None
         if not in_M:
             if not is_spread(place_mm[now[at_place, 0]]):
@@ -174,7 +174,7 @@ def _grown(
 
 def _may_lack(points: int) -> float:
     """Most points at no dwell, by their number."""
-    return max(1.0, MOST_WITHOUT * points)
+    return max(1.0, MAX_WITHOUT * points)
 
 
 def _distinct(results: Sequence[Assignment | None]) -> list[Assignment]:
@@ -210,7 +210,7 @@ def _decided(
         return NoAssignment(
             f"{len(without)} of {len(measured_mm)} points are at no dwell",
             f"{best.rms_mm:.3g} mm rms of the others",
-            f"one, or {MOST_WITHOUT:.0%}",
+            f"one, or {MAX_WITHOUT:.0%}",
             int(without[0]),
         )
     visits = np.bincount(place_of)

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.joining.distances import LARGEST_RMS_MM, RigidMotion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
+from compd.joining.distances import MAX_RMS_MM, RigidMotion, distances_rms_mm, is_spread, largest_rms_mm, lay_over
 
 _LAST_NUMBER = re.compile(r"(?:.*\D)?0*(\d+)")
 # Most rounds of the robust registration: points far off are left out until their set stays the same.
@@ -126,7 +126,7 @@ def check_names(
     q, p = measured_mm[points], expected_mm[dwell[points]]
     if not in_M and not is_spread(p):
         return NameCheck(np.nan, np.nan, why="too few different places to check the names by their distances")
-    allowed_mm = LARGEST_RMS_MM if in_M else largest_rms_mm(p)
+    allowed_mm = MAX_RMS_MM if in_M else largest_rms_mm(p)
     right = _in_place(p, q, allowed_mm, near_mm) if in_M else _consistent(p, q, allowed_mm, near_mm)
     if not right.any() or not (in_M or is_spread(p[right])):
         return NameCheck(

@@ -19,7 +19,7 @@ from compd.arrays import FloatArray, IntArray
 from compd.joining.assignment import (
     CLEARLY_WORSE,
     LIMIT_SIGMAS,
-    MOST_WITHOUT,
+    MAX_WITHOUT,
     OTHER_SHARE,
     Assignment,
     NoAssignment,
@@ -155,7 +155,7 @@ def _decided(
             f"{best.rms_mm:.3g} mm rms",
             f"{allowed_mm:.3g} mm or less",
         )
-    may_lack = max(1.0, MOST_WITHOUT * len(best.dwell))
+    may_lack = max(1.0, MAX_WITHOUT * len(best.dwell))
     rivals = [
         each
         for each in ordered[1:]
@@ -181,7 +181,7 @@ def _decided(
         return NoAssignment(
             f"{len(without)} of {len(best.dwell)} points fit no dwell in order",
             f"{best.rms_mm:.3g} mm rms of the others",
-            f"one, or {MOST_WITHOUT:.0%}",
+            f"one, or {MAX_WITHOUT:.0%}",
             first,
             int(before[-1]) + 1 if len(before) else 0,
         )

@@ -29,16 +29,16 @@ from compd.joining.shared_motion import SharedMotion
 
 # Least share of the instrument's variance that the scales must explain. On simulated tripods the right offset explains
 # 0.995 or more; unrelated motions, with some twenty moves, reach up to 0.6 by chance.
-LEAST_AGREEMENT = 0.9
+MIN_AGREEMENT = 0.9
 # Least unexplained variance of any other offset: this share of the variance (linear interpolation alone may miss a
 # tenth of it between samples), and this multiple of the best one's.
 ALIKE = 0.01
 CLEARLY_WORSE = 2.0
 # Limits: steps of the common grid of time, candidates,
-_MOST_STEPS = 2**18
+_MAX_STEPS = 2**18
 _CANDIDATES = 8
 # and fewest steps of the shorter recording on that grid.
-_FEWEST_STEPS = 3
+_MIN_STEPS = 3
 # Offsets in one scan of the refinement.
 _SCAN = 201
 # Offsets of a picture: over all at which the two overlap, and near each candidate.
@@ -90,10 +90,10 @@ def estimate_offset(time_s: FloatArray, scale_mm: FloatArray, track: Track) -> C
     # (agreement, offset), best first
     maxima = sorted((_refine(motion, start_s, window_s) for start_s in _candidates_s(motion, window_s)), reverse=True)
     maxima = [maximum for maximum in maxima if np.isfinite(maximum[0])]
-    if not maxima or maxima[0][0] < LEAST_AGREEMENT:
+    if not maxima or maxima[0][0] < MIN_AGREEMENT:
         best = f"{maxima[0][0]:.3f}" if maxima else "none"
         raise motion.refusal(
-            "no offset makes the instrument follow the scales", f"agreement {best}", f"{LEAST_AGREEMENT} or more"
+            "no offset makes the instrument follow the scales", f"agreement {best}", f"{MIN_AGREEMENT} or more"
         )
     agreement, offset_s = maxima[0]
     others = [maximum for maximum in maxima[1:] if abs(maximum[1] - offset_s) > window_s]
@@ -139,7 +139,7 @@ def _candidates_s(motion: SharedMotion, window_s: float) -> list[float]:
     """Offsets at which the two speeds correlate best, each further than `window_s` from the others."""
     track = motion.track
     span_s = np.ptp(motion.all_time_s) + np.ptp(track.time_s)
-    step_s = max(track.period_s, motion.period_s / 8.0, float(span_s) / _MOST_STEPS)
+    step_s = max(track.period_s, motion.period_s / 8.0, float(span_s) / _MAX_STEPS)
 
     def root_speed(time_s: FloatArray, position_mm: FloatArray) -> FloatArray:
         grid_s = np.arange(time_s[0], time_s[-1], step_s)
@@ -149,7 +149,7 @@ def _candidates_s(motion: SharedMotion, window_s: float) -> list[float]:
         return root
 
     spans_s = [float(np.ptp(time_s)) for time_s in (motion.all_time_s, track.time_s)]
-    if min(spans_s) < _FEWEST_STEPS * step_s:
+    if min(spans_s) < _MIN_STEPS * step_s:
         raise motion.refusal(
             "one of the two is too short beside the rows of the other",
             f"the gauges span {spans_s[0]:.3g} s, a row every {motion.period_s:.3g} s; the instrument {spans_s[1]:.3g} "
@@ -172,7 +172,7 @@ def _candidates_s(motion: SharedMotion, window_s: float) -> list[float]:
 
 def _decorrelation_time_s(track: Track) -> float:
     """The shift at which the motion's speed has lost half of its correlation with itself."""
-    speed = np.sqrt(np.linalg.norm(np.diff(track.position_mm, axis=0), axis=1))[:_MOST_STEPS]
+    speed = np.sqrt(np.linalg.norm(np.diff(track.position_mm, axis=0), axis=1))[:_MAX_STEPS]
     autocorrelation = _overlap_correlation(speed, speed)[len(speed) - 1 :]
     below_half = np.flatnonzero(autocorrelation < 0.5)
     return float(below_half[0]) * track.period_s if len(below_half) else float(np.ptp(track.time_s)) / 4.0

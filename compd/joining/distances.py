@@ -19,11 +19,11 @@ from compd.arrays import FloatArray, IntArray, rms
 # Largest rms error (mm) of distances. compd's library has 0.1 mm as the limit for one joint after machining and
 # assembly (`base_joint`, `platform_joint`), and 1 mm for the rest of two registered frames (`reference`). A larger
 # error means another geometry than that of the configuration, or other points.
-LARGEST_RMS_MM = 1.0
+MAX_RMS_MM = 1.0
 # The same as a share of the distances' own rms: any points would fit among places this near to each other.
-LARGEST_SHARE = 0.05
+MAX_SHARE = 0.05
 # Least rms of the points across their best line, as a share of that along it: less fixes no frame.
-LEAST_WIDTH = 0.01
+MIN_WIDTH = 0.01
 # Up to this many points all pairs are compared; of more points, the pairs at these distances in order.
 _ALL_PAIRS = 200
 _LAGS = (1, 2, 3, 5, 8, 13, 21, 34, 55, 89, 144, 233, 377)
@@ -84,7 +84,7 @@ def largest_rms_mm(expected_mm: FloatArray) -> float:
     """Limit of the rms of the distances between these points (N, d)."""
     first, second = pairs_of(len(expected_mm))
     spread_mm = rms(separation_mm(expected_mm[first], expected_mm[second]))
-    return min(LARGEST_RMS_MM, LARGEST_SHARE * spread_mm)
+    return min(MAX_RMS_MM, MAX_SHARE * spread_mm)
 
 
 def is_spread(expected_mm: FloatArray) -> bool:
@@ -94,4 +94,4 @@ def is_spread(expected_mm: FloatArray) -> bool:
     values = np.linalg.svd(expected_mm - expected_mm.mean(axis=0), compute_uv=False)
     if expected_mm.shape[1] == 1:
         return bool(len(np.unique(np.round(expected_mm, 2))) >= 3)
-    return bool(values[1] > max(LEAST_WIDTH * values[0], 1e-3))
+    return bool(values[1] > max(MIN_WIDTH * values[0], 1e-3))

@@ -17,13 +17,13 @@ STILL_MM = 0.001
 NOISE_SIGMAS = 6.0
 # Limit (mm) above which any change is motion, even for noisy scales: `shared_motion.MOTION_MM` for a recording without
 # an instrument.
-LARGEST_LIMIT_MM = 0.01
+MAX_LIMIT_MM = 0.01
 # Least rows and duration (s) of a dwell, below those of a measurement: a machine that reverses also stands still for a
 # moment.
-LEAST_ROWS = 3
-LEAST_S = 1.0
+MIN_ROWS = 3
+MIN_S = 1.0
 # Most missing or wrong rows within a dwell.
-_MOST_GAP_ROWS = 2
+_MAX_GAP_ROWS = 2
 # The quarter quantile of the absolute value of a standard normal variable.
 _QUARTER = 0.3186
 
@@ -60,7 +60,7 @@ def find_dwells(recording: Recording) -> tuple[Dwell, ...]:
 
     Rows with an id in `point` are at rest by what the recording says: successive rows of one visit, without visits of
     one point, are one dwell. Without a column `point` a dwell is a stretch in which every scale stays within STILL_MM,
-    or within what its noise can imitate, for LEAST_ROWS rows and LEAST_S seconds. Rows that a person excluded are in
+    or within what its noise can imitate, for MIN_ROWS rows and MIN_S seconds. Rows that a person excluded are in
     no dwell.
 
     Raises RecordingError if there is none.
@@ -105,7 +105,7 @@ def _no_dwell(recording: Recording) -> Problem:
     return Problem(
         where=str(recording.path),
         what="the machine stands still nowhere",
-        allowed=f"{LEAST_ROWS} rows and {LEAST_S:g} s or more within {STILL_MM * 1e3:g} um on every scale",
+        allowed=f"{MIN_ROWS} rows and {MIN_S:g} s or more within {STILL_MM * 1e3:g} um on every scale",
         next_step="record faster, or dwell longer; where each row is a place at rest, say so with a column `point`",
     )
 
@@ -141,7 +141,7 @@ def _still_stretches(recording: Recording) -> list[tuple[IntArray, str]]:
     first = 0
     while first < len(usable):
         kept = _stretch_from(first, scale_mm, limit_mm)
-        if len(kept) >= LEAST_ROWS and time_s[kept[-1]] - time_s[kept[0]] >= LEAST_S:
+        if len(kept) >= MIN_ROWS and time_s[kept[-1]] - time_s[kept[0]] >= MIN_S:
             rows = _trimmed(kept, scale_mm, limit_mm)
             stretches.append((usable[rows], ""))
             first = kept[-1] + 1
@@ -151,7 +151,7 @@ def _still_stretches(recording: Recording) -> list[tuple[IntArray, str]]:
 
 
 def _stretch_from(first: int, scale_mm: FloatArray, limit_mm: FloatArray) -> IntArray:
-    """Rows from `first` on that stay; up to _MOST_GAP_ROWS rows that leave and are followed by one that stays do not
+    """Rows from `first` on that stay; up to _MAX_GAP_ROWS rows that leave and are followed by one that stays do not
     end the stretch."""
     kept, total_mm, away = [first], scale_mm[first].copy(), 0
     for row in range(first + 1, len(scale_mm)):
@@ -161,7 +161,7 @@ def _stretch_from(first: int, scale_mm: FloatArray, limit_mm: FloatArray) -> Int
             away = 0
         else:
             away += 1
-            if away > _MOST_GAP_ROWS:
+            if away > _MAX_GAP_ROWS:
                 break
     return np.array(kept)
 
@@ -170,7 +170,7 @@ def _trimmed(rows: IntArray, scale_mm: FloatArray, limit_mm: FloatArray) -> IntA
     """The rows without those at either end that still settle: farther from the median than a third of the limit."""
     near = (np.abs(scale_mm[rows] - np.median(scale_mm[rows], axis=0)) <= limit_mm / 3.0).all(axis=1)
     inner = np.flatnonzero(near)
-    if len(inner) < LEAST_ROWS:
+    if len(inner) < MIN_ROWS:
         return rows
     return rows[inner[0] : inner[-1] + 1]
 
@@ -181,9 +181,9 @@ def _limits_mm(scale_mm: FloatArray) -> FloatArray:
     The noise is that of each row against the mean of its neighbours, whose variance is 3/2 sigma^2 at rest. The lower
     quartile of its absolute value is of rows at rest where a quarter of all rows or more are.
     """
-    if len(scale_mm) < LEAST_ROWS:
+    if len(scale_mm) < MIN_ROWS:
         return np.full(scale_mm.shape[1], STILL_MM)
     against_neighbours = np.abs(scale_mm[1:-1] - (scale_mm[2:] + scale_mm[:-2]) / 2.0)
     noise_mm = np.quantile(against_neighbours, 0.25, axis=0) / _QUARTER / np.sqrt(1.5)
-    limits: FloatArray = np.clip(NOISE_SIGMAS * noise_mm, STILL_MM, LARGEST_LIMIT_MM)
+    limits: FloatArray = np.clip(NOISE_SIGMAS * noise_mm, STILL_MM, MAX_LIMIT_MM)
     return limits

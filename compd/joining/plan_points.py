@@ -8,7 +8,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.errors import Problem, RecordingError
-from compd.joining.distances import LARGEST_RMS_MM
+from compd.joining.distances import MAX_RMS_MM
 from compd.joining.monotone_match import CLEAR_MARGIN, match_in_order
 from compd.plan_file import TIP_COLUMNS, WRITTEN_BY
 from compd.tables import ProblemList, read_table
@@ -36,10 +36,10 @@ def dwell_of_plan_rows(expected_mm: FloatArray, plan_mm: FloatArray, path: Path)
 
     expected_mm : (S, 3) places of the dwells in {M}, in the order of time. plan_mm : (K, 3) of the plan's rows, in the
         order of measuring; rows at one place, such as those with different loads, may share a dwell.
-    A dwell may be LARGEST_RMS_MM from the plan's place, no more. Raises RecordingError if none is at any place.
+    A dwell may be MAX_RMS_MM from the plan's place, no more. Raises RecordingError if none is at any place.
     """
     residual_mm = np.linalg.norm(expected_mm[:, None, :] - plan_mm[None, :, :], axis=2)
-    match = match_in_order(residual_mm, LARGEST_RMS_MM)
+    match = match_in_order(residual_mm, MAX_RMS_MM)
     clear = (match.dwell >= 0) & (match.margin >= CLEAR_MARGIN)
     if not clear.any():
         raise RecordingError(
@@ -47,7 +47,7 @@ def dwell_of_plan_rows(expected_mm: FloatArray, plan_mm: FloatArray, path: Path)
                 where=str(path),
                 what="the machine dwelled at no place of the plan, in its order",
                 value=f"nearest {np.nanmin(residual_mm):.3g} mm" if np.isfinite(residual_mm).any() else "",
-                allowed=f"{LARGEST_RMS_MM:g} mm",
+                allowed=f"{MAX_RMS_MM:g} mm",
                 next_step="give the plan that was measured, or join --by order",
             )
         )

@@ -14,9 +14,9 @@ from compd.instruments import Track
 MOTION_MM = 0.01
 # Least independent places per term of the polynomial: in the whole recording, and in the overlapping part.
 _PLACES_PER_TERM = 5
-_LEAST_PLACES_PER_TERM = 2
+_MIN_PLACES_PER_TERM = 2
 # Most rows in the regression.
-_MOST_ROWS = 2000
+_MAX_ROWS = 2000
 
 
 class SharedMotion:
@@ -34,7 +34,7 @@ class SharedMotion:
         complete = np.isfinite(scale_mm).all(axis=1)
         self.track = track
         self.all_time_s, self.all_scale_mm = time_s[complete], scale_mm[complete]
-        thin = slice(None, None, -(-max(len(self.all_time_s), 1) // _MOST_ROWS))
+        thin = slice(None, None, -(-max(len(self.all_time_s), 1) // _MAX_ROWS))
         self.time_s = self.all_time_s[thin]
         self.travel = _travel(self.all_scale_mm)[thin]
         places = min(len(self.time_s), int(self.travel.max(initial=0.0)))
@@ -88,7 +88,7 @@ class SharedMotion:
         """
         travel = self.travel[rows]
         places = min(len(travel), float(np.ptp(travel))) if len(travel) else 0.0
-        if self.terms is None or places < _LEAST_PLACES_PER_TERM * self.terms.shape[1]:
+        if self.terms is None or places < _MIN_PLACES_PER_TERM * self.terms.shape[1]:
             return np.full(len(offsets_s), np.nan)
         basis, _ = np.linalg.qr(self.terms[rows])
         result = np.empty(len(offsets_s))

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 # Silence before a request on any serial line, in characters, as Modbus RTU asks (Serial Line V1.02, 2.5.1.1).
 QUIET_CHARACTERS = 3.5
-SHORTEST_QUIET_RTU_S = 1.75e-3  # the same, above 19200 baud
-SHORTEST_QUIET_ASCII_S = 1e-3
+MIN_QUIET_RTU_S = 1.75e-3  # the same, above 19200 baud
+MIN_QUIET_ASCII_S = 1e-3
 # An FTDI adapter hands over a packet that is not full when its latency timer has run out: 16 ms, if nobody shortens it
 # (FTDI AN232B-04, "Data Throughput, Latency and Handshaking").
 LATENCY_TIMER_S = 16e-3
@@ -49,7 +49,7 @@ def character_bits(form: str) -> int:
 def serial_pace(baud: int, form: str, rtu: bool, turnaround_s: float | None = None) -> Pace:
     """A serial line's pace. `turnaround_s`: never shorter than the silence that a device must keep; None for that."""
     character_s = character_bits(form) / baud
-    quiet_s = max(QUIET_CHARACTERS * character_s, SHORTEST_QUIET_RTU_S if rtu else SHORTEST_QUIET_ASCII_S)
+    quiet_s = max(QUIET_CHARACTERS * character_s, MIN_QUIET_RTU_S if rtu else MIN_QUIET_ASCII_S)
     return Pace(character_s, quiet_s, max(quiet_s, turnaround_s or 0.0))
 
 

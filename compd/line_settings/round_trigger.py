@@ -12,7 +12,7 @@ from compd.text import unescape
 SettleTime = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)]
 Register = Annotated[int, Field(ge=0, le=0xFFFF)]
 # Most registers of one request by function 16 (Modbus Application Protocol V1.1b3, 6.12).
-MOST_WRITTEN = 123
+MAX_WRITTEN = 123
 WRITE_COIL, WRITE_REGISTERS = 5, 16
 BROADCAST = 0
 
@@ -43,7 +43,7 @@ class TriggerWrite(Section):
 
     function: Literal[5, 6, 16] = Field(description="5: one coil, 6: one register, 16: several registers")
     address: Register = Field(description="of the coil or the first register, from 0")
-    values: Annotated[tuple[Register, ...], Field(min_length=1, max_length=MOST_WRITTEN)] = Field(
+    values: Annotated[tuple[Register, ...], Field(min_length=1, max_length=MAX_WRITTEN)] = Field(
         description="what is written; for a coil 0 or 1"
     )
     unit: Annotated[int, Field(ge=0, le=247)] = Field(

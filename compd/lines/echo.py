@@ -11,7 +11,7 @@ from compd.gauge import LineFault, Quality
 
 HINT = "the request itself came back; if the adapter repeats what it sends, write `echo: true` on the line"
 # Two bytes may be a reply by chance, where the request has no more; of a longer request this many are enough.
-FEWEST_BYTES, ENOUGH_BYTES = 2, 5
+MIN_BYTES, ENOUGH_BYTES = 2, 5
 _OF_THE_REPLY = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
 
 
@@ -26,7 +26,7 @@ def is_echo(request: bytes, came: bytes) -> bool:
     """Whether the first bytes that came after a request are the request."""
     if len(came) < len(request):
         return len(came) >= ENOUGH_BYTES and request.startswith(came)
-    return len(request) >= FEWEST_BYTES and came.startswith(request)
+    return len(request) >= MIN_BYTES and came.startswith(request)
 
 
 def explained(fault: LineFault, line: EchoWatch) -> LineFault:

@@ -34,7 +34,7 @@ READ_BITS = (1, 2)
 WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS = 5, 6, 16
 WRITES = (WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS)
 CONFIRMED = 4  # bytes behind the function of a write's confirmation: the address, and what was written
-MOST_REGISTERS, MOST_BITS = 125, 2000  # of one reply
+MAX_REGISTERS, MAX_BITS = 125, 2000  # of one reply
 COIL_ON = 0xFF00
 BROADCAST = 0  # the unit that is all slaves of a serial line
 # Qualities of a slave's answer for a missing register; damage on the wire does not count.
@@ -76,11 +76,11 @@ class SerialMaster(ABC):
         Raises LineFault: TIMEOUT, INCOMPLETE, CRC, MISMATCH (a whole reply to another request), DEVICE_ERROR (with the
         exception's name), LINE_LOST.
         """
-        return self._read((unit, function, address, count), 1, MOST_REGISTERS)
+        return self._read((unit, function, address, count), 1, MAX_REGISTERS)
 
     def read_bits(self, unit: int, function: int, address: int, count: int) -> RegisterReply:
         """`count` bits from `address` of slave `unit` by function 1 or 2. Raises LineFault as `read_registers` does."""
-        return self._read((unit, function, address, count), 8, MOST_BITS)  # eight more make the reply longer
+        return self._read((unit, function, address, count), 8, MAX_BITS)  # eight more make the reply longer
 
     def write(self, unit: int, function: int, address: int, values: Sequence[int], settle_s: float = 0.0) -> float:
         """Write by function 5, 6 or 16; see `RegisterLine`. Raises LineFault as `read_registers` does."""

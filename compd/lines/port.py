@@ -23,7 +23,7 @@ log = structlog.get_logger()
 
 # Pulling a plug raises SerialException (an OSError), a plain OSError or termios.error, depending on the call.
 PORT_FAULTS = (OSError, termios.error)
-MOST_BYTES = 4096  # of one read: far more than any reply
+MAX_BYTES = 4096  # of one read: far more than any reply
 # Polling interval (s) of ports without a file descriptor (rfc2217://, loop://), for which `select` cannot wait.
 SLICE_S = 5e-3
 
@@ -124,7 +124,7 @@ class SerialPort:
                 return self._read_in_slices(timeout_s)
             if not select.select([self._fd], [], [], max(0.0, timeout_s))[0]:
                 return b""
-            data = os.read(self._fd, MOST_BYTES)
+            data = os.read(self._fd, MAX_BYTES)
         except PORT_FAULTS as error:
             raise LineFault(Quality.LINE_LOST, f"read: {error}") from error
         if not data:  # an unplugged adapter is always ready and has no bytes
@@ -208,7 +208,7 @@ class TcpPort:
         try:
             if not select.select([self._socket], [], [], max(0.0, timeout_s))[0]:
                 return b""
-            data = self._socket.recv(MOST_BYTES)
+            data = self._socket.recv(MAX_BYTES)
         except OSError as error:
             raise LineFault(Quality.LINE_LOST, f"read: {error}") from error
         if not data:

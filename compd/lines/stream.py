@@ -13,19 +13,19 @@ from compd.lines.port import Port
 
 SHOWN_BYTES = 40  # of a broken reply, in a fault's detail
 # Longest draining (timeouts) of a line that never becomes quiet.
-MOST_DRAIN_TIMEOUTS = 10
+MAX_DRAIN_TIMEOUTS = 10
 # Least time (s) of a reply's rest on the wire for waiting as a whole instead of byte by byte.
 WORTH_SLEEPING_S = 1e-3
 # Replies of which the longest pause is kept in mind, and so many of them are needed.
-RESTS_IN_MIND, FEWEST_RESTS = 256, 20
+RESTS_IN_MIND, MIN_RESTS = 256, 20
 # The rest of a reply may take so much longer than it ever did beyond its time on the wire, and so much, s: an adapter
 # hands over what has come after its latency timer.
 SLOWER_REST, LATER_REST_S = 1.25, 10e-3
 # Least wait for a reply's rest, as a share of the timeout: a device may pause within a reply.
-SHORTEST_REST = 0.5
+MIN_REST = 0.5
 # Replies in a row with an abandoned rest, or one whose rest comes after all, that show a slower device; a single one
 # may have lost a byte.
-MOST_GIVEN_UP = 5
+MAX_GIVEN_UP = 5
 
 
 def shown(data: bytes) -> str:
@@ -157,14 +157,12 @@ class StreamLine:
         """How long the rest of a reply is waited for, beyond its time on the wire, s.
 
         At most the timeout; less where the rest of so many replies has come sooner. After a reply that was given up
-        sooner and came after all, or `MOST_GIVEN_UP` in a row that did not, it is the timeout until one is whole: a
+        sooner and came after all, or `MAX_GIVEN_UP` in a row that did not, it is the timeout until one is whole: a
         device that has become slower is waited for.
         """
-        if self._given_up >= MOST_GIVEN_UP or len(self._rests_s) < FEWEST_RESTS:
+        if self._given_up >= MAX_GIVEN_UP or len(self._rests_s) < MIN_RESTS:
             return self._timeout_s
-        return min(
-            self._timeout_s, max(SHORTEST_REST * self._timeout_s, SLOWER_REST * max(self._rests_s) + LATER_REST_S)
-        )
+        return min(self._timeout_s, max(MIN_REST * self._timeout_s, SLOWER_REST * max(self._rests_s) + LATER_REST_S))
 
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes. Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST."""
@@ -222,7 +220,7 @@ class StreamLine:
         quiet_s = self._timeout_s if quiet_s is None else quiet_s
         dropped = self._take(len(self._received))
         self._next_line_s = math.nan
-        until_s = self._clock.monotonic() + MOST_DRAIN_TIMEOUTS * self._timeout_s
+        until_s = self._clock.monotonic() + MAX_DRAIN_TIMEOUTS * self._timeout_s
         while (data := self._port.read(quiet_s)) and self._clock.monotonic() < until_s:
             dropped += data
             self._came_after_all()
@@ -308,7 +306,7 @@ class StreamLine:
     def _came_after_all(self) -> None:
         """Bytes have come without a request: behind a reply that was given up they are its rest."""
         if self._given_up:
-            self._given_up = MOST_GIVEN_UP
+            self._given_up = MAX_GIVEN_UP
 
     def _read_more(self, count: int, first_s: float, head: bytes = b"") -> None:
         """Wait for more of a reply of at most `count` bytes, whose first was there at `first_s` (s).

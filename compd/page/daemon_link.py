@@ -22,7 +22,7 @@ STATUS_EVERY_S = 1.0
 # Silence (s) after which the daemon counts as gone: it sends a message in every cycle, in every state.
 SILENT_AFTER_S = 2.0
 _AGAIN_AFTER_S = 1.0
-_LONGEST_LINE_BYTES = 4 * 1024 * 1024
+_MAX_LINE_BYTES = 4 * 1024 * 1024
 
 _log = structlog.get_logger()
 
@@ -119,7 +119,7 @@ class DaemonConnection:
         self._path = path
 
     async def __aenter__(self) -> DaemonConnection:
-        self._reader, self._writer = await asyncio.open_unix_connection(self._path, limit=_LONGEST_LINE_BYTES)
+        self._reader, self._writer = await asyncio.open_unix_connection(self._path, limit=_MAX_LINE_BYTES)
         try:
             _agreed(await self.read(), "the connection")  # the greeting
         except BaseException:  # a cancelled task closes its connection, too

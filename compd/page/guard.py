@@ -31,7 +31,7 @@ from compd.live.service import WRONG_TOKEN_REST_S
 from compd.page.limited_protocol import LimitedProtocol
 
 # Most waiting addresses. Beyond it all addresses wait, since they belong to one attacker.
-_MOST_ADDRESSES = 256
+_MAX_ADDRESSES = 256
 
 
 class WrongTokens:
@@ -45,7 +45,7 @@ class WrongTokens:
         """Whether a token from this address is checked."""
         now_s = self._clock.monotonic()
         self._until_s = {waiting: until_s for waiting, until_s in self._until_s.items() if until_s > now_s}
-        return address not in self._until_s and len(self._until_s) < _MOST_ADDRESSES
+        return address not in self._until_s and len(self._until_s) < _MAX_ADDRESSES
 
     def note(self, address: str) -> None:
         """Note a wrong token from this address."""
@@ -57,7 +57,7 @@ FORM_PATH = "/token"
 # Static files of the form, served without a token.
 FORM_FILES = ("/static/page.css", "/static/token.css", "/static/icon.svg")
 # Most bytes of the form; a token has 32 characters.
-LONGEST_FORM_BYTES = 512
+MAX_FORM_BYTES = 512
 _PAGE = Path(__file__).parent / "static" / "token.html"
 _PROBLEM = "<!-- problem -->"
 
@@ -74,12 +74,12 @@ async def posted_token(request: Request) -> str | None:
     Raises ClientDisconnect where the browser goes meanwhile.
     """
     length = request.headers.get("content-length", "0")
-    if not length.isdecimal() or int(length[:10]) > LONGEST_FORM_BYTES:
+    if not length.isdecimal() or int(length[:10]) > MAX_FORM_BYTES:
         return None
     body = b""
     async for piece in request.stream():
         body += piece
-        if len(body) > LONGEST_FORM_BYTES:
+        if len(body) > MAX_FORM_BYTES:
             return None
     try:
         fields = parse_qs(body.decode("ascii"), max_num_fields=4)
@@ -108,7 +108,7 @@ _HEADERS = {
 }
 LEAVE_PATH = "/leave"
 # Most headers of a request; browsers send some twenty.
-MOST_HEADERS = 64
+MAX_HEADERS = 64
 _OWN_PATH = re.compile(r"(/[A-Za-z0-9_.-]+)*/?")
 _NEEDS_TOKEN = "This page needs the address that `compd page` printed, with its token, or a token of your own."
 
@@ -163,8 +163,8 @@ class Guard:
     def _foreign(self, connection: HTTPConnection) -> Response | None:
         """Reason why a request is from another site; None for one of this server's own pages."""
         headers: Headers = connection.headers
-        if len(headers) > MOST_HEADERS:
-            return PlainTextResponse(f"a request has {MOST_HEADERS} headers at most", 431)
+        if len(headers) > MAX_HEADERS:
+            return PlainTextResponse(f"a request has {MAX_HEADERS} headers at most", 431)
         host = headers.get("host", "")
         if host not in self._hosts:
             return PlainTextResponse(f"this server is not {host!r}; it is {', '.join(sorted(self._hosts))}", 400)

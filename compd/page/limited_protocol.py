@@ -29,7 +29,7 @@ BODY_WITHIN_S = 600.0
 # Time limit (s) for sending the rest after the server has closed its end.
 FLUSH_WITHIN_S = 60.0
 # Largest head (bytes) of a request.
-LARGEST_HEAD_BYTES = 16 * 1024
+MAX_HEAD_BYTES = 16 * 1024
 # Connections accepted in one turn of the event loop: far fewer than are kept without a token, so that a new one has its
 # turns to show one before as many others arrive.
 ACCEPTED_AT_ONCE = 8

@@ -17,7 +17,7 @@ _SUBJECT = (
     *("replace", "reason"),
 )
 _READS = ("GET", "HEAD")
-_LONGEST_REASON_BYTES = 4096
+_MAX_REASON_BYTES = 4096
 
 _log = structlog.get_logger()
 
@@ -38,7 +38,7 @@ class Logbook:
             nonlocal status, body
             status = message.get("status", status)
             if not body:
-                body = message.get("body", b"")[:_LONGEST_REASON_BYTES]
+                body = message.get("body", b"")[:_MAX_REASON_BYTES]
             await send(message)
 
         try:

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from compd.documents import LARGEST_BYTES
+from compd.documents import MAX_BYTES
 from compd.files import open_regular, read_descriptor
 from compd.page.recordings import is_own
 
@@ -67,7 +67,7 @@ def opened(path: Path) -> int:
 
 def hash_of_file(path: Path) -> str:
     """Hash of an offered file, as in the daemon's messages. Raises OSError."""
-    return hashlib.sha256(read_descriptor(opened(path), LARGEST_BYTES)).hexdigest()[:16]
+    return hashlib.sha256(read_descriptor(opened(path), MAX_BYTES)).hexdigest()[:16]
 
 
 def _running(models: Message | None) -> Iterator[tuple[str, Path]]:

@@ -13,16 +13,16 @@ from starlette.types import Scope
 
 from compd.text import nan_to_null
 
-LONGEST_BODY_BYTES = 8192
+MAX_BODY_BYTES = 8192
 LOOKS_ONLY = "this browser is read-only"
-LONGEST_LINE = 200
+MAX_LINE = 200
 # Most characters of a person's name in a log line, which leaves room for role and address.
-_LONGEST_NAME = 100
+_MAX_NAME = 100
 # Keys of a request's scope: its JSON object, and whether it asks for a change, which is logged.
 KEYS, CHANGE = "keys", "change"
 
 
-async def keys_of(request: Request, longest_bytes: int = LONGEST_BODY_BYTES) -> Mapping[str, Any]:
+async def keys_of(request: Request, longest_bytes: int = MAX_BODY_BYTES) -> Mapping[str, Any]:
     """The JSON object in a request's body. Raises HTTPException (400, 413) for anything else."""
     body = b""
     async for piece in request.stream():
@@ -53,12 +53,12 @@ def may_change(request: Request) -> bool:
 def asked_by(scope: Scope) -> str:
     """The person behind a request in one line: "anna (operate) from 10.0.0.5"."""
     token, client = scope["token"], scope.get("client")
-    return one_line(f"{token.name[:_LONGEST_NAME]} ({token.role}) from {client[0] if client else 'an unknown address'}")
+    return one_line(f"{token.name[:_MAX_NAME]} ({token.role}) from {client[0] if client else 'an unknown address'}")
 
 
 def one_line(text: str) -> str:
-    """The text in one line of at most LONGEST_LINE printable characters."""
-    return "".join(character if character.isprintable() else "?" for character in text[:LONGEST_LINE])
+    """The text in one line of at most MAX_LINE printable characters."""
+    return "".join(character if character.isprintable() else "?" for character in text[:MAX_LINE])
 
 
 def answer(data: Any) -> Response:

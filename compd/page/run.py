@@ -17,7 +17,7 @@ from compd.page.connections import ConnectionLimits, Connections, raised_descrip
 from compd.page.counted_log import CountedLog
 from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Guard, Token
-from compd.page.limited_protocol import ACCEPTED_AT_ONCE, LARGEST_HEAD_BYTES, WAITING, LimitedProtocol
+from compd.page.limited_protocol import ACCEPTED_AT_ONCE, MAX_HEAD_BYTES, WAITING, LimitedProtocol
 from compd.page.recordings import Recordings
 from compd.page.server import Server
 
@@ -76,7 +76,7 @@ def limited_config(app: Guard, connections: Connections) -> uvicorn.Config:
         access_log=False,
         backlog=ACCEPTED_AT_ONCE,
         timeout_graceful_shutdown=1,
-        h11_max_incomplete_event_size=LARGEST_HEAD_BYTES,
+        h11_max_incomplete_event_size=MAX_HEAD_BYTES,
         server_header=False,
     )
 

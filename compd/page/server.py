@@ -38,7 +38,7 @@ from compd.page.workers.workers import Workers
 
 STATIC = Path(__file__).parent / "static"
 # Longest burst (s): an hour at 1 kHz takes some gigabytes.
-LONGEST_BURST_S = 3600.0
+MAX_BURST_S = 3600.0
 # Duration (s) of a burst by the page's button.
 BURST_S = 5.0
 _CANCEL_EVERY_S = 0.5
@@ -194,8 +194,8 @@ class Server:
             await self._recordings.stop()
             return JSONResponse({})
         burst_s = keys.get("burst_s")
-        if burst_s is not None and not (isinstance(burst_s, int | float) and 0 < burst_s <= LONGEST_BURST_S):
-            return refused(f"a burst lasts up to {LONGEST_BURST_S:g} s", 400)
+        if burst_s is not None and not (isinstance(burst_s, int | float) and 0 < burst_s <= MAX_BURST_S):
+            return refused(f"a burst lasts up to {MAX_BURST_S:g} s", 400)
         problem = await self._recordings.start(str(keys.get("name", "")), burst_s)
         return refused(problem, 409) if problem else JSONResponse({})
 

@@ -24,9 +24,9 @@ _EITHER = (
     "stays open."
 )
 # A smaller one is rounding.
-LEAST_SHOWN = 0.01
+MIN_SHOWN = 0.01
 # A column with more values is told by its range.
-MOST_VALUES = 4
+MAX_VALUES = 4
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,7 +99,7 @@ class MeasurementPlan:
             text += f" No rows within the limits tell {pairs}. {_EITHER}"
         if self.tells_apart:
             return text
-        if self.separation < LEAST_SHOWN:
+        if self.separation < MIN_SHOWN:
             return f"{text} One of them does nothing on such rows that the other, a constant or the model does not do."
         if not self.is_wide_enough:
             text += f" That does not tell them apart, which takes {self.criteria.min_separation:.2g} times."
@@ -116,7 +116,7 @@ class MeasurementPlan:
             values = np.unique([row[name] for row in self.rows]) if name not in NOT_SET else np.zeros(0)
             if len(values) == 1:
                 held.append(f"{name} at {values[0]:g}")
-            elif len(values) > MOST_VALUES:
+            elif len(values) > MAX_VALUES:
                 varied.append(f"{name} from {values[0]:g} to {values[-1]:g}")
             elif len(values):
                 varied.append(f"{name} to {', '.join(f'{value:g}' for value in values[:-1])} or {values[-1]:g}")
@@ -221,4 +221,4 @@ def as_factor(separation: float) -> str:
     """A number of standard deviations as people read it: "18", "1.6", "0"."""
     if separation >= 10:
         return f"{separation:.0f}"
-    return f"{separation:.2g}" if separation >= LEAST_SHOWN else "0"
+    return f"{separation:.2g}" if separation >= MIN_SHOWN else "0"

@@ -21,12 +21,12 @@ from compd.errors import CompdError, Problem
 SettingLimits: TypeAlias = Mapping[str, tuple[float, float]]
 
 # A column with so few values, each taken twice on average, is set in steps, such as the stops of a stage.
-MOST_STEPS = 12
+MAX_STEPS = 12
 DIRECTIONS = (-1.0, 0.0, 1.0)
 # Combinations of settings that are tried. Values of a continuous setting among them: three show a curve, and 33 are
 # steps of 3 % of its range.
-MOST_COMBINATIONS = 512
-FEWEST_LEVELS, MOST_LEVELS = 3, 33
+MAX_COMBINATIONS = 512
+MIN_LEVELS, MAX_LEVELS = 3, 33
 # Two columns that a straight line joins to within this share of their range were never set apart.
 TIED = 1e-3
 # A setting is rounded to 1e-4 of its range: finer than matters, and short enough to type.
@@ -86,8 +86,8 @@ def settings_of(recorded: Mapping[str, FloatArray], limits: SettingLimits) -> li
     steps = {name: _steps(name, recorded[name], limits.get(name)) for name in leaders}
     continuous = [name for name in leaders if not len(steps[name])]
     combinations = math.prod(len(values) for values in steps.values() if len(values))
-    levels = (MOST_COMBINATIONS / combinations) ** (1 / max(len(continuous), 1))
-    count = int(np.clip(levels, FEWEST_LEVELS, MOST_LEVELS))
+    levels = (MAX_COMBINATIONS / combinations) ** (1 / max(len(continuous), 1))
+    count = int(np.clip(levels, MIN_LEVELS, MAX_LEVELS))
     values = steps | {name: _levels(*_range(recorded[name], limits.get(name)), count) for name in continuous}
     return [
         Setting(name, values[name], followers)
@@ -113,7 +113,7 @@ def _steps(name: str, values: FloatArray, limits: tuple[float, float] | None) ->
     """The few values that a column takes, within its limits, and the limits; none of a column that takes many."""
     known = values[np.isfinite(values)]
     steps = np.unique(known)
-    if len(steps) > 1 and (len(steps) > MOST_STEPS or 2 * len(steps) > len(known)):
+    if len(steps) > 1 and (len(steps) > MAX_STEPS or 2 * len(steps) > len(known)):
         return np.zeros(0)
     if limits is None:
         return steps

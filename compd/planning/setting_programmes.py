@@ -16,7 +16,7 @@ from compd.comparison import AlignedRecording
 from compd.errors import CompdError, Problem
 from compd.model.effects import Effect, Observations, evaluate_basis, needed_quantities
 from compd.plan_file import TIP_COLUMNS, settings_row
-from compd.planning.measurement_settings import MOST_COMBINATIONS, Setting, SettingLimits, settings_of
+from compd.planning.measurement_settings import MAX_COMBINATIONS, Setting, SettingLimits, settings_of
 from compd.planning.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
 
 # A step of a setting is watched for two hours, as long as machines take to warm through, or for 12 minutes.
@@ -143,12 +143,12 @@ def _check_names(limits: SettingLimits, names: Sequence[str]) -> None:
 def _grid(settings: Sequence[Setting]) -> _Programmes:
     """All combinations of the settings' values, one row each; of too many a part that fills the space evenly."""
     sizes = [len(setting.values) for setting in settings]
-    if math.prod(sizes) <= MOST_COMBINATIONS:
+    if math.prod(sizes) <= MAX_COMBINATIONS:
         places = np.indices(tuple(sizes)).reshape(len(sizes), -1)
     else:
         from scipy.stats import qmc  # takes a third of a second, and is seldom needed
 
-        points = qmc.Sobol(len(sizes), scramble=False).random(MOST_COMBINATIONS)
+        points = qmc.Sobol(len(sizes), scramble=False).random(MAX_COMBINATIONS)
         places = np.unique((points * sizes).astype(np.int64), axis=0).T
     columns: dict[str, FloatArray] = {}
     for setting, place in zip(settings, places, strict=True):
@@ -255,7 +255,7 @@ def _recorded_rows(
         within &= (low <= recorded[name]) & (recorded[name] <= high)
     index = np.flatnonzero(within)
     # of very many rows some, evenly over the recording
-    index = index[np.linspace(0, len(index) - 1, min(len(index), MOST_COMBINATIONS)).astype(np.int64)]
+    index = index[np.linspace(0, len(index) - 1, min(len(index), MAX_COMBINATIONS)).astype(np.int64)]
     lengths = np.ones(len(index), dtype=np.int64)
     rows = replace(aligned.rows.select(index), session_start=programme_starts(lengths))
     shown = [name for name in recorded if not _SENSITIVITY.fullmatch(name)]

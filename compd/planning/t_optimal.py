@@ -26,7 +26,7 @@ from compd.statistics import solve_ridge
 # Ridge of the rival's refit, as a share of the diagonal of its normal equations: conditioning alone.
 RIDGE = 1e-9
 # Keeps the normal equations solvable where no row moves a column; far below one variance of the noise.
-LEAST_RIDGE = 1e-12
+MIN_RIDGE = 1e-12
 
 
 class Predictions(NamedTuple):
@@ -78,7 +78,7 @@ class RivalRefit:
 
     @staticmethod
     def _solve(normal: FloatArray, score: FloatArray) -> FloatArray:
-        ridge = RIDGE * np.diagonal(normal, axis1=-2, axis2=-1) + LEAST_RIDGE
+        ridge = RIDGE * np.diagonal(normal, axis1=-2, axis2=-1) + MIN_RIDGE
         return solve_ridge(normal, score, ridge)
 
 

@@ -16,9 +16,9 @@ from compd.model.kinematics import inverse_kinematics
 from compd.plan_file import SPEED_COLUMN, TIP_COLUMNS
 
 # Travel of the slowest link before the place: an error of reversal has built up after a hand's width at most, and
-# most of it after this. No way is longer than LONGEST_MM.
+# most of it after this. No way is longer than MAX_MM.
 TRAVEL_MM = 10.0
-LONGEST_MM = 60.0
+MAX_MM = 60.0
 # Time at constant speed before and after a place that is passed.
 STEADY_S = 0.5
 # For the derivative of the links' lengths.
@@ -66,7 +66,7 @@ class TipWays:
             end_M_mm = tip_M_mm + length_mm * course
         via_M_mm = tip_M_mm - length_mm * course
         stations = [via_M_mm, tip_M_mm] if end_M_mm is None else [via_M_mm, tip_M_mm, end_M_mm]
-        if length_mm > LONGEST_MM or not self._as_wanted(np.array(stations), direction):
+        if length_mm > MAX_MM or not self._as_wanted(np.array(stations), direction):
             return None
         return Way(via_M_mm, end_M_mm, tip_mm_per_s)
 

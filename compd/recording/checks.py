@@ -84,7 +84,7 @@ LIMITS: tuple[Limit, ...] = tuple(
     )
 )
 # Least change (um) of a set of comparators: those of +-1 mm resolve 0.01 to 0.1 um, so that less is probably in mm.
-_SMALLEST_JOINT_UM = 0.05
+_MIN_JOINT_UM = 0.05
 # Distance (mm) of places that every reference instrument tells apart.
 _PLACE_MM = 0.1
 
@@ -285,7 +285,7 @@ def largest_joint_um(table: Table) -> float:
 
 def check_joint_unit(largest: float, problems: ProblemList) -> None:
     """Warn if the joint comparators never move by their resolution. largest : of the whole recording, um."""
-    if 0 < largest < _SMALLEST_JOINT_UM:
+    if 0 < largest < _MIN_JOINT_UM:
         problems.warn(
             "columns joint_<k>_um",
             "no joint comparator ever moves by what it can resolve",

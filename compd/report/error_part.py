@@ -17,7 +17,7 @@ from compd.units import UM_PER_MM
 # Ports of effects on each link: shown at the links if their lengths follow from the tip.
 LINK_PORTS = {"scale", "link"}
 # Least size of a drawn series, as a share of the largest.
-LEAST_SHARE = 0.1
+MIN_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class ErrorContribution:
     def largest(self, most: int) -> list[int]:
         """The series with the largest parts, up to a number, in their order; negligible ones excluded."""
         sizes = np.array([rms(self.part[self.used, k]) for k in range(len(self.series))])
-        order = [int(k) for k in np.argsort(-sizes)[:most] if sizes[k] > LEAST_SHARE * sizes.max()]
+        order = [int(k) for k in np.argsort(-sizes)[:most] if sizes[k] > MIN_SHARE * sizes.max()]
         return sorted(order) or [0]
 
 

@@ -18,9 +18,9 @@ from compd.report.page import style_figure
 from compd.report.small_multiples import DOTS, SERIES_COLOURS, add_dots_and_means, class_means, dot_style, thin
 
 # Most drawn series, those with the largest effect.
-MOST_SERIES = 3
+MAX_SERIES = 3
 # Most different values of a driver that is drawn as boxes.
-MOST_BOXES = 6
+MAX_BOXES = 6
 # Points of a fitted curve.
 CURVE_CLASSES = 60
 ROW_PX = 250
@@ -40,7 +40,7 @@ def plot_step(
     comparison, described : as in `error_contribution`.
     """
     part = error_contribution(comparison, effects, described)
-    shown = part.largest(MOST_SERIES)
+    shown = part.largest(MAX_SERIES)
     drivers = [find_driver(part, k, effects, comparison.aligned, fall.unit) for k in shown]
     figure = make_subplots(
         len(shown),
@@ -113,7 +113,7 @@ def _add_boxes(
 
 def _is_discrete(driver: Driver, part: ErrorContribution) -> bool:
     values = driver.values[part.used]
-    return len(np.unique(values[np.isfinite(values)])) <= MOST_BOXES
+    return len(np.unique(values[np.isfinite(values)])) <= MAX_BOXES
 
 
 def _span(before: FloatArray, fall: ErrorFall) -> list[float]:

@@ -14,7 +14,7 @@ from .period_criteria import PeriodCriteria as PeriodCriteria
 from .periodogram import PeriodLimits as PeriodLimits
 from .periodogram import strongest_periods as strongest_periods
 from .replicates import replicate_pairs as replicate_pairs
-from .robust import LEAST_SIGMA as LEAST_SIGMA
+from .robust import MIN_SIGMA as MIN_SIGMA
 from .robust import SCALE_EFFICIENCY as SCALE_EFFICIENCY
 from .robust import huber_weights as huber_weights
 from .robust import robust_regression as robust_regression

@@ -40,11 +40,11 @@ OVERSAMPLING = 4
 # peak, lower ones are not peaks of their own.
 LOBES = 3
 # A quantity that changes less does not change.
-LEAST_SPAN = 1e-300
+MIN_SPAN = 1e-300
 # Values of a finer grid about a peak, on which it is refined: the phase at the ends is then right within 3 degrees.
 REFINED = 33
 # A sine and a cosine of which so little is left beside each other and a constant (1 on even rows) explain nothing.
-LEAST_DETERMINANT = 1e-3
+MIN_DETERMINANT = 1e-3
 
 _Complex = NDArray[np.complex64]
 
@@ -113,7 +113,7 @@ def _without_slow(quantity: FloatArray, series: FloatArray, criteria: PeriodCrit
     y = _outliers_held(series, criteria.outlier_sigmas)
     for k in range(y.shape[1]):
         q = quantity[:, min(k, quantity.shape[1] - 1)]
-        powers = np.vander((q - q.mean()) / max(float(np.ptp(q)), LEAST_SPAN), criteria.slow_degree + 1)
+        powers = np.vander((q - q.mean()) / max(float(np.ptp(q)), MIN_SPAN), criteria.slow_degree + 1)
         y[:, k] -= powers @ solve_least_squares(powers, y[:, k])
     y = _outliers_held(y, criteria.outlier_sigmas)
     return np.asarray(y - y.mean(axis=0))
@@ -180,7 +180,7 @@ def _spectrum(
         ss = (1 - double.real) / 2 - mean.imag**2
         cs = double.imag / 2 - mean.real * mean.imag
         determinant = cc * ss - cs**2
-        usable = determinant > LEAST_DETERMINANT
+        usable = determinant > MIN_DETERMINANT
         for values in y.T if quantity.shape[1] == 1 else y.T[k : k + 1]:
             product = _sums(coarse, fine, values, size) / len(y)
             yc, ys = product.real, product.imag

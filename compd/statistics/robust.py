@@ -25,7 +25,7 @@ from compd.statistics.least_squares import column_norms, solve_least_squares, so
 # Rounds of reweighting: the weights settle in three to five.
 ROUNDS = 8
 # Residuals are um or standard deviations of the noise: a smaller standard deviation is rounding.
-LEAST_SIGMA = 1e-9
+MIN_SIGMA = 1e-9
 # Median of |x| and its 95 % point, of a normal distribution with standard deviation 1.
 MEDIAN_OF_NORMAL, P95_OF_NORMAL = 0.674490, 1.959964
 
@@ -106,7 +106,7 @@ def huber_weights(
     With u_i = max_j |r_ij| / sigma_j, sigma by `scale`: w_i = min(1, huber / u_i)^exponent. Exponent 1 is Huber's
     weight, where an outlier keeps a bounded pull; with 2 its pull falls as 1 / u.
     """
-    size = (np.abs(residual) / np.maximum(scale(residual), LEAST_SIGMA)).max(axis=1)
+    size = (np.abs(residual) / np.maximum(scale(residual), MIN_SIGMA)).max(axis=1)
     return np.asarray(np.minimum(1.0, huber / np.maximum(size, huber)) ** exponent)
 
 

@@ -27,7 +27,7 @@ from compd.tables.table import FIRST_ROW, Table, id_codes, id_labels
 # Characters of a file for the fast parser: numbers, commas and line ends only.
 _PLAIN = b"0123456789eE+-.,\r\n"
 # Fewest cells for pyarrow: Python alone parses fewer in a tenth of a second, the time of importing pyarrow.
-_LEAST_BYTES_FOR_ARROW = 1 << 20
+_MIN_BYTES_FOR_ARROW = 1 << 20
 
 
 def read_table(
@@ -116,7 +116,7 @@ def _read_plain(path: Path, names: list[str], body: bytes, lines: list[str], fir
     None if a cell is no number after all: then `_read_any` reports which.
     """
     number = np.array([number for number, line in enumerate(lines, start=first_row) if line], dtype=np.int64)
-    values = _arrow_columns(body, names) if len(body) >= _LEAST_BYTES_FOR_ARROW else None
+    values = _arrow_columns(body, names) if len(body) >= _MIN_BYTES_FOR_ARROW else None
     if values is None or len(values[0]) != len(number):
         cells = _numbers(",".join(filter(None, lines)).split(",")) if len(number) else np.empty(0)
         if cells is None:

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 # Digits that a person reads, and the most that tell two neighbouring numbers apart.
 DIGITS = 2
-MOST_DIGITS = 4
+MAX_DIGITS = 4
 # Between these a number is written without a power of ten.
 SMALLEST, LARGEST = 1e-4, 1e7
 
@@ -28,7 +28,7 @@ def number_text(value: float, unit: str = "", digits: int = DIGITS) -> str:
 
 def fall_text(values: Sequence[float], unit: str) -> str:
     """Numbers one after the other, with digits enough to tell neighbours apart: "105 -> 55 um"."""
-    for digits in range(DIGITS, MOST_DIGITS + 1):
+    for digits in range(DIGITS, MAX_DIGITS + 1):
         texts = [number_text(value, digits=digits) for value in values]
         if all(before != after for before, after in pairwise(texts)):
             return " -> ".join(texts) + _behind(unit)

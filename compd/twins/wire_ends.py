@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 LOOPBACK = "127.0.0.1"
-MOST_BYTES = 4096  # of one read
+MAX_BYTES = 4096  # of one read
 # For the daemon: a device path, a URL, or host and port.
 Port = str | tuple[str, int]
 
@@ -52,7 +52,7 @@ class PtyEnd:
         return [self._master]
 
     def read(self, fd: int) -> bytes:
-        return os.read(fd, MOST_BYTES)
+        return os.read(fd, MAX_BYTES)
 
     def write(self, fd: int, data: bytes) -> None:
         os.write(fd, data)
@@ -87,7 +87,7 @@ class TcpEnd:
             self._connections[connection.fileno()] = connection
             return b""
         try:
-            data = self._connections[fd].recv(MOST_BYTES)
+            data = self._connections[fd].recv(MAX_BYTES)
         except OSError:
             data = b""
         if not data:

@@ -27,7 +27,7 @@ RECONNECT_EVERY_S = 0.5
 # A daemon sends a setpoint per cycle: after this silence the connection is half open.
 SILENCE_S = 2.0
 # Longer than any line that compd sends.
-LONGEST_LINE = 1 << 20
+MAX_LINE = 1 << 20
 # How far time_s may be ahead of this computer's clock before the clocks are not the same.
 CLOCK_TOLERANCE_S = 0.01
 # Messages after which the smallest delay is forgotten: the clocks of two computers drift apart.
@@ -172,7 +172,7 @@ class Stream:
             self._connect()
         if self._socket is None:
             return []
-        if not self._receive(now_s) or now_s - self._heard_s > SILENCE_S or len(self._buffer) > LONGEST_LINE:
+        if not self._receive(now_s) or now_s - self._heard_s > SILENCE_S or len(self._buffer) > MAX_LINE:
             self.close()
             return []
         *lines, self._buffer = self._buffer.split(b"\n")

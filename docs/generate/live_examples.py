@@ -22,8 +22,8 @@ from compd.live.service.requests import REQUESTS
 ZERO_TRIES = 3
 TIMEOUT_S = 30.0
 # Messages are long; of a list or mapping of likes so many are shown.
-MOST_ENTRIES = 2
-LONGEST_TEXT = 60
+MAX_ENTRIES = 2
+MAX_TEXT = 60
 Message = dict[str, Any]
 
 
@@ -154,15 +154,15 @@ def shown(message: Message, left_out: Sequence[str] = ()) -> str:
 def _shortened(value: Any) -> Any:
     if isinstance(value, dict):
         short = {key: _shortened(part) for key, part in value.items()}
-        if len(short) > MOST_ENTRIES + 1 and len({type(part) for part in value.values()}) == 1 and "class" not in value:
-            return {**dict(list(short.items())[:MOST_ENTRIES]), "...": f"{len(short) - MOST_ENTRIES} more"}
+        if len(short) > MAX_ENTRIES + 1 and len({type(part) for part in value.values()}) == 1 and "class" not in value:
+            return {**dict(list(short.items())[:MAX_ENTRIES]), "...": f"{len(short) - MAX_ENTRIES} more"}
         return short
     if isinstance(value, list):
         short_list = [_shortened(part) for part in value]
-        if len(short_list) > MOST_ENTRIES + 3:
-            return [*short_list[:MOST_ENTRIES], f"... {len(short_list) - MOST_ENTRIES} more"]
+        if len(short_list) > MAX_ENTRIES + 3:
+            return [*short_list[:MAX_ENTRIES], f"... {len(short_list) - MAX_ENTRIES} more"]
         return short_list
-    return value[:LONGEST_TEXT] + "..." if isinstance(value, str) and len(value) > LONGEST_TEXT else value
+    return value[:MAX_TEXT] + "..." if isinstance(value, str) and len(value) > MAX_TEXT else value
 
 
 def _lines(value: Any, indent: str) -> str:

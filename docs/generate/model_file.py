@@ -22,7 +22,7 @@ from compd.model.formula import (
 )
 from compd.model.formula.columns import READING_PORTS
 from compd.model.formula.keys import FormulaParameter
-from compd.model.formula.parser import ALLOWED, DEEPEST, LARGEST_EXPONENT
+from compd.model.formula.parser import ALLOWED, DEEPEST, MAX_EXPONENT
 from compd.model.library import find_effect
 from compd.model_file import ModelFile, ModelStep
 from compd.model_file.model_document import EffectEntry, ModelDocument, ParameterEntry
@@ -43,7 +43,7 @@ range.
 NAMES = f"""\
 Allowed are {escape(ALLOWED)}. A name that is no parameter is a column. A column `reference_...` is refused, because an
 effect must never see the answer. A formula nests at most {DEEPEST} levels deep, and an exponent is a number up to
-{LARGEST_EXPONENT:g} or a parameter.
+{MAX_EXPONENT:g} or a parameter.
 """
 # A formula of a user, checked by `formula_effect` when the page is made.
 EXAMPLE = {

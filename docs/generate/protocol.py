@@ -12,7 +12,7 @@ from compd.live.service.message_keys.message import ErrorKeys, SentMessage, Vers
 from compd.live.service.message_keys.readings import ReadingsKeys
 from compd.live.service.message_keys.setpoint import SetpointKeys
 from compd.live.service.message_keys.status import StatusKeys
-from compd.live.service.messages import LARGEST_NUMBER, MAX_LINE_BYTES, ErrorCode
+from compd.live.service.messages import MAX_LINE_BYTES, MAX_NUMBER, ErrorCode
 from compd.live.service.order import OrderKeys
 from compd.live.service.request import Asker, Request
 from compd.live.service.requests import REQUESTS
@@ -119,7 +119,7 @@ def page() -> str:
             ["limit", "value"],
             [
                 ["length of a line that a client sends", f"{MAX_LINE_BYTES} bytes, without its newline"],
-                ["absolute value of a number that a client sends", f"{LARGEST_NUMBER:g}"],
+                ["absolute value of a number that a client sends", f"{MAX_NUMBER:g}"],
                 ["clients at once", f"{MAX_CLIENTS}, of which {MAX_TCP_CLIENTS} over TCP"],
                 [
                     "TCP client that neither watches, nor asks, nor is the controller",

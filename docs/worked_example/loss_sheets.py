@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from compd.diagnosis.search.regression import LEAST_RIDGE
+from compd.diagnosis.search.regression import MIN_RIDGE
 from docs.worked_example.sheets import AXES, FIRST, SETS, Sheets
 from docs.worked_example.spreadsheet import Address, column_letters
 
@@ -128,7 +128,7 @@ def _write_ridges(sheets: Sheets) -> dict[str, Address]:
     ridges = {}
     for k, (m, candidate) in enumerate(zip("abc", sheets.example.candidates, strict=True)):
         squares = f"SUM({sheets.column('Sums', m + m)})"
-        ridge = f"=1/B{15 + k}^2+{LEAST_RIDGE}*{squares}"
+        ridge = f"=1/B{15 + k}^2+{MIN_RIDGE}*{squares}"
         theta = f"=SUM({sheets.column('Sums', 'r' + m)})/({squares}+C{15 + k})"
         sheets.book.put("Folds", 15 + k, 1, [f"{m} {candidate.name}", float(candidate.largest[0]), ridge, theta])
         ridges[m] = Address("Folds", 15 + k, 3)

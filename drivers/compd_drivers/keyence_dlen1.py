@@ -25,7 +25,7 @@ from pydantic import Field
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 
-MOST_HEADS = 15
+MAX_HEADS = 15
 END = b"\r\n"
 _STATE = re.compile(rb"\d{2}")
 _NUMBER = re.compile(rb"[+-]\d{9}")
@@ -45,7 +45,7 @@ ERRORS = {b"031": "starting its communication", b"254": "system error, or starti
 class KeyenceDlEn1Options(GaugeOptions):
     """Options of a DL-EN1."""
 
-    heads: int = Field(ge=1, le=MOST_HEADS, description="number of heads on the unit; channels are named 1, 2 ...")
+    heads: int = Field(ge=1, le=MAX_HEADS, description="number of heads on the unit; channels are named 1, 2 ...")
     decimals: int = Field(ge=0, le=6, description="of the amplifiers' display; GT2 in 0.1 um: 4")
 
 

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 
-MOST_HEADS = 15
+MAX_HEADS = 15
 NO_VALUE_MM = 199.999  # from here on numbers are codes
 END = b"\r\n"
 _NUMBER = re.compile(rb"[+-]\d{3}\.\d{4}")
@@ -30,7 +30,7 @@ _STATUS_LENGTH = 3  # of `,dd`
 class KeyenceGt2DlRs1aOptions(GaugeOptions):
     """Options of a DL-RS1A."""
 
-    heads: int = Field(ge=1, le=MOST_HEADS, description="number of heads on the unit; channels are named 1, 2 ...")
+    heads: int = Field(ge=1, le=MAX_HEADS, description="number of heads on the unit; channels are named 1, 2 ...")
     request: Literal["M0", "MS"] = Field(
         default="M0", description="M0: values; MS: values with each head's status, for units that want it"
     )

@@ -27,7 +27,7 @@ from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quali
 from compd_drivers.exchange import MenuSilence, receive_line
 
 CR = b"\r"
-LONGEST_REPLY = 80  # three features of at most 26 characters
+MAX_REPLY = 80  # three features of at most 26 characters
 FEATURES = (1, 2, 3)
 MM_PER_UNIT = {"mm": 1.0, "um": 1e-3, "inch": 25.4}
 _ERROR = re.compile(rb"([123]) ERR(\d)")
@@ -81,7 +81,7 @@ class MahrC1202(Gauge[ByteLine]):
         """Raises LineFault: SILENT or TIMEOUT (see above), MISMATCH unless the requested features answer."""
         time_s = line.send(self._request)
         try:
-            reply = receive_line(line, CR, LONGEST_REPLY)
+            reply = receive_line(line, CR, MAX_REPLY)
             readings = self._readings(reply, time_s)
         except LineFault as fault:
             raise self._silence.named(fault, line) from None

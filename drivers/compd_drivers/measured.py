@@ -53,12 +53,12 @@ SIGNALS = ("V", "mA")
 
 
 # Smallest (besides 0) and largest plausible float; floats with exchanged bytes lie outside.
-SMALLEST_FLOAT, LARGEST_FLOAT = 1e-20, 1e20
+MIN_FLOAT, MAX_FLOAT = 1e-20, 1e20
 
 
 def not_measured(number: float) -> bool:
     """Whether a float on the wire is implausible, and probably read in a wrong order of its bytes."""
-    return math.isfinite(number) and number != 0.0 and not SMALLEST_FLOAT <= abs(number) <= LARGEST_FLOAT
+    return math.isfinite(number) and number != 0.0 and not MIN_FLOAT <= abs(number) <= MAX_FLOAT
 
 
 class DescriptionSection(BaseModel):

@@ -45,7 +45,7 @@ from compd_drivers.modbus_doubts import doubts
 from compd_drivers.modbus_number import FLOATS, READ_BITS, decode
 
 # Most registers of a read: fewer than Modbus allows, as a serial master asks for one more.
-MOST_REGISTERS, MOST_BITS = 124, 1992
+MAX_REGISTERS, MAX_BITS = 124, 1992
 
 
 class RegisterBlock(NamedTuple):
@@ -181,7 +181,7 @@ def blocks(spans: Sequence[tuple[int, int, int]]) -> tuple[RegisterBlock, ...]:
         if reads and reads[-1].function == function and address <= reads[-1].address + reads[-1].length:
             last = reads[-1]
             covered = max(end - last.address, last.length)
-            if covered <= (MOST_BITS if function in READ_BITS else MOST_REGISTERS):
+            if covered <= (MAX_BITS if function in READ_BITS else MAX_REGISTERS):
                 reads[-1] = RegisterBlock(function, last.address, covered)
                 continue
         reads.append(RegisterBlock(function, address, length))

@@ -16,7 +16,7 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 Register = Annotated[int, Field(ge=0, le=0xFFFF)]
 Function = Literal[1, 2, 3, 4]
 WRITE_COIL, WRITE_REGISTERS = 5, 16
-MOST_WRITTEN = 123  # registers of one request by function 16
+MAX_WRITTEN = 123  # registers of one request by function 16
 BROADCAST = 0
 
 
@@ -76,7 +76,7 @@ class ModbusWrite(DescriptionSection):
     function: Literal[5, 6, 16] = Field(description="5: one coil, 6: one register, 16: several registers")
     address: Address = Field(description="of the coil or the first register, from 0")
     values: tuple[Register, ...] = Field(
-        min_length=1, max_length=MOST_WRITTEN, description="what is written; for a coil 0 or 1"
+        min_length=1, max_length=MAX_WRITTEN, description="what is written; for a coil 0 or 1"
     )
     unit: Annotated[int, Field(ge=0, le=247)] | None = Field(
         default=None, description="to whom: the gauge's own if left out; 0 on a serial line: all, without an answer"
@@ -103,7 +103,7 @@ class Identity(DescriptionSection):
 
     function: Literal[3, 4] = Field(description="3: holding registers, 4: input registers")
     address: Address = Field(description="of the first of them, from 0")
-    equals: tuple[Register, ...] = Field(min_length=1, max_length=MOST_WRITTEN, description="what they must hold")
+    equals: tuple[Register, ...] = Field(min_length=1, max_length=MAX_WRITTEN, description="what they must hold")
 
 
 class ModbusOptions(GaugeOptions):

@@ -13,7 +13,7 @@ from compd_drivers.modbus_number import FLOATS
 # First digits of Modbus's "reference numbers": in a manual 10001 is the first discrete input, 30001 the first input
 # register, 40001 the first holding register.
 _REFERENCES = {10001: 2, 30001: 4, 40001: 3}
-_HIGHEST_REFERENCE = 9999
+_MAX_REFERENCE = 9999
 # Numbers above those of any sensor of a machine, by unit; a wrong factor is off by ten or more.
 _LARGEST = {"degC": 5e3, "hPa": 1e5, "pct": 1e4}
 # Coarsest digit of a machine's sensors by unit; a float's digit is fine, and its factor at most converts kelvin or
@@ -34,7 +34,7 @@ def doubts(channels: Sequence[ModbusChannel]) -> Iterator[OptionDoubt]:
             )
     for k, channel in enumerate(channels):
         for first, function in _REFERENCES.items():
-            if first <= channel.address < first + _HIGHEST_REFERENCE:
+            if first <= channel.address < first + _MAX_REFERENCE:
                 yield OptionDoubt(
                     ("channels", k, "address"),
                     "is more likely the manual's number of a register than its address, which counts from 0",

@@ -35,7 +35,7 @@ from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQua
 NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
 _TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
 _FLOATS: Mapping[str, str] = {"float32": "f", "float64": "d"}
-FEWEST_FIXED_BYTES = 2  # fewest fixed bytes of a frame without a checksum
+MIN_FIXED_BYTES = 2  # fewest fixed bytes of a frame without a checksum
 
 
 class FrameLayout(NamedTuple):
@@ -153,8 +153,8 @@ class SerialFrameOptions(ExchangeOptions):
             self.checksum.check(frame, "frame")
         elif frame.checksum.stop:
             raise ValueError("`frame` has bytes CS, `checksum` must describe them")
-        elif sum(byte is not None for byte in frame.fixed) < FEWEST_FIXED_BYTES:
-            raise ValueError(f"a frame without a checksum needs {FEWEST_FIXED_BYTES} fixed bytes to be known by")
+        elif sum(byte is not None for byte in frame.fixed) < MIN_FIXED_BYTES:
+            raise ValueError(f"a frame without a checksum needs {MIN_FIXED_BYTES} fixed bytes to be known by")
         for channel in self.channels:
             if channel.at + channel.length > len(frame.fixed):
                 raise ValueError(f"channel {channel.name} ends beyond the frame's {len(frame.fixed)} bytes")

@@ -27,7 +27,7 @@ BUDGET_S = 20.0
 BUDGET_MB = 2048.0
 SCIPY_ROWS = 300
 FEW_ROWS = 100  # their time is that of Python, of imports and of compiled kernels
-LEAST_SHARE = 0.1  # of the start: less work than that is lost in how long starts take
+MIN_SHARE = 0.1  # of the start: less work than that is lost in how long starts take
 # A process counts the memory of the one that started it as its own: it is started by a small one.
 LAUNCHER = """
 import json, os, sys, time
@@ -62,7 +62,7 @@ def main() -> None:
             bare = command(["compare", str(path), "--json"])
             page = command(["compare", str(path), "--json", "--html", str(directory / "page.html")])
             work = bare.processor_s - start
-            plain = work > LEAST_SHARE * start
+            plain = work > MIN_SHARE * start
             growth = [
                 f"{work / (count - FEW_ROWS) * 1e6:.1f}" if plain else "-",
                 f"{work / before:.1f}" if before else "-",

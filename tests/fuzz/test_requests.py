@@ -16,7 +16,7 @@ from compd.errors import Problem, StateError
 from compd.live.loop import Commands
 from compd.live.service import Errands, Messages, RequestContext, Requests, TargetKeys
 from compd.live.service.client_session import ClientSession
-from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError
+from compd.live.service.messages import MAX_NUMBER, ErrorCode, ProtocolError
 from compd.live.service.requests import REQUESTS, SENT_MESSAGES
 from tests.fuzz.bounds import examples
 
@@ -115,7 +115,7 @@ def test_every_line_has_an_answer_an_error_or_a_documented_silence(
             assert len(answer) < 2000
         target = asked.context.commands.target
         if target is not None:
-            assert all(abs(number) <= LARGEST_NUMBER for number in target.tip_mm)
+            assert all(abs(number) <= MAX_NUMBER for number in target.tip_mm)
             assert asked.context.controller is client
 
 

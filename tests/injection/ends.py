@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 LOOPBACK = "127.0.0.1"
-MOST_BYTES = 4096
+MAX_BYTES = 4096
 # Closing a socket with this option resets its connection.
 RESET = struct.pack("ii", 1, 0)
 
@@ -39,7 +39,7 @@ class PtyEnd:
         return [self._master]
 
     def read(self, fd: int) -> bytes:
-        return os.read(fd, MOST_BYTES)
+        return os.read(fd, MAX_BYTES)
 
     def write(self, data: bytes) -> None:
         os.write(self._master, data)
@@ -69,7 +69,7 @@ class ListeningEnd:
             return b""
         data = b""
         with suppress(OSError):
-            data = self._connections[fd].recv(MOST_BYTES)
+            data = self._connections[fd].recv(MAX_BYTES)
         if not data:
             self._connections.pop(fd).close()
         return data
@@ -98,7 +98,7 @@ class DevicePort:
         return [self._fd]
 
     def read(self, fd: int) -> bytes:
-        return os.read(fd, MOST_BYTES)
+        return os.read(fd, MAX_BYTES)
 
     def write(self, data: bytes) -> None:
         os.write(self._fd, data)
@@ -118,7 +118,7 @@ class DeviceConnection:
         return [self._socket.fileno()]
 
     def read(self, fd: int) -> bytes:
-        return self._socket.recv(MOST_BYTES)
+        return self._socket.recv(MAX_BYTES)
 
     def write(self, data: bytes) -> None:
         self._socket.sendall(data)

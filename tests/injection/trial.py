@@ -25,7 +25,7 @@ SETTLED_WITHIN_S = 8.0
 # For so long a gauge that must be accepted is watched after its cause has gone.
 WATCHED_AFTER_S = 1.5
 # A reason is for people, and goes out with every setpoint.
-LONGEST_REASON = 300  # bytes
+MAX_REASON = 300  # bytes
 # A busy computer makes polls late: so many setpoints may be disturbed where nothing must be.
 DISTURBED_SHARE = 0.2
 
@@ -181,8 +181,8 @@ def _judge(
         problems.append(
             f"a valid setpoint is wrong by {verdict.worst_um:.1f} um, allowed {case.bound_um:g}: {verdict.worst}"
         )
-    if verdict.longest_reason > LONGEST_REASON:
-        problems.append(f"a reason of {verdict.longest_reason} bytes, allowed {LONGEST_REASON}")
+    if verdict.longest_reason > MAX_REASON:
+        problems.append(f"a reason of {verdict.longest_reason} bytes, allowed {MAX_REASON}")
     disturbed = [s for s in during if s["state"] != State.OK]
     if case.way in (Way.UNDISTURBED, Way.UNSEEN):
         if len(disturbed) > DISTURBED_SHARE * len(during):

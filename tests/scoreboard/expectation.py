@@ -10,7 +10,7 @@ from tests.scoreboard.cases import CONSTANT_CAUSES, Case
 
 # A hidden cause whose error is smaller, over the noise, need not be named: its plausible range has ended before the
 # size that was asked for.
-LEAST_FLOORS = 0.45
+MIN_FLOORS = 0.45
 NAMED = ("identified", "ambiguous", "partial")
 # Covariates of a cause that depends on the tip's position: any of its coordinates.
 POSITION = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
@@ -81,7 +81,7 @@ def expectation(case: Case, answer: Mapping[str, Any], change_s: float | None) -
     answer : `effects`, `answers`, `follows` and `error_in_floors`, as the simulation's answer has them.
     """
     floors: Mapping[str, float] = answer["error_in_floors"]
-    large = [name for name in answer["answers"] if floors[name] >= LEAST_FLOORS]
+    large = [name for name in answer["answers"] if floors[name] >= MIN_FLOORS]
     small = tuple(name for name in answer["answers"] if name not in large)
     groups = _groups(large)
     words = NAMED if groups else ("adequate", *NAMED[:-1])

@@ -11,9 +11,9 @@ from tests.scoreboard import scoring
 from tests.scoreboard.scoring import Result
 
 # Sizes of errors, over the noise floor, that the targets are stated for: 1 to 6, with the tolerance of sizing.
-LEAST_FLOORS, MOST_FLOORS = 0.95, 6.3
+MIN_FLOORS, MAX_FLOORS = 0.95, 6.3
 # Floor ratio on the other recording.
-MOST_RATIO = 1.1
+MAX_RATIO = 1.1
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ def floors(result: Result) -> tuple[float, ...]:
 
 def plain(result: Result) -> bool:
     """Whether every hidden cause has a size that the targets are stated for."""
-    return all(LEAST_FLOORS <= size <= MOST_FLOORS for size in floors(result))
+    return all(MIN_FLOORS <= size <= MAX_FLOORS for size in floors(result))
 
 
 def measures(results: Sequence[Result]) -> list[Measure]:
@@ -59,9 +59,9 @@ def measures(results: Sequence[Result]) -> list[Measure]:
         _share("nothing hidden: says adequate", of["nothing"], is_adequate, ">= 98 %"),
         _share("outside the library: names none", outside, lambda result: not scoring.steps(result), ""),
         _share("outside: names none, right covariate first or second", outside, described, ">= 95 %"),
-        Measure(f"other recording <= {MOST_RATIO}, with the true effect fitted: the bound", len(named), bound, ""),
+        Measure(f"other recording <= {MAX_RATIO}, with the true effect fitted: the bound", len(named), bound, ""),
         _share(
-            f"other recording <= {MOST_RATIO}, of those that can be",
+            f"other recording <= {MAX_RATIO}, of those that can be",
             can_be,
             lambda result: reaches(result, "other_floor_ratio"),
             "all",
@@ -108,7 +108,7 @@ def described(result: Result) -> bool:
 def reaches(result: Result, key: str) -> bool:
     """Whether this floor ratio is known and small enough."""
     ratio = result.get(key)
-    return ratio is not None and ratio <= MOST_RATIO
+    return ratio is not None and ratio <= MAX_RATIO
 
 
 def _share(what: str, group: Sequence[Result], right: Callable[[Result], bool], wanted: str) -> Measure:

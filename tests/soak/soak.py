@@ -26,7 +26,7 @@ QUIET_SHARE = 0.1
 # Stroke in which the machine visits places, mm; every link goes some way, since one that stays while all others go is
 # taken for stuck.
 STROKE_MM = 12.0
-LEAST_WAY_MM = 0.2
+MIN_WAY_MM = 0.2
 # A fault lasts between these times, s.
 LASTS_S = (0.5, 4.0)
 # How long a fault's end is given before a person accepts all gauges, and then before the daemon is started anew.
@@ -81,7 +81,7 @@ def _drawn(chance: random.Random, together_share: float) -> list[Case]:
 
 
 def _other_mm(length_mm: float, chance: random.Random) -> float:
-    while abs((other_mm := chance.uniform(-STROKE_MM, STROKE_MM)) - length_mm) < LEAST_WAY_MM:
+    while abs((other_mm := chance.uniform(-STROKE_MM, STROKE_MM)) - length_mm) < MIN_WAY_MM:
         pass
     return other_mm
 

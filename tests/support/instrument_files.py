@@ -32,8 +32,8 @@ START = datetime(2026, 11, 22, 9, 15, 30)
 RATE_HZ = 4.0
 # Noise of one sample beside that of the row, which is in the campaign's reference already.
 SAMPLE_NOISE_UM = 0.02
-# At rest around a row for so long, to either side; less where the next row is near, none below LEAST_DWELL_S.
-DWELL_S, LEAST_DWELL_S = 1.5, 0.3
+# At rest around a row for so long, to either side; less where the next row is near, none below MIN_DWELL_S.
+DWELL_S, MIN_DWELL_S = 1.5, 0.3
 # Between rows further apart nobody measured: the night between two sessions.
 NIGHT_S = 600.0
 ENDINGS = {form.name: declared.ending for declared in instrument_formats().values() for form in declared.written}
@@ -147,7 +147,7 @@ def _half_dwells(time_s: FloatArray, at_rest: BoolArray) -> FloatArray:
     """(N,) how long the machine rests before and after each row; 0 in motion, and where the next row is too near."""
     gaps = np.concatenate([[np.inf], np.diff(time_s), [np.inf]])
     half_s = np.minimum(DWELL_S, 0.3 * np.minimum(gaps[:-1], gaps[1:]))
-    return np.where(at_rest & (half_s >= LEAST_DWELL_S), half_s, 0.0)
+    return np.where(at_rest & (half_s >= MIN_DWELL_S), half_s, 0.0)
 
 
 def _knots(time_s: FloatArray, values: FloatArray, at_rest: BoolArray) -> tuple[FloatArray, FloatArray]:

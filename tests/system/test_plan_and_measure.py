@@ -24,7 +24,7 @@ from compd.simulation import Mechanism, Simulation, World, read_plan
 from compd.simulation.truth.plan_motion import SETTLED_S
 from tests.support.planned_measurements import plan_file, straight_down, thin
 from tests.support.simulated import TRIPOD, ask, run_directory
-from tests.unit.simulation.test_server import LONGEST_WAIT_S, TurnedClock
+from tests.unit.simulation.test_server import MAX_WAIT_S, TurnedClock
 
 PAIR = ("link_elasticity", "joint_contact")
 
@@ -161,7 +161,7 @@ def test_the_machine_goes_through_its_plan_on_wires(tmp_path: Path) -> None:
         simulation = Simulation(configuration, world, directory, clock)
         simulation.start()
         try:
-            control.settimeout(LONGEST_WAIT_S)
+            control.settimeout(MAX_WAIT_S)
             control.connect(str(directory / "control.sock"))
             assert "plan" not in ask(control, {"class": "TRUTH"})
             clock.turn(5.1)

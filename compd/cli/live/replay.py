@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 # Most cells of the CSV in the list; a file saved by another program differs everywhere.
-_MOST_CELLS = 5
+_MAX_CELLS = 5
 
 
 def replay(
@@ -48,7 +48,7 @@ def replay(
     lacking = transcripts.rows_without_cycle()
     for table, rows in lacking.items():
         typer.echo(f"{table}: {rows} rows have no cycle beside them, and cannot be replayed", err=True)
-    cells = list(islice(differing_cells(RecordedCycles(name)), _MOST_CELLS))
+    cells = list(islice(differing_cells(RecordedCycles(name)), _MAX_CELLS))
     for cell in cells:
         text = f"{cell.cell or 'no value'}, by the cycle {cell.recorded or 'no value'}"
         typer.echo(f"{cell.where} was changed: {text}", err=True)

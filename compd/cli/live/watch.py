@@ -25,13 +25,13 @@ from compd.units import UM_PER_MM
 
 _BAR_WIDTH = 21  # odd: one cell is zero
 # Least correction (mm) of a full bar, so that noise shows no bar.
-_LEAST_FULL_BAR_MM = 1e-3
+_MIN_FULL_BAR_MM = 1e-3
 # Sources of the correction with a column in the table of the links; all others are effects with rows of their own.
 _OWN_COLUMN = ("joints", "frame")
 _STATUS_EVERY_S = 1.0
 # Least rate (Hz) of read setpoints, at which silence is noticed faster than by eye; and the periods that may pass
 # without one.
-_LEAST_RATE_HZ = 40.0
+_MIN_RATE_HZ = 40.0
 _PERIODS = 3.0
 _LOOK_EVERY_S = 0.1
 _END_WITHIN_S = 0.5
@@ -80,7 +80,7 @@ class NewestSetpoint:
         """`rate_hz`: at which the picture is to change; setpoints are read more often, so that a silence shows.
         `same_clock`: whether `clock` is the daemon's, on its own computer."""
         self._client = client
-        self._rate_hz = max(rate_hz, _LEAST_RATE_HZ)
+        self._rate_hz = max(rate_hz, _MIN_RATE_HZ)
         self._clock = clock
         self._same_clock = same_clock
         self._change = threading.Condition()
@@ -243,7 +243,7 @@ def _corrections(setpoint: dict[str, Any]) -> Table:
     )
     for column in table.columns[:3] + table.columns[4:]:
         column.justify = "right"
-    largest_mm = max(_LEAST_FULL_BAR_MM, *map(abs, corrections))
+    largest_mm = max(_MIN_FULL_BAR_MM, *map(abs, corrections))
     for i, correction in enumerate(corrections):
         table.add_row(
             str(i + 1),

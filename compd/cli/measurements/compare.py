@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from compd.model.effects import FittedEffect
 
 # Most sentences in the terminal.
-MOST_SENTENCES = 6
+MAX_SENTENCES = 6
 
 
 def compare(
@@ -111,10 +111,10 @@ def print_comparisons(comparisons: list[Comparison]) -> None:
             console.print(f"Check: {comparison.floor.contradiction}.")
         if not comparison.trends:
             console.print(f"Where it fails: {no_trend_text(comparison)}.")
-        for trend in comparison.trends[:MOST_SENTENCES]:
+        for trend in comparison.trends[:MAX_SENTENCES]:
             console.print(f"  - {trend.text}")
-        if len(comparison.trends) > MOST_SENTENCES:
-            console.print(f"  and {len(comparison.trends) - MOST_SENTENCES} weaker ones (--json and --html have all)")
+        if len(comparison.trends) > MAX_SENTENCES:
+            console.print(f"  and {len(comparison.trends) - MAX_SENTENCES} weaker ones (--json and --html have all)")
         rows = comparison.outlier_rows
         if rows:
             shown = ", ".join(map(str, rows[:20])) + (" ..." if comparison.outlier_count > 20 else "")

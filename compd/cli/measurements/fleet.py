@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from compd.fleet import Examination, RecordingResult
 
 # Most sentences of a kind in the terminal; the page and the table have all.
-MOST_SENTENCES = 20
+MAX_SENTENCES = 20
 # Number of machines above which inconspicuous ones share a line.
-MOST_MACHINES = 12
+MAX_MACHINES = 12
 # Exit code of shells after SIGINT.
 _INTERRUPTED = 130
 
@@ -232,7 +232,7 @@ def _print_overview(results: list[RecordingResult] | tuple[RecordingResult, ...]
     console = Console(highlight=False, markup=False, soft_wrap=True)
     overview = Overview(results)
     console.print(overview.headline)
-    quiet = overview.quiet if len(overview.machines) > MOST_MACHINES else []
+    quiet = overview.quiet if len(overview.machines) > MAX_MACHINES else []
     if len(overview.machines) > len(quiet):
         summary = overview.machine_table(without=quiet)
         table = Table(*summary.head)
@@ -242,11 +242,11 @@ def _print_overview(results: list[RecordingResult] | tuple[RecordingResult, ...]
     if quiet:
         console.print(f"Nothing is missing on {len(quiet)} others: {', '.join(quiet)}")
     sentences = overview.sentences()
-    for sentence in sentences[:MOST_SENTENCES]:
+    for sentence in sentences[:MAX_SENTENCES]:
         console.print(f"  - {sentence}")
-    if len(sentences) > MOST_SENTENCES:
-        console.print(f"  and {len(sentences) - MOST_SENTENCES} more (the page has all)")
-    for result in overview.failed[:MOST_SENTENCES]:
+    if len(sentences) > MAX_SENTENCES:
+        console.print(f"  and {len(sentences) - MAX_SENTENCES} more (the page has all)")
+    for result in overview.failed[:MAX_SENTENCES]:
         console.print(f"not examined: {result.problem.splitlines()[0]}")
-    if len(overview.failed) > MOST_SENTENCES:
-        console.print(f"and {len(overview.failed) - MOST_SENTENCES} more; the table has all, with what to do")
+    if len(overview.failed) > MAX_SENTENCES:
+        console.print(f"and {len(overview.failed) - MAX_SENTENCES} more; the table has all, with what to do")

@@ -16,14 +16,14 @@ from scipy.spatial.transform import Rotation
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.criteria import ComparisonCriteria
-from compd.statistics import LEAST_SIGMA, robust_sigma
+from compd.statistics import MIN_SIGMA, robust_sigma
 
 # Converges in three or four rounds: each drops the rows that the last one shows to be outliers.
 ROUNDS = 10
 # Three points fix a frame.
-FEWEST_POINTS = 3
+MIN_POINTS = 3
 # mm; points that are all nearer to their middle than this have no spread to scale by.
-LEAST_SPREAD_MM = 1e-9
+MIN_SPREAD_MM = 1e-9
 
 
 class Registration(NamedTuple):
@@ -52,12 +52,12 @@ def register(
     use = known.copy()
     registration: Registration | None = None
     for _ in range(ROUNDS):
-        if use.sum() < FEWEST_POINTS:
+        if use.sum() < MIN_POINTS:
             return None
         registration = _rigid_motion(measured_mm[use], predicted_M_mm[use])
         distance_mm = np.linalg.norm(predicted_M_mm - registration.into_M(measured_mm), axis=1)
         limit_mm = criteria.outlier_sigmas * float(robust_sigma(distance_mm[use][:, None])[0])
-        near = known & (distance_mm <= max(limit_mm, LEAST_SIGMA))
+        near = known & (distance_mm <= max(limit_mm, MIN_SIGMA))
         if (near == use).all():
             break
         use = near
@@ -118,7 +118,7 @@ def points_spread_mm(tip_M_mm: FloatArray) -> float:
     """Root mean square of the coordinates of points (N, 3) from their centroid, along the axes that are known."""
     known: BoolArray = np.asarray(np.isfinite(tip_M_mm).any(axis=0))
     points_mm = tip_M_mm[:, known][np.isfinite(tip_M_mm[:, known]).all(axis=1)]
-    return max(float(np.sqrt(np.mean((points_mm - points_mm.mean(axis=0)) ** 2))), LEAST_SPREAD_MM)
+    return max(float(np.sqrt(np.mean((points_mm - points_mm.mean(axis=0)) ** 2))), MIN_SPREAD_MM)
 
 
 def displacement_columns(rows: int, coordinates: int) -> FloatArray:

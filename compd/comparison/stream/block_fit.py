@@ -15,7 +15,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.effect_fit import CONVERGED, LEAST_RMS_UM, STEPS, FitResult
+from compd.comparison.effect_fit import CONVERGED, MIN_RMS_UM, STEPS, FitResult
 from compd.comparison.initial_states import initial_states
 from compd.comparison.nuisance import nuisance_columns
 from compd.comparison.outliers import OutlierLimits, outlier_limits
@@ -62,7 +62,7 @@ def fit_blocks(
         normals, ranges = _normals(stream, sample, system, start.fitted, theta, nuisance, progress)
         step, change = normals.step(len(theta))
         theta, nuisance = theta + step[: len(theta)], nuisance + step[len(theta) :]
-        if change <= CONVERGED * max(np.sqrt(normals.squares / normals.values), LEAST_RMS_UM):
+        if change <= CONVERGED * max(np.sqrt(normals.squares / normals.values), MIN_RMS_UM):
             break
     covariance = normals.covariance(len(theta))
     ends = np.cumsum([0, *(len(effect.theta) for effect in start.fitted)])

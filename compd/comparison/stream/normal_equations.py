@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.comparison.nuisance import LEAST_SHARE
+from compd.comparison.nuisance import MIN_SHARE
 from compd.statistics import covariance_of_normals, normal_norms, solve_normal
 
 
@@ -96,7 +96,7 @@ def _beside(normal: FloatArray, parameters: int) -> FloatArray:
     own, cross = normal[:P, :P], normal[:P, P:] / norms
     left = normal[P:, P:] / np.outer(norms, norms) - cross.T @ solve_normal(own, cross)
     squares, vectors = np.linalg.eigh(left)
-    kept = vectors[:, squares > LEAST_SHARE**2] / norms[:, None]
+    kept = vectors[:, squares > MIN_SHARE**2] / norms[:, None]
     basis = np.zeros((count, P + kept.shape[1]))
     basis[:P, :P] = np.eye(P)
     basis[P:, P:] = kept

@@ -15,7 +15,7 @@ from compd.comparison.stream.magnitude_histogram import MagnitudeHistogram
 from compd.comparison.stream.time_envelope import TimeEnvelope
 
 # Most outliers whose rows are kept.
-MOST_OUTLIERS_LISTED = 1000
+MAX_OUTLIERS_LISTED = 1000
 
 
 class ContributionSquares(NamedTuple):
@@ -56,7 +56,7 @@ class ResidualTotals:
     ----------
     rows, used, outliers : numbers of rows.
     left_out : reason -> rows that cannot be used.
-    outlier_rows : the first MOST_OUTLIERS_LISTED of them.
+    outlier_rows : the first MAX_OUTLIERS_LISTED of them.
     largest_um, largest_row : (m,) the largest amount of each coordinate, and its row.
     envelope : of the residual over time.
     """
@@ -79,7 +79,7 @@ class ResidualTotals:
         self.rows += block.rows
         self.left_out.update(block.left_out)
         self.outliers += len(block.outlier_row)
-        self.outlier_rows += block.outlier_row[: MOST_OUTLIERS_LISTED - len(self.outlier_rows)].tolist()
+        self.outlier_rows += block.outlier_row[: MAX_OUTLIERS_LISTED - len(self.outlier_rows)].tolist()
         for name, squares in block.contributions.items():
             before = self._contributions.get(name, ContributionSquares(0.0, 0.0, 0))
             self._contributions[name] = before.plus(squares)

@@ -36,7 +36,7 @@ SHIPPED_PROGRAM = Path(__file__).parent / "program.ngc"
 ROUNDS_W = (3.0, 3.0, 0.3, 3.0)
 # The rest of the machine's heat, as after switch-on: base ring, cabinet by column, platform, tool, lamps.
 _OTHER_HEAT = {"ring_W": 12.0, "cabinet_W": [8.0, 3.0, 4.0], "platform_W": 0.4, "tool_W": 0.0, "lamps_W": 3.0}
-LONGEST_PROGRAM_S = 1200.0
+MAX_PROGRAM_S = 1200.0
 # Attempts to switch corrections on before it is an error; a busy computer disarms the bridge.
 ARMINGS = 20
 # Attempts to run a program.
@@ -180,7 +180,7 @@ class _Session:
         """Run a program; repeat it if LinuxCNC stops it, as for a late probe. Raises DaemonError after RUNS."""
         for runs_left in reversed(range(RUNS)):
             try:
-                start_s, end_s = self._controller.run(program, LONGEST_PROGRAM_S, self._go_on)
+                start_s, end_s = self._controller.run(program, MAX_PROGRAM_S, self._go_on)
                 break
             except ProgramStopped as stopped:
                 if not runs_left:

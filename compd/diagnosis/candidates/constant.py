@@ -19,7 +19,7 @@ CONSTANT = "constant"
 MM_PER_UM = 1 / UM_PER_MM
 # Columns of which less than this share of the squares lies outside a subspace are part of it: rounding of the forward
 # model, which is linear within 1e-5.
-LEAST_OUTSIDE = 1e-4
+MIN_OUTSIDE = 1e-4
 
 
 def constant_candidate(aligned: AlignedRecording) -> Candidate | None:
@@ -78,7 +78,7 @@ def makes_only(columns: FloatArray, of: FloatArray) -> bool:
     B = columns.reshape(len(A), -1)
     B = B / column_norms(B)
     outside = B - A @ solve_least_squares(A, B)
-    return bool(((outside**2).sum(axis=0) <= LEAST_OUTSIDE).all())
+    return bool(((outside**2).sum(axis=0) <= MIN_OUTSIDE).all())
 
 
 def split_constants(

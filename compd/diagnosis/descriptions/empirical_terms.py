@@ -41,7 +41,7 @@ FORMS_BY_KIND: Mapping[Kind, tuple[str, ...]] = {
     "other": ("square",),
 }
 # A parabola needs three values of its covariate, a knee with two slopes four.
-FEWEST_VALUES = {"square": 3, "knee": 4}
+MIN_VALUES = {"square": 3, "knee": 4}
 # Behind the residual's unit in a parameter's, by its name, {} for the covariate's; nothing where it is not here.
 _PER_COVARIATE = {"k": "/{}", "m": "/{}", "k2": "/{}^2"}
 _UNITS_OF_STRAIN = {"k": "ppm/{}", "c": "ppm"}
@@ -225,7 +225,7 @@ def _terms_of(
     """
     grids: dict[str, tuple[float, ...]] = {"linear": ()}
     for form in FORMS_BY_KIND[covariate.kind]:
-        if covariate.distinct >= FEWEST_VALUES.get(form, 2):
+        if covariate.distinct >= MIN_VALUES.get(form, 2):
             grids[form] = grid_of(form, covariate)
     for form, grid in grids.items():
         for port in ports:

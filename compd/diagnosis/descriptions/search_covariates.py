@@ -22,7 +22,7 @@ Kind: TypeAlias = Literal["workspace", "place", "angle", "load", "flow", "other"
 
 STAYED_THE_SAME = "stayed the same"
 # Smaller changes, as a share of the largest value, are rounding.
-LEAST_CHANGE = 1e-9
+MIN_CHANGE = 1e-9
 # A middle nearer to zero than this share of the covariate's range is zero, and it is rounded to half of that.
 MIDDLE_SHARE = 0.1
 
@@ -129,7 +129,7 @@ def round_within(value: float, tolerance: float) -> float:
 
 
 def _changes(values: FloatArray) -> bool:
-    return len(values) > 0 and float(np.ptp(values)) > LEAST_CHANGE * max(1.0, float(np.abs(values).max()))
+    return len(values) > 0 and float(np.ptp(values)) > MIN_CHANGE * max(1.0, float(np.abs(values).max()))
 
 
 def _is_among(values: FloatArray, covariates: list[SearchCovariate]) -> bool:

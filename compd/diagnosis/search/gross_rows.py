@@ -14,7 +14,7 @@ from compd.comparison import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import GrossRows
 from compd.diagnosis.search_criteria import GrossCriteria
-from compd.statistics import LEAST_SIGMA, robust_regression, trimmed_scale
+from compd.statistics import MIN_SIGMA, robust_regression, trimmed_scale
 
 # Rounds of reweighting: with the exponent of the criteria the weights settle in about ten.
 ROUNDS = 12
@@ -68,7 +68,7 @@ def weigh_rows(
     )
     left = residual - G @ theta
     judged: BoolArray = np.asarray(np.isfinite(left).all(axis=1))
-    scale = np.maximum(trimmed_scale(left[known]), LEAST_SIGMA)
+    scale = np.maximum(trimmed_scale(left[known]), MIN_SIGMA)
     distance = np.where(judged[:, None], np.abs(left) / scale, 0.0)
     far = (distance > criteria.gross_sigmas).any(axis=1)
     gross = far & ~_confirmed(left, judged, visit, criteria.gross_sigmas * np.sqrt(2.0) * (noise or scale))

@@ -18,7 +18,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.statistics import ridge_inverse, solve_ridge
 
 # Ridge of a parameter without a plausible range, as a share of its column's sum of squares: conditioning alone.
-LEAST_RIDGE = 1e-9
+MIN_RIDGE = 1e-9
 # Approximate number of elements of normal equations in a batch of sets of columns.
 BATCH = 2_000_000
 
@@ -36,13 +36,13 @@ class Regressors:
 
     @cached_property
     def ridge(self) -> FloatArray:
-        """(P,) ridge of each parameter: 1 / largest^2 + LEAST_RIDGE |column|^2.
+        """(P,) ridge of each parameter: 1 / largest^2 + MIN_RIDGE |column|^2.
 
         The plausible range counts as one measurement of zero with the range as its standard deviation. It bounds what
         the rows do not determine, and is negligible against what they do.
         """
         sum_of_squares = (self.values**2).sum(axis=(0, 1))
-        return np.asarray(1.0 / self.largest**2 + LEAST_RIDGE * sum_of_squares + 1e-300)
+        return np.asarray(1.0 / self.largest**2 + MIN_RIDGE * sum_of_squares + 1e-300)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.search.regression import NormalEquations, RegressionData, Regressors, normal_equations
 
 # A loss is at least this share of what it was without any candidate: rounding.
-LEAST_LOSS = 1e-9
+MIN_LOSS = 1e-9
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class SubsetLosses:
         ).reshape(len(candidates), len(data.splits))
         self._prices = np.array([candidate.price(criteria) for candidate in candidates])
         self.floor_known = least_loss > 0
-        self._least_loss = max(least_loss, LEAST_LOSS * self.baseline)
+        self._least_loss = max(least_loss, MIN_LOSS * self.baseline)
         self._losses: dict[tuple[int, ...], float] = {(): self.baseline}
         self._by_row: dict[tuple[tuple[int, ...], bytes], FloatArray] = {}
 

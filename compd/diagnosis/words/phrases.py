@@ -21,11 +21,11 @@ _BUNDLED = frozenset(effect.id for effect in BUNDLED)
 # Effects that people know by another name than their id.
 _PLAIN_NAMES = {"reference_registration": "the instrument's frame"}
 # A parameter that has more values than this is said by its smallest and its largest.
-MOST_VALUES = 3
+MAX_VALUES = 3
 # Rivals of one effect that are named.
-MOST_RIVALS = 3
+MAX_RIVALS = 3
 # Single gross rows that are named.
-MOST_ROWS = 4
+MAX_ROWS = 4
 
 IMPLAUSIBLE = "IMPLAUSIBLE"
 
@@ -55,7 +55,7 @@ def parameter_texts(step: DiagnosisStep, links: int) -> dict[str, str]:
         name = values[0].name if len(values) == 1 else f"{values[0].name} to {values[-1].name}"
         if len(values) == 1:
             text = estimate_text(numbers[0], std, values[0].unit)
-        elif len(values) <= MOST_VALUES:
+        elif len(values) <= MAX_VALUES:
             text = estimates_text(numbers, std, values[0].unit)
         else:
             text = estimates_text([min(numbers), max(numbers)], std, values[0].unit, " to ")
@@ -98,8 +98,8 @@ def followed_text(finding: EmpiricalFinding) -> str:
 
 def rivals_text(step: DiagnosisStep) -> str:
     """An effect and those that do as well in its place: "link_elasticity or joint_contact (99 % alike)"."""
-    rivals = [rival.name for rival in step.rivals[:MOST_RIVALS]]
-    others = [f"{len(step.rivals) - MOST_RIVALS} more"] if len(step.rivals) > MOST_RIVALS else []
+    rivals = [rival.name for rival in step.rivals[:MAX_RIVALS]]
+    others = [f"{len(step.rivals) - MAX_RIVALS} more"] if len(step.rivals) > MAX_RIVALS else []
     names = join_words([step.effect.id, *rivals, *others], "or")
     return f"{names} ({percent_text(max(rival.cosine for rival in step.rivals))} alike)"
 
@@ -143,7 +143,7 @@ def constant_text(constant: ConstantFinding, unit: str) -> str:
     return f"a constant of {size}: {join_words(names, 'or')}; these rows cannot tell"
 
 
-def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: int = MOST_ROWS) -> list[str]:
+def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: int = MAX_ROWS) -> list[str]:
     """How many rows nothing explains, how far off they are, where they lie, and what to look at.
 
     most_rows : single rows that are named.

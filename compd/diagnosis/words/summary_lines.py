@@ -27,10 +27,10 @@ from compd.diagnosis.words.summary import CANNOT_KNOW
 from compd.text import LabelledText, fall_text, fit_lines, join_words, number_text, percent_text
 
 # What a terminal shows without scrolling, and its usual width.
-MOST_LINES = 12
+MAX_LINES = 12
 WIDTH = 80
 # Effects, rivals and untested effects that are said here.
-MOST_NAMED = 3
+MAX_NAMED = 3
 NO_RIVAL = "no other effect that was tried does as well"
 # A probability above this is said before the numbers.
 DOUBTFUL = 0.01
@@ -60,10 +60,10 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     others = [text for text in others if text.clauses]
     if len(others) >= CROWDED:
         others = [text for text in others if text.clauses != (NO_RIVAL,)]
-    room = MOST_LINES - 1 - len(others)
+    room = MAX_LINES - 1 - len(others)
     label = "Shares" if diagnosis.verdict in ("partial", "unexplained") else "Found"
-    texts = [LabelledText(label, found, names, least=min(len(found), MOST_NAMED, room))] if found else []
-    return [_heading(diagnosis, fall), *fit_lines([*texts, *others], MOST_LINES - 1, WIDTH)]
+    texts = [LabelledText(label, found, names, least=min(len(found), MAX_NAMED, room))] if found else []
+    return [_heading(diagnosis, fall), *fit_lines([*texts, *others], MAX_LINES - 1, WIDTH)]
 
 
 def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
@@ -126,7 +126,7 @@ def _found(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
 
 def _changed(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     changes = [finding for finding in diagnosis.depends_on if finding.is_change]
-    clauses = [f"{change_text(finding, diagnosis)}: something happened then" for finding in changes[:MOST_NAMED]]
+    clauses = [f"{change_text(finding, diagnosis)}: something happened then" for finding in changes[:MAX_NAMED]]
     return [
         *clauses,
         *(f"with it {fall_text([fall.after, finding.heldout_rms_um], fall.unit)}" for finding in changes[:1]),
@@ -193,14 +193,14 @@ def _or_else(diagnosis: Diagnosis) -> list[str]:
     clauses = [f"{rivals_text(step)}: these rows cannot tell" for step in diagnosis.steps if step.rivals]
     untested = untested_here(diagnosis)
     likely = [effect for effect in untested if effect.likely]
-    clauses += [f"{effect.effect} may be behind it, and could not be tried" for effect in likely[:MOST_NAMED]]
+    clauses += [f"{effect.effect} may be behind it, and could not be tried" for effect in likely[:MAX_NAMED]]
     if not clauses and diagnosis.steps:
         clauses.append(NO_RIVAL)
     others = [effect.effect for effect in untested if not effect.likely]
     if diagnosis.verdict == "not_testable":
-        clauses += [f"{effect.effect} {effect.why}" for effect in untested if not effect.likely][:MOST_NAMED]
+        clauses += [f"{effect.effect} {effect.why}" for effect in untested if not effect.likely][:MAX_NAMED]
     elif others:
-        shown = others[:MOST_NAMED] + ([f"{len(others) - MOST_NAMED} more"] if len(others) > MOST_NAMED else [])
+        shown = others[:MAX_NAMED] + ([f"{len(others) - MAX_NAMED} more"] if len(others) > MAX_NAMED else [])
         clauses.append(f"not testable here: {join_words(shown)}")
     return clauses
 

@@ -3,7 +3,7 @@ from .cross_checks.cross_checks import LOOK_EVERY_S as LOOK_EVERY_S
 from .cross_checks.cross_checks import Votes as Votes
 from .cross_checks.machine_view import WiredLength as WiredLength
 from .gauge_trust import Judge as Judge
-from .polled_round import FASTEST_ROUND_S as FASTEST_ROUND_S
+from .polled_round import MIN_ROUND_S as MIN_ROUND_S
 from .polled_round import NO_REPLY_PENDING as NO_REPLY_PENDING
 from .possible_motion import MotionLimits as MotionLimits
 from .possible_motion import unseen_jump_mm as unseen_jump_mm
@@ -11,11 +11,11 @@ from .quantity_bounds import UNIT_LIMITS as UNIT_LIMITS
 from .quantity_bounds import quantity_limits as quantity_limits
 from .quantity_trust import QuantityLimits as QuantityLimits
 from .quantity_trust import QuantityTrust as QuantityTrust
-from .reading_trust import LEAST_MOTION as LEAST_MOTION
+from .reading_trust import MIN_MOTION as MIN_MOTION
 from .reading_trust import ReadingTrust as ReadingTrust
 from .reading_trust import TrustSettings as TrustSettings
 from .reply_order import LATER_S as LATER_S
 from .reply_order import SLOWER as SLOWER
 from .round_trigger import read_latched as read_latched
-from .way_evidence import LEAST_WAY_MM as LEAST_WAY_MM
+from .way_evidence import MIN_WAY_MM as MIN_WAY_MM
 from .way_evidence import WAY_SHARE as WAY_SHARE

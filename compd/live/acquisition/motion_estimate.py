@@ -32,10 +32,10 @@ from compd.reading import ROUNDS_UNTIL_DUE
 from compd.stated_noise import DIFFERENCE_SIGMAS
 
 # Longest window (s) of a speed; an older drift says little about the present.
-LONGEST_WINDOW_S = 1.0
+MAX_WINDOW_S = 1.0
 # Largest growth of a speed from one window to the next: the factor at which a slope limiter does not overshoot (P. K.
 # Sweby, SIAM J. Numer. Anal. 21 (1984) 995-1011).
-LARGEST_GROWTH = 2.0
+MAX_GROWTH = 2.0
 # Age (rounds) at which a reading is replaced: one round, or two for a reading that waits for the end of its round.
 HORIZON_ROUNDS = 2.0
 # The usual round time is the median of this many last rounds.
@@ -43,7 +43,7 @@ _USUAL_ROUNDS = 5
 # Rounds without motion that show a rest; a part that reverses shows one of them.
 _CALM_ROUNDS = 2
 # Longest time (s) that a motion is assumed to continue; drives stop from full speed within 0.1 to 0.3 s.
-LONGEST_HORIZON_S = 0.15
+MAX_HORIZON_S = 0.15
 # Width of a uniform distribution over its standard deviation (GUM, 4.3.7).
 _UNIFORM = math.sqrt(12.0)
 # Least duration of a window as a share of the last one; polls scatter.
@@ -66,7 +66,7 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
     if duration_s <= 0.0:
         return UNKNOWN
     rounds = [history[k].time_s - history[k - 1].time_s for k in range(max(1, last - 1), last + 1)]
-    horizon_s = min(HORIZON_ROUNDS * max(rounds), LONGEST_HORIZON_S)
+    horizon_s = min(HORIZON_ROUNDS * max(rounds), MAX_HORIZON_S)
     due_s = ROUNDS_UNTIL_DUE * median(
         history[k].time_s - history[k - 1].time_s for k in range(max(1, last - _USUAL_ROUNDS + 1), last + 1)
     )
@@ -90,7 +90,7 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
     if now * before <= 0.0 or _has_stopped(history, now, tolerance_mm):
         return _rounded(0.0, 0.0, max(u, abs(now)), horizon_s, *as_measured)
     if abs(now) >= abs(before):
-        speed = math.copysign(min(abs(now), LARGEST_GROWTH * abs(before)), now)
+        speed = math.copysign(min(abs(now), MAX_GROWTH * abs(before)), now)
         return _rounded(speed, 0.0, max(u, abs(now - speed)), horizon_s, *as_measured)
     braking = (abs(before) - abs(now)) / duration_s
     speed = abs(now) - braking * duration_s / 2  # the slope is the speed in the middle of the window
@@ -104,7 +104,7 @@ def _window_start(history: Sequence[GaugeSample], last: int, tolerance_mm: float
     newest = history[last]
     start = last - 1
     for k in range(last - 1, -1, -1):
-        if newest.time_s - history[k].time_s > LONGEST_WINDOW_S and k < last - 1:
+        if newest.time_s - history[k].time_s > MAX_WINDOW_S and k < last - 1:
             break
         start = k
         if abs(newest.value - history[k].value) > tolerance_mm:
@@ -145,13 +145,13 @@ def _has_stopped(history: Sequence[GaugeSample], speed: float, tolerance_mm: flo
 def _slopes(history: Sequence[GaugeSample], start: int, duration_s: float) -> list[float]:
     """Mean speeds (mm/s): from `start` to the last reading, then of whole windows as long before it, the latest first.
 
-    Windows that ended more than LONGEST_WINDOW_S ago do not count.
+    Windows that ended more than MAX_WINDOW_S ago do not count.
     """
     newest, begin = history[-1], history[start]
     slopes = [(newest.value - begin.value) / duration_s]
     end = begin
     for k in range(start - 1, -1, -1):
-        if newest.time_s - end.time_s > LONGEST_WINDOW_S:
+        if newest.time_s - end.time_s > MAX_WINDOW_S:
             break
         passed_s = end.time_s - history[k].time_s
         if passed_s >= _AS_LONG * duration_s:

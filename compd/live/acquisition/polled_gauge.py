@@ -12,7 +12,7 @@ from compd.clock import Clock
 from compd.gauge import Gauge, Quality, Reading, bad
 from compd.live.acquisition.gauge_trust import GaugeTrust, Judge
 from compd.live.acquisition.round_trigger import RoundBuffer, stamped
-from compd.live.memory import LONGEST_DETAIL, Latest
+from compd.live.memory import MAX_DETAIL, Latest
 from compd.pushed_gauge import Heard
 
 log = structlog.get_logger()
@@ -21,10 +21,10 @@ _NO_TRUST: Mapping[str, Judge] = {}
 # Faults of the wire. The next poll is likely to succeed, and the last good reading stays valid.
 TRANSIENT_FAULTS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
 # Damaged replies in a row, above which the cause is more than interference.
-MOST_DAMAGED = 10
+MAX_DAMAGED = 10
 DAMAGED = (Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
 # Longest rest (s) of a gauge on an open line: it is polled again within a second of a fault.
-LONGEST_REST_S = 0.9
+MAX_REST_S = 0.9
 # Largest lead (s) of a reading's time over now: `send` returns before its last bit has left. A larger lead comes from
 # another clock.
 MAX_CLOCK_AHEAD_S = 0.05
@@ -88,7 +88,7 @@ class PolledGauge:
         self.rests_until_s = -math.inf
         self.reported = False
         self.failures = 0
-        self._back_off = BackOff(min(timeout_s, LONGEST_REST_S), LONGEST_REST_S)
+        self._back_off = BackOff(min(timeout_s, MAX_REST_S), MAX_REST_S)
         self._stale_after_s = stale_after_s
         self._latest = latest
         channels = [f"{name}.{channel.name}" for channel in driver.channels]
@@ -160,7 +160,7 @@ class PolledGauge:
         """Count a poll that failed as a whole, at the monotonic time `now_s` (s).
 
         A reading that is still good stays after a fault that may pass (`TRANSIENT_FAULTS`); every other channel takes
-        `quality`. After a missing reply, more than MOST_DAMAGED damaged ones in a row, or the second other fault, the
+        `quality`. After a missing reply, more than MAX_DAMAGED damaged ones in a row, or the second other fault, the
         gauge rests for one timeout of the line, then for twice as long each time: a late reply has time to come and go,
         and the others are not slowed.
         """
@@ -173,7 +173,7 @@ class PolledGauge:
         if not kept:
             self._log_change()
         self.failures += 1
-        if self.failures > (MOST_DAMAGED if quality in DAMAGED else 0 if quality is Quality.TIMEOUT else 1):
+        if self.failures > (MAX_DAMAGED if quality in DAMAGED else 0 if quality is Quality.TIMEOUT else 1):
             self.rests_until_s = now_s + self._back_off.failed()
 
     def driver_error(self, error: Exception) -> str:
@@ -218,7 +218,7 @@ class PolledGauge:
 
     def _note(self, quality: Quality, detail: str) -> None:
         self.quality = quality
-        self.detail = detail[:LONGEST_DETAIL]
+        self.detail = detail[:MAX_DETAIL]
 
     def _log_change(self) -> None:
         """Log a change of quality, except to and from LINE_LOST, which the line logs once for all its gauges."""

@@ -18,14 +18,14 @@ from compd.gauge import LineFault, Quality, Reading
 from compd.line_settings import PolledLineSettings
 from compd.lines import Line, explained, shown
 from compd.live.acquisition.absent_gauges import AbsentGauges
-from compd.live.acquisition.polled_gauge import DAMAGED, LONGEST_REST_S, BackOff, PolledGauge
+from compd.live.acquisition.polled_gauge import DAMAGED, MAX_REST_S, BackOff, PolledGauge
 from compd.live.acquisition.reply_order import ReplyOrder
 from compd.live.acquisition.round_trigger import RoundBuffer, send_trigger
 from compd.live.memory import PollRequests
 
 # Shortest period (s) of polling rounds. Modbus TCP answers in 0.1 ms; polling it without a pause would starve the other
 # lines of the interpreter and keep a processor busy.
-FASTEST_ROUND_S = 2e-3
+MIN_ROUND_S = 2e-3
 # Stands for the time of a round trigger that could not be sent.
 NOT_LATCHED_S = -math.inf
 # Faults after which no byte of a reply can follow. After any other fault the line is drained, so that the rest of a
@@ -93,7 +93,7 @@ class PolledRound:
         self._publish()
         end_s = self._clock.monotonic()
         self.duration_s = end_s - start_s
-        next_s = start_s + max(self._poll_every_s, FASTEST_ROUND_S)
+        next_s = start_s + max(self._poll_every_s, MIN_ROUND_S)
         wake_s = max(next_s, min((gauge.rests_until_s for gauge in self._gauges), default=next_s))
         if wake_s > end_s:
             self._clock.wait(self._stop, wake_s - end_s)
@@ -104,7 +104,7 @@ class PolledRound:
             count = self._poll_requests.count(gauge.name)
             if count != self._requested[gauge.name]:
                 self._requested[gauge.name] = count
-                if gauge.rests_until_s > now_s + LONGEST_REST_S:
+                if gauge.rests_until_s > now_s + MAX_REST_S:
                     gauge.resume()
 
     def _publish(self) -> None:

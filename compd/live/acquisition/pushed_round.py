@@ -18,7 +18,7 @@ log = structlog.get_logger()
 # Interval (s) of new requests for a refused node or topic, which may exist later.
 SUBSCRIBE_EVERY_S = 2.0
 # Longest wait (s) before the thread checks whether it is to end.
-LONGEST_WAIT_S = 0.1
+MAX_WAIT_S = 0.1
 
 
 @dataclass
@@ -82,7 +82,7 @@ class PushedRound:
         if now_s >= self._subscribe_s:
             line.subscribe([listener.address for listener in self._listeners])
             self._subscribe_s = now_s + SUBSCRIBE_EVERY_S
-        messages = line.messages(LONGEST_WAIT_S)
+        messages = line.messages(MAX_WAIT_S)
         for message in messages:
             self._publish(message)
         self._note_silence()

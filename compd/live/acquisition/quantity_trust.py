@@ -24,13 +24,13 @@ from compd.live.memory import Doubt, TrustMemory
 # Longest time (s) that a quantity may be implausible: beyond a burst of interference, below the usual `loop.hold_s`.
 LASTING_S = 1.0
 # Largest share (s) of that time that one reading counts for, also for a gauge that is polled seldom.
-_LONGEST_SHARE_S = LASTING_S / 5
+_MAX_SHARE_S = LASTING_S / 5
 # A quantity begins at the median of this many readings, or of those within this time (s), so that a single reading does
 # not decide for all that follow. Its neighbours are awaited for the same time.
-_FEWEST_FIRST, _LONGEST_START_S = 5, 1.0
+_MIN_FIRST, _MAX_START_S = 5, 1.0
 # Age (s) from which a neighbour's reading no longer counts.
 _OLD_S = 60.0
-_FEWEST_NEIGHBOURS = 2
+_MIN_NEIGHBOURS = 2
 
 
 class QuantityLimits(NamedTuple):
@@ -141,23 +141,23 @@ class QuantityTrust:
             return unconfirmed
         if not self._first:
             self._begun_s = min(answer.time_s for answer in answers)
-        self._first = [*self._first[1 - _FEWEST_FIRST :], reading]
+        self._first = [*self._first[1 - _MIN_FIRST :], reading]
         passed_s = reading.time_s - self._begun_s
         values = [each.value for each in self._first]
         if math.isfinite(self._limits.fastest_per_s):
-            if len(values) < _FEWEST_FIRST and passed_s < _LONGEST_START_S:
+            if len(values) < _MIN_FIRST and passed_s < _MAX_START_S:
                 return bad(reading.time_s, Quality.MISMATCH, "has been read too few times yet")
             scatter, possible = max(values) - min(values), self._possible_change(reading.time_s, self._first[0].time_s)
             if scatter > 2 * self._limits.tolerance + possible:
                 return self._scattering(reading, scatter)
         unread = np.isnan(self._memory.shown[self._neighbours]).any() and math.isfinite(self._limits.apart)
-        if unread and passed_s < _LONGEST_START_S:
+        if unread and passed_s < _MAX_START_S:
             return bad(reading.time_s, Quality.MISMATCH, "its neighbours have not been read yet")
         return self._from(float(np.median(values)), reading)
 
     def _scattering(self, reading: Reading, scatter: float) -> Reading:
         """Readings that scatter from the start: a later agreement is chance."""
-        self._implausible_s += min(reading.time_s - self._first[-2].time_s, _LONGEST_SHARE_S)
+        self._implausible_s += min(reading.time_s - self._first[-2].time_s, _MAX_SHARE_S)
         if self._implausible_s >= LASTING_S:
             return self._distrust(reading, _Fault(Doubt.JUMPED, scatter, ""))
         return bad(reading.time_s, Quality.MISMATCH, f"its first readings scatter by {scatter:.3g} {self._unit}")
@@ -199,7 +199,7 @@ class QuantityTrust:
     def _share_s(self, time_s: float) -> float:
         """Time (s) that a reading counts for."""
         passed_s, self._judged_s = time_s - self._judged_s, time_s
-        return min(max(passed_s, 0.0), _LONGEST_SHARE_S) if math.isfinite(passed_s) else 0.0
+        return min(max(passed_s, 0.0), _MAX_SHARE_S) if math.isfinite(passed_s) else 0.0
 
     def _fault(self, value: float, time_s: float) -> _Fault | None:
         """Reason why a value at this time is implausible; None if it is plausible."""
@@ -212,7 +212,7 @@ class QuantityTrust:
             if abs(away) > limits.tolerance + self._possible_change(time_s, self._expected_s):
                 text = f"{value:g} {unit}, {away:+.3g} at once, fastest {limits.fastest_per_s:g} a second"
                 return _Fault(Doubt.JUMPED, away, text)
-        if math.isfinite(limits.apart) and len(self._neighbours) >= _FEWEST_NEIGHBOURS:
+        if math.isfinite(limits.apart) and len(self._neighbours) >= _MIN_NEIGHBOURS:
             return self._apart(value, time_s)
         return None
 
@@ -230,7 +230,7 @@ class QuantityTrust:
         speak = (memory.doubt[places] <= Doubt.LOST) & (time_s - memory.shown_s[places] < _OLD_S)
         others = memory.shown[places][speak]
         far = np.abs(others - value) > self._limits.apart
-        if 2 * far.sum() <= len(others) or far.sum() < _FEWEST_NEIGHBOURS:
+        if 2 * far.sum() <= len(others) or far.sum() < _MIN_NEIGHBOURS:
             return None
         away = value - float(np.median(others))
         return _Fault(

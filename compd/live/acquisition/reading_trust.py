@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from compd.gauge import Quality, Reading, bad
-from compd.live.acquisition.motion_estimate import LONGEST_WINDOW_S, MotionEstimate
+from compd.live.acquisition.motion_estimate import MAX_WINDOW_S, MotionEstimate
 from compd.live.acquisition.motion_while_away import all_back, moved_while_away, scales_stood, stood_still
 from compd.live.acquisition.possible_motion import (
     BASE_S,
@@ -40,15 +40,15 @@ _WAIT_FOR_MOTION_S = 0.3
 # or this many of the channel's own longest gaps, if that is longer.
 _WAIT_FOR_POLLS = 2.0
 # Motion (tolerances) below which a gauge may move in a short gap unnoticed by the others.
-LEAST_MOTION = 10.0
+MIN_MOTION = 10.0
 # Longest interval (s) that is no gap: a scale with 300 mm/s2 moves less than 1 mm from rest to rest, and no display
 # restarts.
-SHORTEST_GAP_S = 0.1
+MIN_GAP_S = 0.1
 # A gap is also this many times as long as the usual interval between readings.
 _GAP = 2.0
 _USUAL_OF = 8
 # Smallest step (signal periods): an interpolator that loses counts loses whole periods or quarters of them.
-LEAST_PERIODS = 0.25
+MIN_PERIODS = 0.25
 # Samples of motion that are kept.
 _HISTORY = 32
 # Two answers agree if they differ by less than this share of the jump that they show.
@@ -94,7 +94,7 @@ class ReadingTrust:
         self._latest = LatestScatter(self._tolerance_mm)
         self._motion = MotionEstimate(self._tolerance_mm)
         period_mm = settings.signal_period_mm
-        least_mm = LEAST_PERIODS * period_mm - self._tolerance_mm
+        least_mm = MIN_PERIODS * period_mm - self._tolerance_mm
         self._steps = None if math.isnan(period_mm) else Steps(least_mm, self._tolerance_mm)
 
     def surprises(self, sample: GaugeSample) -> bool:
@@ -198,7 +198,7 @@ class ReadingTrust:
     def _unexplained_mm(self, sample: GaugeSample) -> float:
         """Change (mm) of a joint or the frame at rest; 0 within its noise, and over times of possible drift."""
         memory, i = self._memory, self._i
-        if i < memory.scales or not self._history or sample.time_s - memory.time_s[i] > LONGEST_WINDOW_S:
+        if i < memory.scales or not self._history or sample.time_s - memory.time_s[i] > MAX_WINDOW_S:
             return 0.0
         change_mm = abs(sample.value - float(memory.value[i]))
         within_mm = max(self._settings.noise_mm, _DIGITS * float(memory.step_mm[i]))
@@ -295,9 +295,9 @@ class ReadingTrust:
     def _needs_evidence(self, sample: GaugeSample) -> bool:
         """Whether a gauge that may count anew shows another value after a gap, or after a poll that has failed."""
         last = self._history[-1]
-        if self._settings.returns_by_itself or abs(sample.value - last.value) <= LEAST_MOTION * self._tolerance_mm:
+        if self._settings.returns_by_itself or abs(sample.value - last.value) <= MIN_MOTION * self._tolerance_mm:
             return False
-        return self._missed or bool(self._after) or sample.time_s - last.time_s > max(SHORTEST_GAP_S, self._gap_s())
+        return self._missed or bool(self._after) or sample.time_s - last.time_s > max(MIN_GAP_S, self._gap_s())
 
     def _gap_s(self) -> float:
         """Shortest interval (s) between two readings that counts as longer than usual."""
@@ -314,7 +314,7 @@ class ReadingTrust:
         after, last = self._after, self._history[-1]
         after += [later for later in (earlier, sample) if not after or later.time_s > after[-1].time_s]
         alone = stood_still(memory, i)
-        short = after[0].time_s - last.time_s <= SHORTEST_GAP_S
+        short = after[0].time_s - last.time_s <= MIN_GAP_S
         if short and not alone:
             return self._accounted_for(reading, sample)
         may_wait = sample.time_s - after[0].time_s < max(_WAIT_FOR_MOTION_S, _WAIT_FOR_POLLS * self._gap_s())

@@ -30,17 +30,17 @@ from compd.gauge import Gauge, replies_tell_whose
 # Polls of the line whose longest duration is remembered: some ten rounds.
 POLLS_IN_MIND = 256
 # Fewest polls, at least one of each gauge, before a reply must be faster than the line's timeout.
-FEWEST_POLLS = 4
+MIN_POLLS = 4
 # Largest duration of a reply, relative to the longest remembered one; and
 SLOWER = 1.25
 # its largest excess (s): an adapter hands over received bytes once a millisecond.
 LATER_S = 2e-3
 # Latest arrival (s) of a reply; a later one is lost. A line with one gauge is in doubt after a missed reply and after
 # its opening, since earlier requests may still be answered.
-LATEST_REPLY_S = 10.0
+MAX_REPLY_S = 10.0
 # Longest time (s) to listen after a missed reply: the largest interval of requests, except for gauges that are polled
 # seldom.
-LONGEST_LISTEN_S = 2.0
+MAX_LISTEN_S = 2.0
 # Share of quick answers; the others waited for the device or for this computer.
 NEARLY_EVERY = 0.9
 # Requests are close together if the next one follows within this many times the time of a quick answer.
@@ -61,7 +61,7 @@ class ReplyOrder:
         self._shortest = min(received, default=0)  # length of the replies in bytes; 0 if unknown
         self._timeout_s = timeout_s
         self._durations_s: deque[float] = deque(maxlen=POLLS_IN_MIND)
-        self._fewest_polls = max(FEWEST_POLLS, len(gauges))
+        self._fewest_polls = max(MIN_POLLS, len(gauges))
         self._in_doubt_until_s = -math.inf
         self._in_step = False
         self._asked_s = math.nan  # time of the last request
@@ -91,7 +91,7 @@ class ReplyOrder:
         if self._quick:
             return self._quickly_s()
         if not self._in_step and self._apart_s > 0.0:
-            return min(self._apart_s + JITTER_S, LONGEST_LISTEN_S)
+            return min(self._apart_s + JITTER_S, MAX_LISTEN_S)
         if not self._in_step or len(self._durations_s) < self._fewest_polls:
             return self._timeout_s
         return min(self._timeout_s, max(SLOWER * max(self._durations_s) - passed_s, 0.0) + LATER_S)
@@ -135,7 +135,7 @@ class ReplyOrder:
 
         absent : of a gauge that did not answer before either, while others on its line may: the line is not late.
         """
-        self._in_doubt_until_s = now_s + LATEST_REPLY_S
+        self._in_doubt_until_s = now_s + MAX_REPLY_S
         self._in_step = self._in_step and absent
         self._quick = False
 
@@ -146,7 +146,7 @@ class ReplyOrder:
         missed reply, in case that it was noise, and the reply is later than any before.
         """
         if self._in_step and len(self._durations_s) >= self._fewest_polls:
-            self._in_doubt_until_s = now_s + LATEST_REPLY_S
+            self._in_doubt_until_s = now_s + MAX_REPLY_S
             self._quick = False
         else:
             self.missed(now_s)

@@ -27,10 +27,10 @@ FEWEST = 32
 WINDOW_S = 1.0
 # Windows whose median counts, and the fewest of them.
 _WINDOWS = 5
-_FEWEST_WINDOWS = 2
+_MIN_WINDOWS = 2
 # Fewest changes from one side of the line to the other, each by half a standard deviation beyond it: three periods. The
 # residual of a move with one reversal has three or four such changes, that of noise 0.3 for each reading.
-_FEWEST_CHANGES = 6
+_MIN_CHANGES = 6
 _BEYOND = 0.5
 # Largest length of the line, in standard deviations, for readings about one place.
 _STAYS = 2.0
@@ -38,7 +38,7 @@ _STAYS = 2.0
 _DAMAGED = 7.0
 # Last readings whose turns and changes count, and the fewest turns that no machine makes.
 _LAST = 32
-_FEWEST_TURNS = 2
+_MIN_TURNS = 2
 # Rounded to 1 pm, below its uncertainty, since a recording has it as text.
 _DECIMALS_MM = 9
 
@@ -77,9 +77,9 @@ class RestScatter:
         deviation_mm = math.sqrt(float(off_mm @ off_mm) / (len(off_mm) - 2))
         stands = float(np.ptp(value_mm[whole])) <= self._tolerance_mm
         stays = went_mm <= max(self._tolerance_mm, _STAYS * deviation_mm)
-        if stands or (stays and _changes_of_side(off_mm, _BEYOND * deviation_mm) >= _FEWEST_CHANGES):
+        if stands or (stays and _changes_of_side(off_mm, _BEYOND * deviation_mm) >= _MIN_CHANGES):
             self._windows.append(deviation_mm)
-            if len(self._windows) >= _FEWEST_WINDOWS:
+            if len(self._windows) >= _MIN_WINDOWS:
                 self.mm = round(float(np.median(self._windows)), _DECIMALS_MM)
 
 
@@ -117,7 +117,7 @@ class LatestScatter:
         """
         turns_mm = [size for _, size in self._turns]
         shown_mm = [size for _, size in self._changes]
-        if len(turns_mm) >= _FEWEST_TURNS:
+        if len(turns_mm) >= _MIN_TURNS:
             shown_mm.append(sum(turns_mm) / len(turns_mm))
         return round(max(shown_mm), _DECIMALS_MM) if shown_mm else math.nan
 

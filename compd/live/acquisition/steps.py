@@ -15,7 +15,7 @@ from compd.live.acquisition.possible_motion import GaugeSample
 _FEWEST = 3
 _STANDS_S = 0.05
 # Largest interval (s) of readings for a step; in a longer one a reading on the way may be missing.
-_LONGEST_GAP_S = 0.1
+_MAX_GAP_S = 0.1
 
 
 class Step(NamedTuple):
@@ -56,7 +56,7 @@ class Steps:
             return None
         (stood_mm, until_s), self._stood = self._stood, None
         height_mm = _middle(run) - stood_mm
-        unknown = not self._is_seen and run[0].time_s - until_s > _LONGEST_GAP_S
+        unknown = not self._is_seen and run[0].time_s - until_s > _MAX_GAP_S
         return None if unknown or abs(height_mm) < self._least_mm else Step(height_mm, until_s, self._is_seen)
 
 

@@ -22,7 +22,7 @@ from compd.live.memory import Doubt, TrustMemory
 # path.
 SIDE_S = 0.06
 # Least motion (mm) that gives a direction: readings are late by 1 ms, in which a link moves some 0.05 mm.
-LEAST_WAY_MM = 0.1
+MIN_WAY_MM = 0.1
 # Relative uncertainty of a path from those of other links: links turn while they move, and readings are late.
 WAY_SHARE = 0.1
 # Two paths are one straight path if their ratios differ by less than this, as the sine of an angle.
@@ -62,7 +62,7 @@ def way_by_links(
 
     sides = [ways_mm(start, before[-1]), ways_mm(after[0], end)]
     gap_mm = ways_mm(before[-1], after[0])[1:]
-    sides = [side for side in sides if np.abs(side[1:]).max() >= LEAST_WAY_MM]
+    sides = [side for side in sides if np.abs(side[1:]).max() >= MIN_WAY_MM]
     if not sides:
         return None
     units = [side / np.linalg.norm(side[1:]) for side in sides]
@@ -74,9 +74,9 @@ def way_by_links(
     lengths, *_ = np.linalg.lstsq(directions, gap_mm, rcond=None)
     left_mm = float(np.linalg.norm(directions @ lengths - gap_mm))
     way_mm = float(np.array([unit[0] for unit in units]) @ lengths)
-    if left_mm > WAY_SHARE * np.linalg.norm(gap_mm) + LEAST_WAY_MM:
+    if left_mm > WAY_SHARE * np.linalg.norm(gap_mm) + MIN_WAY_MM:
         return None  # neither one path nor two
-    return ExpectedWay(way_mm, WAY_SHARE * float(np.abs(lengths).max()) + LEAST_WAY_MM)
+    return ExpectedWay(way_mm, WAY_SHARE * float(np.abs(lengths).max()) + MIN_WAY_MM)
 
 
 def way_by_itself(before: Sequence[GaugeSample], after: Sequence[GaugeSample]) -> ExpectedWay | None:
@@ -86,14 +86,14 @@ def way_by_itself(before: Sequence[GaugeSample], after: Sequence[GaugeSample]) -
         return None
     speeds = []
     for begin, end in ((_side_start(before), before[-1]), (after[0], side_end)):
-        if end.time_s <= begin.time_s or abs(end.value - begin.value) < LEAST_WAY_MM:
+        if end.time_s <= begin.time_s or abs(end.value - begin.value) < MIN_WAY_MM:
             return None
         speeds.append((end.value - begin.value) / (end.time_s - begin.time_s))
     mean = sum(speeds) / 2
     if abs(speeds[1] - speeds[0]) > 2 * WAY_SHARE * abs(mean):
         return None
     way_mm = mean * (after[0].time_s - before[-1].time_s)
-    return ExpectedWay(way_mm, WAY_SHARE * abs(way_mm) + LEAST_WAY_MM)
+    return ExpectedWay(way_mm, WAY_SHARE * abs(way_mm) + MIN_WAY_MM)
 
 
 def _side_start(before: Sequence[GaugeSample]) -> GaugeSample:

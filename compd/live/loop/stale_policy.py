@@ -16,7 +16,7 @@ from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
 
 # How long the correction is held, at most, while the daemon ends.
-_LONGEST_END_S = 1.0
+_MAX_END_S = 1.0
 _NO_QUANTITIES: Mapping[str, FloatArray] = {}
 
 
@@ -124,7 +124,7 @@ def held_comparators(
 
     why : the daemon ends. now_s : monotonic time of the snapshot.
     """
-    if last_good is None or now_s - last_good.time_s > _LONGEST_END_S:
+    if last_good is None or now_s - last_good.time_s > _MAX_END_S:
         return usable_comparators(None, last_good, Lost(why), now_s, settings)
-    expires_s = last_good.time_s + _LONGEST_END_S
+    expires_s = last_good.time_s + _MAX_END_S
     return _held(last_good, f"{why}; the last good set is held", expires_s, now_s)

@@ -19,7 +19,7 @@ FILE_NAME = "machine-zero.json"
 OLD_FILE_NAME = "machine-zero.json.old"
 # Format 1, of releases up to 0.2, has no checksum; neither 1 nor 2 has quantities and ports.
 _FORMAT = 3
-_LARGEST_FILE_BYTES = 1_000_000
+_MAX_FILE_BYTES = 1_000_000
 _TAKE_ONE = "bring the machine to its zero position and run `compd zero`"
 
 log = structlog.get_logger()
@@ -114,7 +114,7 @@ def _old_file(directory: Path) -> dict[Path, bytes]:
     Raises OSError where it is there and cannot be kept.
     """
     try:
-        return {directory / OLD_FILE_NAME: read_small_file(directory / FILE_NAME, _LARGEST_FILE_BYTES)}
+        return {directory / OLD_FILE_NAME: read_small_file(directory / FILE_NAME, _MAX_FILE_BYTES)}
     except FileNotFoundError:
         return {}
 
@@ -135,7 +135,7 @@ def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> Mac
     """
     path = directory / FILE_NAME
     try:
-        content = json.loads(read_small_file(path, _LARGEST_FILE_BYTES).decode())
+        content = json.loads(read_small_file(path, _MAX_FILE_BYTES).decode())
     except FileNotFoundError as error:
         raise StateError(
             Problem(where=str(path), what="machine zero has never been taken", next_step=_TAKE_ONE)

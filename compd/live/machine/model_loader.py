@@ -14,7 +14,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
-from compd.documents import LARGEST_BYTES
+from compd.documents import MAX_BYTES
 from compd.errors import Problem, StateError
 from compd.files import read_small_file
 from compd.live.machine.machine_zero import MachineZero
@@ -42,7 +42,7 @@ class ModelText(NamedTuple):
     def read(cls, path: Path) -> Self:
         """Read a file. Raises StateError where it cannot be read, is no regular file, or has more than 1 MB."""
         try:
-            return cls(str(path), read_small_file(path, LARGEST_BYTES))
+            return cls(str(path), read_small_file(path, MAX_BYTES))
         except OSError as error:
             raise StateError(
                 Problem(

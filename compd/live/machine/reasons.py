@@ -8,7 +8,7 @@ from typing import NamedTuple
 from compd.gauge import Quality
 
 # A reason goes to every client, in every setpoint; READINGS and STATUS name each gauge.
-LONGEST_REASON_BYTES = 300
+MAX_REASON_BYTES = 300
 # The words by which SETPOINT, STATUS, page and command line say that time alone changes nothing.
 WAITS_FOR_PERSON = "waits for a person"
 _AND_MORE = " ... (STATUS names all)"
@@ -71,11 +71,11 @@ def waiting_text(channels: Iterable[str]) -> str:
 
 
 def shortened(reason: str) -> str:
-    """The reason with at most LONGEST_REASON_BYTES of UTF-8."""
+    """The reason with at most MAX_REASON_BYTES of UTF-8."""
     encoded = reason.encode()
-    if len(encoded) <= LONGEST_REASON_BYTES:
+    if len(encoded) <= MAX_REASON_BYTES:
         return reason
-    kept = encoded[: LONGEST_REASON_BYTES - len(_AND_MORE)].decode(errors="ignore")
+    kept = encoded[: MAX_REASON_BYTES - len(_AND_MORE)].decode(errors="ignore")
     return kept.rstrip(" ,;") + _AND_MORE
 
 

@@ -3,7 +3,7 @@ from .control import Phase as Phase
 from .latest import Latest as Latest
 from .latest import Snapshot as Snapshot
 from .poll_requests import PollRequests as PollRequests
-from .readings import LONGEST_DETAIL as LONGEST_DETAIL
+from .readings import MAX_DETAIL as MAX_DETAIL
 from .readings import OK_NUMBER as OK_NUMBER
 from .readings import SLOTS as SLOTS
 from .readings import Readings as Readings

@@ -6,7 +6,7 @@ import os
 import select
 from enum import IntEnum
 
-from compd.documents import LARGEST_BYTES
+from compd.documents import MAX_BYTES
 from compd.live.memory.shared_array import shared_counters
 from compd.live.memory.shared_message import SharedMessage
 
@@ -52,7 +52,7 @@ class Control:
         self.realtime = SharedMessage()
         self.processes = SharedMessage()
         self.headline = SharedMessage(_TEXT_BYTES)
-        self.model_request = SharedMessage(LARGEST_BYTES + _USUAL_BYTES)
+        self.model_request = SharedMessage(MAX_BYTES + _USUAL_BYTES)
         self.model_answer = SharedMessage()
         self.supervisor_woken = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self.turn_given = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)

@@ -49,7 +49,7 @@ _CHECKED_BYTES = _CHECKED.size
 _HEAD_BYTES = _HEAD.size
 _LENGTH_OFFSET = sum(SLOT[name].itemsize for name in (*_NUMBERS, "quality"))
 SLOT_BYTES = _SLOT.size
-LONGEST_DETAIL = _DETAIL_BYTES
+MAX_DETAIL = _DETAIL_BYTES
 _NO_MOTION = (math.nan,) * len(ReadingMotion._fields)
 
 _QUALITIES = tuple(Quality)
@@ -68,7 +68,7 @@ def pack(reading: Reading) -> bytes:
     moves = motion or _NO_MOTION
     text = b""
     if detail:
-        text = detail.encode(errors="replace")[:LONGEST_DETAIL].decode(errors="ignore").encode()
+        text = detail.encode(errors="replace")[:MAX_DETAIL].decode(errors="ignore").encode()
     number = _QUALITY_NUMBERS[quality]
     checksum = zlib.crc32(text, zlib.crc32(_CHECKED.pack(value, time_s, *moves, number, len(text), 0)))
     return _SLOT.pack(value, time_s, *moves, number, len(text), 0, checksum, text)
@@ -89,7 +89,7 @@ _CRC_TABLE = _crc_table()
 def _is_whole(content: NDArray[np.uint8]) -> bool:
     """Whether the checksum of a slot fits."""
     length = np.int64(content[_LENGTH_OFFSET])
-    if length > LONGEST_DETAIL:
+    if length > MAX_DETAIL:
         return False
     crc = np.int64(0xFFFFFFFF)
     for i in range(_CHECKED_BYTES):

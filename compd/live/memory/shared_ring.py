@@ -25,7 +25,7 @@ from compd.live.memory.shared_array import shared_memory
 ENTRIES = 512
 # Ten times what a cycle of a hexapod with ten effects needs, and for larger machines so much for each channel. Memory
 # that is not used costs nothing.
-_SMALLEST_PLACE_BYTES = 64 * 1024
+_MIN_PLACE_BYTES = 64 * 1024
 _CHANNEL_BYTES = 1024
 _HEAD_BYTES = 16
 _HEADER_BYTES = 32
@@ -44,7 +44,7 @@ class SharedRing:
 
     def __init__(self, channels: int = 0) -> None:
         """`channels`: of the machine, whose readings an entry may have."""
-        self._place_bytes = max(_SMALLEST_PLACE_BYTES, channels * _CHANNEL_BYTES)
+        self._place_bytes = max(_MIN_PLACE_BYTES, channels * _CHANNEL_BYTES)
         self.longest_content = self._place_bytes - _HEADER_BYTES
         memory = memoryview(shared_memory(_HEAD_BYTES + ENTRIES * self._place_bytes))
         self._count = memory[:8].cast("Q")

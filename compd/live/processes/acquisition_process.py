@@ -11,7 +11,7 @@ from typing import Any
 from compd.clock import Clock
 from compd.live.acquisition import LOOK_EVERY_S, Acquisition
 from compd.live.memory import Control, Phase, SharedMessage
-from compd.live.system import LARGEST_SHARE, OUT_OF_MEMORY, RationedPriority, limit_memory
+from compd.live.system import MAX_SHARE, OUT_OF_MEMORY, RationedPriority, limit_memory
 
 # Longest time (s) for a driver to release its line in the middle of a poll.
 _STOP_WITHIN_S = 0.5
@@ -81,7 +81,7 @@ class AcquisitionProcess:
     def _priorities(self, acquisition: Acquisition) -> list[RationedPriority]:
         """Of this thread and of every line's. This one looks after the others: a driver that never waits loses its."""
         threads = [line.thread_id for line in acquisition.lines.values()]
-        share = max(LARGEST_SHARE / max(1, len(threads)), _SHARE_OF_A_FAST_LINE)
+        share = max(MAX_SHARE / max(1, len(threads)), _SHARE_OF_A_FAST_LINE)
         own = RationedPriority(self._priority, self._clock)
         return [own, *(RationedPriority(self._priority, self._clock, thread, share) for thread in threads)]
 

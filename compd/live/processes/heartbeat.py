@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 _FIRST_WAIT_S = 0.1
-_LONGEST_WAIT_S = 5.0
+_MAX_WAIT_S = 5.0
 # Looks that a process may take until its first beat.
 _STARTS_WITHIN = 100
 # Time (s) after which a running process has recovered.
@@ -68,7 +68,7 @@ class RestartDelay:
     def ended(self, started_s: float, now_s: float) -> None:
         """The process that was started at `started_s` has ended at `now_s` (s)."""
         self.failures = self.failures + 1 if now_s - started_s < _RECOVERED_S else 1
-        wait_s = 0.0 if self.failures == 1 else min(_FIRST_WAIT_S * 2 ** (self.failures - 2), _LONGEST_WAIT_S)
+        wait_s = 0.0 if self.failures == 1 else min(_FIRST_WAIT_S * 2 ** (self.failures - 2), _MAX_WAIT_S)
         self.due_s = now_s + wait_s
 
     def take(self, now_s: float) -> bool:

@@ -18,7 +18,7 @@ BURST_LINES = 200
 # Largest read of a source, and its interval. A process that prints more waits for its own pipe.
 READ_BYTES = 64 * 1024
 ROUND_S = 0.05
-LONGEST_LINE_BYTES = 4096
+MAX_LINE_BYTES = 4096
 REPORT_EVERY_S = 1.0
 # At the end: what a full pipe holds, and what is printed while it is emptied.
 _LAST_ROUNDS = 4
@@ -47,10 +47,10 @@ class _Source:
         # the rest has more than an unfinished line only where no more lines may be sent
         self.dropped += rest.count(b"\n")
         # one byte more than is shown, so that the line is known to be too long
-        self._unfinished = rest[rest.rfind(b"\n") + 1 :][: LONGEST_LINE_BYTES + 1]
+        self._unfinished = rest[rest.rfind(b"\n") + 1 :][: MAX_LINE_BYTES + 1]
         for line in whole:
-            cut = " ..." if len(line) > LONGEST_LINE_BYTES else ""
-            yield line[:LONGEST_LINE_BYTES].decode("utf-8", "replace") + cut + "\n"
+            cut = " ..." if len(line) > MAX_LINE_BYTES else ""
+            yield line[:MAX_LINE_BYTES].decode("utf-8", "replace") + cut + "\n"
 
     def last_line(self, now_s: float) -> Iterator[str]:
         """The unfinished line, if there is one."""

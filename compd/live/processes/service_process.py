@@ -17,7 +17,7 @@ from compd.live.system import Journal, RationedPriority, sharpen_timers, shorten
 from compd.setpoint_states import State
 
 # Characters. A reason that names every gauge of a machine has thousands; the log has it whole.
-_LONGEST_HEADLINE = 500
+_MAX_HEADLINE = 500
 
 _log = structlog.get_logger()
 
@@ -37,7 +37,7 @@ class StateLog:
         log = _log.info if setpoint.state.valid else _log.warning
         log("state", state=setpoint.state.value, reason=setpoint.reason, mode=setpoint.mode.value)
         headline = f"{setpoint.state}: {setpoint.reason}" if setpoint.reason else str(setpoint.state)
-        self._control.headline.write(headline[:_LONGEST_HEADLINE])
+        self._control.headline.write(headline[:_MAX_HEADLINE])
         self._control.wake_supervisor()
 
 

@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from compd.documents import LARGEST_BYTES
+from compd.documents import MAX_BYTES
 from compd.files import read_small_file, sync_directory, write_new_file
 from compd.live.record.appended_file import AppendedFile
 from compd.live.record.part_table import part_table
@@ -109,7 +109,7 @@ class RecordingPart:
         self._models[hash_] = self._stem.with_name(f"{self._stem.name}{MODEL_MARK}{hash_}.yaml")
         try:
             # the path is what a client called the file
-            content = read_small_file(file, LARGEST_BYTES)
+            content = read_small_file(file, MAX_BYTES)
         except OSError as error:
             return f"cannot be read: {error.strerror or error}"
         if not hashlib.sha256(content).hexdigest().startswith(hash_):

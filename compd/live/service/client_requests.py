@@ -12,14 +12,14 @@ from compd.live.service.message_keys.budget import BudgetKeys
 from compd.live.service.message_keys.machine import MachineKeys
 from compd.live.service.message_keys.message import Keys, SentMessage, VersionKeys
 from compd.live.service.message_keys.status import StatusKeys
-from compd.live.service.messages import LARGEST_NUMBER, ErrorCode, ProtocolError, line, unknown_key
+from compd.live.service.messages import MAX_NUMBER, ErrorCode, ProtocolError, line, unknown_key
 from compd.live.service.order import OrderRequest
 from compd.live.service.request import Asker, Request
 from compd.live.service.request_context import RequestContext, SendLater
 
 # Every program has whole numbers up to here exactly: 2 to the power of 53.
-LARGEST_ID = 2**53
-Coordinate = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
+MAX_ID = 2**53
+Coordinate = Annotated[float, Field(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 Vector = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
 
@@ -53,7 +53,7 @@ class WatchRequest(Request):
         default="setpoints",
         description="setpoints: `SETPOINT` messages; readings: `READINGS` messages, over the Unix socket only",
     )
-    rate_hz: Annotated[int | float, Field(ge=0, le=LARGEST_NUMBER)] = Field(
+    rate_hz: Annotated[int | float, Field(ge=0, le=MAX_NUMBER)] = Field(
         default=math.inf, description="messages per second (Hz); left out: one for every cycle; 0: none"
     )
 
@@ -93,7 +93,7 @@ class TargetRequest(Request):
         description="when it was made, s on the daemon's monotonic clock, as in SETPOINT; left out, or later than it "
         "comes: when it comes",
     )
-    id: Annotated[int, Field(ge=0, le=LARGEST_ID)] | None = Field(
+    id: Annotated[int, Field(ge=0, le=MAX_ID)] | None = Field(
         default=None, description="a number of your own; `target_id` of the setpoints that answer it"
     )
 

@@ -22,12 +22,12 @@ MAX_BEHIND_BYTES = 128 * 1024
 MAX_READINGS_BEHIND_BYTES = 8 * 1024 * 1024
 _RECEIVE_BYTES = 4096
 _LAST_RECEIVE_BYTES = 64 * 1024
-_LONGEST_INTERVAL_S = 1e6
+_MAX_INTERVAL_S = 1e6
 # struct ucred of unix(7): process, user, group.
 _CREDENTIALS = struct.Struct("3i")
 # Of SCM_RIGHTS, and how many may come at once: SCM_MAX_FD of unix(7).
 _DESCRIPTOR = struct.Struct("i")
-_MOST_DESCRIPTORS = 253
+_MAX_DESCRIPTORS = 253
 
 
 class Stream(Enum):
@@ -123,7 +123,7 @@ class ClientSession:
         """Send `rate_hz` messages of the stream per second from now on: inf for every one, 0 for none."""
         self.stream = stream
         self._max_behind_bytes = MAX_READINGS_BEHIND_BYTES if stream is Stream.READINGS else MAX_BEHIND_BYTES
-        self._interval_s = min(1.0 / rate_hz, _LONGEST_INTERVAL_S) if rate_hz else math.inf
+        self._interval_s = min(1.0 / rate_hz, _MAX_INTERVAL_S) if rate_hz else math.inf
         self.due_s = -math.inf if rate_hz else math.inf
 
     @property
@@ -197,7 +197,7 @@ class ClientSession:
                 raise (OSError if self._unwanted.hangs else BlockingIOError)(errno.EMFILE, os.strerror(errno.EMFILE))
         # socket.recv_fds of Python 3.11 leaves the flags out
         data, control, _, _ = self.connection.recvmsg(
-            _RECEIVE_BYTES, socket.CMSG_LEN(_MOST_DESCRIPTORS * _DESCRIPTOR.size), socket.MSG_CMSG_CLOEXEC
+            _RECEIVE_BYTES, socket.CMSG_LEN(_MAX_DESCRIPTORS * _DESCRIPTOR.size), socket.MSG_CMSG_CLOEXEC
         )
         received = [
             descriptor

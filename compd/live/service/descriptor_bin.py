@@ -11,7 +11,7 @@ from contextlib import suppress
 from compd.files import close_descriptor
 
 # Descriptors that wait to be closed. With more the one before them hangs, and no further ones are taken.
-MOST_WAITING = 64
+MAX_WAITING = 64
 # Closing takes microseconds where nothing hangs, s.
 _HANGS_AFTER_S = 1.0
 
@@ -27,7 +27,7 @@ class DescriptorBin:
     @property
     def is_full(self) -> bool:
         """Whether no further descriptors should be taken from clients: those before them cannot be closed."""
-        return self._waiting.qsize() >= MOST_WAITING
+        return self._waiting.qsize() >= MAX_WAITING
 
     @property
     def hangs(self) -> bool:

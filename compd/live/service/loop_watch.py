@@ -11,7 +11,7 @@ from compd.setpoint_states import Mode, State
 
 # Within two periods, and not sooner than 20 ms, clients are told that there is no setpoint. A part of that time is left
 # for the way to them.
-_SHORTEST_LIMIT_S = 0.02
+_MIN_LIMIT_S = 0.02
 _PERIODS = 2
 _SHARE = 0.8
 _REPEAT_EVERY_S = 0.1
@@ -32,7 +32,7 @@ class LoopWatch:
         self, ring: SharedRing, period_s: float, fault: Callable[[], tuple[float, str] | None], start_s: float
     ) -> None:
         """`fault`: monotonic time (s) and reason of the last end of a loop; `start_s`: when the watch begins."""
-        self.limit_s = _SHARE * max(_PERIODS * period_s, _SHORTEST_LIMIT_S)
+        self.limit_s = _SHARE * max(_PERIODS * period_s, _MIN_LIMIT_S)
         self._ring = ring
         self._fault = fault
         self._start_s = start_s

@@ -19,7 +19,7 @@ from compd.text import encode_compact, holds_secret
 PROTOCOL = 1
 MAX_LINE_BYTES = 4096
 # 1e9 mm is 1000 km: a number beyond it is not a coordinate, a rate or an angle.
-LARGEST_NUMBER = 1e9
+MAX_NUMBER = 1e9
 # How much of a faulty text is repeated in an error.
 QUOTED_CHARACTERS = 40
 
@@ -154,7 +154,7 @@ def bad_message(error: ValidationError, name: str, allowed: tuple[str, ...]) -> 
         case "greater_than_equal" if context["ge"] == 0:
             text = f"{key} is {quoted}, allowed 0 or more"
         case "greater_than_equal" | "less_than_equal":
-            text = f"{key} must be within +-{LARGEST_NUMBER:g}"
+            text = f"{key} must be within +-{MAX_NUMBER:g}"
         case "literal_error":
             allowed_texts = context["expected"].replace("'", "").replace(" or ", ", ")
             text = f"{key} is {quoted}, allowed: {allowed_texts}"

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import structlog
 
 from compd.clock import Clock
-from compd.documents import LARGEST_BYTES
+from compd.documents import MAX_BYTES
 from compd.files import read_descriptor
 from compd.live.machine import ModelText
 from compd.live.memory import Control
@@ -24,7 +24,7 @@ from compd.live.service.messages import ErrorCode, ProtocolError, line
 # A file of 1 MB is read in milliseconds, from a network in a second.
 READ_WITHIN_S = 5.0
 # Threads that wait for file systems which do not answer; what they wait for is taken to be of one kind.
-MOST_HANGING = 8
+MAX_HANGING = 8
 
 _log = structlog.get_logger()
 
@@ -81,7 +81,7 @@ class ModelSwitch:
         none. Raises ProtocolError without it, and while another model is being read.
         """
         self._readers = [reader for reader in self._readers if reader.is_alive()]
-        if self._answer is not None or len(self._readers) >= MOST_HANGING:
+        if self._answer is not None or len(self._readers) >= MAX_HANGING:
             raise ProtocolError(ErrorCode.BUSY, "another model is being read")
         if not wish.file:
             self._begin(wish, answer)
@@ -126,7 +126,7 @@ class ModelSwitch:
     def _read_file(self, number: int, file: str, descriptor: int) -> None:
         """On a thread of its own."""
         try:
-            read = _ReadModel(number, ModelText(file, read_descriptor(descriptor, LARGEST_BYTES)), "")
+            read = _ReadModel(number, ModelText(file, read_descriptor(descriptor, MAX_BYTES)), "")
         except OSError as error:
             read = _ReadModel(number, None, f"{file} cannot be read: {error.strerror or error}")
         self._read.put(read)

@@ -16,16 +16,16 @@ from compd.live.service.message_keys.message import SentMessage
 from compd.live.service.messages import line
 from compd.live.service.request import Request
 
-LONGEST_BY = 200
+MAX_BY = 200
 # Characters: a path.
-LONGEST_SUBJECT = 1000
+MAX_SUBJECT = 1000
 
 _log = structlog.get_logger()
 
 
 def _shown(subject: str) -> str:
     """A subject as the log and recordings have it: a client may have written anything."""
-    return "".join(letter if letter.isprintable() else "?" for letter in subject[:LONGEST_SUBJECT])
+    return "".join(letter if letter.isprintable() else "?" for letter in subject[:MAX_SUBJECT])
 
 
 def _one_line(by: str) -> str:
@@ -40,8 +40,8 @@ class OrderRequest(Request):
 
     by: Annotated[str, AfterValidator(_one_line)] = Field(
         default="",
-        max_length=LONGEST_BY,
-        description=f"for whom the client asks, as it says; one line of at most {LONGEST_BY} characters, for the log "
+        max_length=MAX_BY,
+        description=f"for whom the client asks, as it says; one line of at most {MAX_BY} characters, for the log "
         "and recordings",
     )
 

@@ -35,7 +35,7 @@ _LOOK_EVERY_S = 0.25
 # The requests of all clients but the controller take at most a third of the time.
 _REST_PER_TURN = 2.0
 # The process may have been suspended in a turn.
-_LONGEST_REST_S = 0.05
+_MAX_REST_S = 0.05
 # Of a setpoint for clients, s: older ones have piled up while this process stood still, and only make a client late.
 _MAX_AGE_S = 1.0
 
@@ -181,7 +181,7 @@ class Publisher:
             self._send(session, reply)
         if others and turns:
             now_s = self._clock.monotonic()
-            self._next_turn_s = now_s + min(_REST_PER_TURN * (now_s - start_s), _LONGEST_REST_S)
+            self._next_turn_s = now_s + min(_REST_PER_TURN * (now_s - start_s), _MAX_REST_S)
         self._waiting = [
             session for session in self._waiting if session.open and session.is_served and session.has_lines
         ]

@@ -13,8 +13,8 @@ from compd.files import read_small_file
 from compd.operation_settings import TcpSocket
 
 # 16 characters of base64 are 96 bits: not to be guessed at one try in a second.
-_SHORTEST_TOKEN = 16
-_LONGEST_TOKEN_BYTES = 1024
+_MIN_TOKEN = 16
+_MAX_TOKEN_BYTES = 1024
 _MAKE_ONE = "make one: (umask 077; openssl rand -base64 32 > {path}), owned by the daemon's user"
 
 
@@ -61,7 +61,7 @@ def read_token(path: Path) -> bytes:
 
     try:
         status = path.stat()
-        content = read_small_file(path, _LONGEST_TOKEN_BYTES)
+        content = read_small_file(path, _MAX_TOKEN_BYTES)
     except OSError as error:
         raise refused(f"cannot be read: {error.strerror}") from error
     if status.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
@@ -69,6 +69,6 @@ def read_token(path: Path) -> bytes:
     if status.st_uid not in {0, os.geteuid()}:
         raise refused("belongs to another user", f"user {status.st_uid}", "root, or the daemon's user")
     token = content.strip()
-    if len(token) < _SHORTEST_TOKEN:
-        raise refused("is too short for a token", f"{len(token)} characters", f"{_SHORTEST_TOKEN} or more")
+    if len(token) < _MIN_TOKEN:
+        raise refused("is too short for a token", f"{len(token)} characters", f"{_MIN_TOKEN} or more")
     return token

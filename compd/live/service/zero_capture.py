@@ -28,7 +28,7 @@ _LOOK_EVERY_S = 0.02
 # A machine at rest stays within a few steps of its gauges; one that moves leaves this in milliseconds.
 REST_TOLERANCE_MM = 0.005
 # A machine that comes to its zero position again is nearer than this to where it was.
-LARGEST_CHANGE_MM = 0.5
+MAX_CHANGE_MM = 0.5
 # A gauge that has been accepted is believed from its next answers on.
 _BELIEVED_WITHIN_S = 3.0
 # The disk may hang; the daemon's end waits no longer for it.
@@ -73,7 +73,7 @@ class ZeroCapture:
     def start(self, replace: bool, answer: Callable[[bytes], None]) -> None:
         """Begin; `answer` gets the ZERO or ERROR line at the end. Raises ProtocolError while one is being taken.
 
-        replace : take it also where a gauge differs from the zero until now by more than LARGEST_CHANGE_MM, or is not
+        replace : take it also where a gauge differs from the zero until now by more than MAX_CHANGE_MM, or is not
         believed.
         """
         self._job.start(lambda: self._capture(replace), answer)
@@ -144,10 +144,10 @@ class ZeroCapture:
         if not isinstance(before, MachineZero):
             return zero, {}
         changed_mm = zero.changes_mm(before)
-        if not replace and any(abs(change_mm) > LARGEST_CHANGE_MM for change_mm in changed_mm.values()):
+        if not replace and any(abs(change_mm) > MAX_CHANGE_MM for change_mm in changed_mm.values()):
             raise ProtocolError(
                 ErrorCode.ZERO_DIFFERS,
-                f"more than {LARGEST_CHANGE_MM:g} mm from the machine zero of {before.taken_at}: {_named(changed_mm)}",
+                f"more than {MAX_CHANGE_MM:g} mm from the machine zero of {before.taken_at}: {_named(changed_mm)}",
             )
         return zero, changed_mm
 

@@ -7,7 +7,7 @@ from .memory_limit import limit_memory as limit_memory
 from .process_limits import exhaustion_named as exhaustion_named
 from .process_limits import require_descriptors as require_descriptors
 from .process_limits import require_limits as require_limits
-from .realtime import LARGEST_SHARE as LARGEST_SHARE
+from .realtime import MAX_SHARE as MAX_SHARE
 from .realtime import QuietCollector as QuietCollector
 from .realtime import RationedPriority as RationedPriority
 from .realtime import limit_wake_latency as limit_wake_latency

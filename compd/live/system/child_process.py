@@ -16,7 +16,7 @@ from pathlib import Path
 from compd.clock import Clock
 
 _PR_SET_PDEATHSIG, _PR_SET_NAME = 1, 15  # linux/prctl.h
-_LONGEST_NAME = 15
+_MAX_NAME = 15
 # Signals that the supervisor gets for all: a terminal's Ctrl-C and systemd send them to every process.
 _LEFT_TO_SUPERVISOR = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 OUT_OF_MEMORY = 70
@@ -122,7 +122,7 @@ class ChildProcess:
             end_with_parent()
             if os.getppid() != supervisor:
                 os._exit(code)
-            _libc.prctl(_PR_SET_NAME, f"compd {self.name}".encode()[:_LONGEST_NAME], 0, 0, 0)
+            _libc.prctl(_PR_SET_NAME, f"compd {self.name}".encode()[:_MAX_NAME], 0, 0, 0)
             signal.set_wakeup_fd(-1)
             for number in _LEFT_TO_SUPERVISOR:
                 signal.signal(number, signal.SIG_IGN)

@@ -21,7 +21,7 @@ _ADDRESS = "/run/systemd/journal/socket"
 _IDENTIFIER = "compd"
 RECORD_SEPARATOR = "\x1e"
 # Of one field: the whole entry must fit into a datagram.
-_LONGEST_FIELD = 4096
+_MAX_FIELD = 4096
 # syslog(3)
 _PRIORITIES = {"debug": 7, "info": 6, "warning": 4, "error": 3, "critical": 2}
 
@@ -111,7 +111,7 @@ def _field_name(key: str) -> str:
 
 
 def _field(name: str, value: str) -> bytes:
-    content = value.encode(errors="replace")[:_LONGEST_FIELD]
+    content = value.encode(errors="replace")[:_MAX_FIELD]
     if b"\n" not in content:
         return b"%s=%s\n" % (name.encode(), content)
     return b"%s\n%s%s\n" % (name.encode(), struct.pack("<Q", len(content)), content)

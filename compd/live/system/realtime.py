@@ -27,7 +27,7 @@ WAKE_LATENCY_DEVICE = Path("/dev/cpu_dma_latency")
 SWITCH_INTERVAL_S = 50e-6
 # A thread with priority that takes more of a processor than this would keep others from theirs: from the gauges, and
 # with the kernel's limit for all real-time threads (95 %) even the loop.
-LARGEST_SHARE = 0.5
+MAX_SHARE = 0.5
 _RATION_EVERY_S = 0.1
 # Exceptions in drivers leave reference cycles of a few kB each; collected at this interval they stay within a few MB.
 _COLLECT_EVERY_S = 5.0
@@ -121,7 +121,7 @@ class RationedPriority:
     """
 
     def __init__(
-        self, priority: int, clock: Clock, thread_id: int | None = None, largest_share: float = LARGEST_SHARE
+        self, priority: int, clock: Clock, thread_id: int | None = None, largest_share: float = MAX_SHARE
     ) -> None:
         """`priority`: below the loop's; 0 for none. `thread_id`: as the kernel counts; None: the thread that looks."""
         self._priority = priority

@@ -15,7 +15,7 @@ from compd.model.effects.effect import Basis, BasisProgram, ConstantValues, Effe
 from compd.model.effects.effect_needs import is_measured, needed_quantities
 from compd.model.effects.observations import MachineConstants, Observations
 from compd.model.kernels import basis_of_rows
-from compd.model.structures import MACHINE, MOST_LINKS, ROW
+from compd.model.structures import MACHINE, MAX_LINKS, ROW
 from compd.reference_conditions import standard_value
 
 # Rows whose structures exist at the same time: of 4000, they take 8 MB.
@@ -168,13 +168,13 @@ def unpack_memory(states: Sequence[int], packed: FloatArray) -> Memory:
 
 def row_structures(rows: Observations, chunk: slice) -> NDArray[np.void]:
     """These rows as kernels read them. Raises CompdError for a machine with more links than there is room for."""
-    if rows.links > MOST_LINKS:
+    if rows.links > MAX_LINKS:
         raise CompdError(
             Problem(
                 where="rows for effects",
                 what="has too many links",
                 value=str(rows.links),
-                allowed=f"{MOST_LINKS} at most",
+                allowed=f"{MAX_LINKS} at most",
                 next_step="record the tip instead of the links' lengths",
             )
         )

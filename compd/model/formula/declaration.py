@@ -26,7 +26,7 @@ from compd.model.formula.columns import ANYWHERE, OF_LINK, OF_READING, PER_LINK,
 from compd.model.formula.formula import Formula
 from compd.model.formula.functions import NUMBERS
 from compd.model.formula.keys import FormulaDeclaration, FormulaParameter, read_declaration
-from compd.model.formula.parser import LARGEST_EXPONENT, parse_together
+from compd.model.formula.parser import MAX_EXPONENT, parse_together
 
 # Rounding of the numbers in a formula, 2 * 3.141593 for instance, in turns.
 ROUNDING = 1e-6
@@ -253,8 +253,8 @@ def _parameter_problems(declaration: FormulaDeclaration, formulas: tuple[Formula
             allowed = f"a parameter that the formula is proportional to, at {', '.join(PER_LINK)}"
             problems.append(Problem(where=place, what="cannot be one per link", value=name, allowed=allowed))
         is_exponent = any(re.search(rf"\*\*\s*{name}\b", text) for text in texts)
-        if is_exponent and max(abs(low), abs(high)) > LARGEST_EXPONENT:
-            allowed = f"within +-{LARGEST_EXPONENT:g}"
+        if is_exponent and max(abs(low), abs(high)) > MAX_EXPONENT:
+            allowed = f"within +-{MAX_EXPONENT:g}"
             problems.append(Problem(where=place, what="is an exponent", value=f"[{low:g}, {high:g}]", allowed=allowed))
         is_time_constant = name in constants and any(
             formula.lags and re.search(rf",\s*{name}\s*\)", formula.text) for formula in formulas

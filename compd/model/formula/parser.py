@@ -20,7 +20,7 @@ from compd.model.formula.functions import FUNCTIONS, NUMBERS, OPERATORS, to_floa
 # A formula that a person reads at a glance; the bounds keep any text from taking time or stack.
 LONGEST = 300
 DEEPEST = 20
-LARGEST_EXPONENT = 10.0
+MAX_EXPONENT = 10.0
 
 CHARACTERS = re.compile(r"[A-Za-z0-9_ .,+\-*/()]*")
 ALLOWED = f"numbers, columns, parameters, {', '.join(NUMBERS)}, + - * / **, {' '.join(FUNCTIONS)} lag(x, tau)"
@@ -188,11 +188,11 @@ class _Checker:
     def _exponent(self, node: ast.expr) -> None:
         match node:
             case ast.Constant(value=value) | ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=value)):
-                if abs(to_float(value)) <= LARGEST_EXPONENT:
+                if abs(to_float(value)) <= MAX_EXPONENT:
                     return
             case ast.Name(id=name) if name in self._parameters:
                 return
-        raise self._error(node, "is no exponent", f"a number up to {LARGEST_EXPONENT:g}, or a parameter")
+        raise self._error(node, "is no exponent", f"a number up to {MAX_EXPONENT:g}, or a parameter")
 
     def _error(self, node: ast.AST, what: str, allowed: str) -> ConfigurationError:
         column = getattr(node, "col_offset", 0)

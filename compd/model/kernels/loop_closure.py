@@ -21,7 +21,7 @@ from compd.linear import all_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NOT_FINITE, OK
 
 # Two joint centres nearer than this coincide: the link between them has no direction.
-SHORTEST_LINK_MM = 1e-6
+MIN_LINK_MM = 1e-6
 
 
 @helper
@@ -51,7 +51,7 @@ def evaluate_closure(
         dy = origin_M[1] + ry - base_joints_M[i, 1]
         dz = origin_M[2] + rz - base_joints_M[i, 2]
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        if not length > SHORTEST_LINK_MM:
+        if not length > MIN_LINK_MM:
             return False
         nx, ny, nz = dx / length, dy / length, dz / length
         value_mm[i] = length

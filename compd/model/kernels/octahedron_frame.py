@@ -44,7 +44,7 @@ PLATE_POINT_OF_DISTANCE = (0, 2, 0, 1, 1, 2)
 FURTHEST = 0.1
 
 # Two reference points nearer than this coincide: the edge between them has no direction.
-SHORTEST_EDGE_MM = 1e-6
+MIN_EDGE_MM = 1e-6
 
 
 @helper
@@ -70,7 +70,7 @@ def edge_lengths(supports_M: FloatArray, plate_points_M: FloatArray, lengths_mm:
             y = supports_M[near, 1] - plate_points_M[far, 1]
             z = supports_M[near, 2] - plate_points_M[far, 2]
         length = math.sqrt(x * x + y * y + z * z)
-        if not length > SHORTEST_EDGE_MM:
+        if not length > MIN_EDGE_MM:
             return False
         x, y, z = x / length, y / length, z / length
         lengths_mm[edge] = length
@@ -100,7 +100,7 @@ def place_base(supports_M: FloatArray, R: FloatArray, origin_M: FloatArray) -> b
     y_length = math.sqrt(yx * yx + yy * yy + yz * yz)
     z_length = math.sqrt(zx * zx + zy * zy + zz * zz)
     # the area of the triangle over its height is a side
-    if not z_length > SHORTEST_EDGE_MM * y_length:
+    if not z_length > MIN_EDGE_MM * y_length:
         return False
     yx, yy, yz = yx / y_length, yy / y_length, yz / y_length
     zx, zy, zz = zx / z_length, zy / z_length, zz / z_length

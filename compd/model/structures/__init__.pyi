@@ -1,7 +1,7 @@
 from .effect_row import EFFECT_MACHINE as EFFECT_MACHINE
 from .effect_row import EFFECT_ROWS as EFFECT_ROWS
 from .effect_row import MACHINE as MACHINE
-from .effect_row import MOST_LINKS as MOST_LINKS
+from .effect_row import MAX_LINKS as MAX_LINKS
 from .effect_row import ROW as ROW
 from .effect_row import EffectMachine as EffectMachine
 from .effect_row import EffectRow as EffectRow

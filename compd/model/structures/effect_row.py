@@ -13,24 +13,24 @@ from numba import from_dtype
 
 # Room for parallel machines with more links than compd knows the kinematics of, such as cable robots with eight; and
 # for all joint comparators that a link can have: S, B, Ra and Rb.
-MOST_LINKS = 16
-MOST_JOINTS = 4 * MOST_LINKS
+MAX_LINKS = 16
+MAX_JOINTS = 4 * MAX_LINKS
 
 # Fields as in `compd.model.effects.observations.Observations`, for one instant.
 ROW = np.dtype(
     [
         ("links", np.int64),
-        ("scale_mm", np.float64, MOST_LINKS),
-        ("joint_mm", np.float64, MOST_JOINTS),
+        ("scale_mm", np.float64, MAX_LINKS),
+        ("joint_mm", np.float64, MAX_JOINTS),
         ("frame_mm", np.float64, 9),
         ("time_s", np.float64),
         ("session_start", np.int64),
-        ("direction", np.float64, MOST_LINKS),
-        ("velocity_mm_per_s", np.float64, MOST_LINKS),
-        ("joint_velocity_mm_per_s", np.float64, MOST_JOINTS),
-        ("link_mm", np.float64, MOST_LINKS),
-        ("directions_M", np.float64, (MOST_LINKS, 3)),
-        ("base_joints_M_mm", np.float64, (MOST_LINKS, 3)),
+        ("direction", np.float64, MAX_LINKS),
+        ("velocity_mm_per_s", np.float64, MAX_LINKS),
+        ("joint_velocity_mm_per_s", np.float64, MAX_JOINTS),
+        ("link_mm", np.float64, MAX_LINKS),
+        ("directions_M", np.float64, (MAX_LINKS, 3)),
+        ("base_joints_M_mm", np.float64, (MAX_LINKS, 3)),
         ("origin_M_mm", np.float64, 3),
         ("rotation_M_P", np.float64, (3, 3)),
         ("tip_M_mm", np.float64, 3),
@@ -42,14 +42,14 @@ MACHINE = np.dtype(
     [
         ("links", np.int64),
         ("axes", np.int64),
-        ("platform_joints_P_mm", np.float64, (MOST_LINKS, 3)),
+        ("platform_joints_P_mm", np.float64, (MAX_LINKS, 3)),
         ("revolute_axes_P", np.float64, (3, 3)),
         ("tool_mm", np.float64, 3),
         ("tool_on_plate", np.int64),
-        ("zero_directions_M", np.float64, (MOST_LINKS, 3)),
-        ("zero_axes_M", np.float64, (MOST_LINKS, 3)),
-        ("zero_axial_force_N", np.float64, MOST_LINKS),
-        ("zero_axial_per_force", np.float64, (MOST_LINKS, 3)),
+        ("zero_directions_M", np.float64, (MAX_LINKS, 3)),
+        ("zero_axes_M", np.float64, (MAX_LINKS, 3)),
+        ("zero_axial_force_N", np.float64, MAX_LINKS),
+        ("zero_axial_per_force", np.float64, (MAX_LINKS, 3)),
         ("zero_rotation_M_P", np.float64, (3, 3)),
         ("weight_N", np.float64),
         ("weight_at_P_mm", np.float64, 3),

@@ -11,11 +11,11 @@ from numba import from_dtype
 
 from compd.model.structures.effect_row import ROW
 
-MOST_LINKS = 6
-MOST_JOINTS = 4 * MOST_LINKS
+MAX_LINKS = 6
+MAX_JOINTS = 4 * MAX_LINKS
 
-_LENGTHS = (np.float64, MOST_LINKS)
-_POINTS = (np.float64, (MOST_LINKS, 3))
+_LENGTHS = (np.float64, MAX_LINKS)
+_POINTS = (np.float64, (MAX_LINKS, 3))
 _VECTOR = (np.float64, 3)
 _MATRIX = (np.float64, (3, 3))
 
@@ -29,14 +29,14 @@ MODEL = np.dtype(
         ("needs_motion", np.int64),
         ("plate_points_M_mm", *_MATRIX),
         ("joint_offsets_B_mm", *_POINTS),
-        ("support_of_joint", np.int64, MOST_LINKS),
+        ("support_of_joint", np.int64, MAX_LINKS),
         ("zero_supports_M_mm", *_MATRIX),
         ("zero_origin_M_mm", *_VECTOR),
         ("zero_rotation_M_B", *_MATRIX),
         ("platform_joints_P_mm", *_POINTS),
         ("revolute_axes_P", *_MATRIX),
         ("tool_mm", *_VECTOR),
-        ("joint_weights", np.float64, (MOST_LINKS, MOST_JOINTS)),
+        ("joint_weights", np.float64, (MAX_LINKS, MAX_JOINTS)),
         ("zero_base_joints_M_mm", *_POINTS),
         ("zero_link_length_mm", *_LENGTHS),
         ("zero_distances_mm", np.float64, 9),

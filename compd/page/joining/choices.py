@@ -16,8 +16,8 @@ from compd.joining import JOIN_BY, Instrument, JoinOptions
 
 Value = TypeVar("Value", str, float, int)
 
-_LONGEST_TEXT = 200
-_MOST_COLUMNS = 500
+_MAX_TEXT = 200
+_MAX_COLUMNS = 500
 # Most rows of an export in the page, so that an answer takes at most a minute or two.
 LIMITS = ReadLimits(lines=2_000_000, cells=8_000_000, sheet_cells=1_000_000, unpacked_bytes=150_000_000)
 # Control characters and surrogates.
@@ -87,7 +87,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
     columns = keys.get("columns") or []
     if (
         not isinstance(columns, list)
-        or len(columns) > _MOST_COLUMNS
+        or len(columns) > _MAX_COLUMNS
         or not all(_is(role, str) and "," not in role for role in columns)
     ):
         problems.append(Problem(where="columns", what="is not understood", allowed="a role for each column"))
@@ -129,7 +129,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
 def _is(value: Any, kind: type) -> bool:
     """Checks of a JSON value: a short text on one line, a finite number, a whole number."""
     if kind is str:
-        return isinstance(value, str) and len(value) <= _LONGEST_TEXT and not _NO_TEXT.search(value)
+        return isinstance(value, str) and len(value) <= _MAX_TEXT and not _NO_TEXT.search(value)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) < 1e15 and math.isfinite(value) and (kind is float or float(value).is_integer())

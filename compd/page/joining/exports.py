@@ -25,17 +25,17 @@ SUFFIX = ".export"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}(\.[A-Za-z0-9]{1,8})?")
 EXPORT_NAME = re.compile(rf"{_NAME.pattern}({re.escape(SUFFIX)})?")
 # Largest file (bytes): some million rows.
-MOST_BYTES = 64 * 2**20
+MAX_BYTES = 64 * 2**20
 # Largest total (bytes) of the directory, including running uploads.
-MOST_FILES = 200
-MOST_BYTES_OF_ALL = 16 * MOST_BYTES
+MAX_FILES = 200
+MAX_BYTES_OF_ALL = 16 * MAX_BYTES
 # Mode of a file: readable by the page's group for backups, never executable.
 _MODE = 0o640
 _TEMPORARY = re.compile(r"\.[0-9a-f]{16}")
 # Age (s) of the last write from which a partial file belongs to an ended process.
 _LEFT_AFTER_S = 3600.0
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9_-]+")
-_LONGEST_STEM = 64
+_MAX_STEM = 64
 _DIRECTORY = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
 _NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
@@ -48,7 +48,7 @@ class Usage(NamedTuple):
 
     def as_json(self) -> dict[str, int]:
         """The contents beside the limits."""
-        return {**self._asdict(), "most_files": MOST_FILES, "most_bytes": MOST_BYTES_OF_ALL}
+        return {**self._asdict(), "most_files": MAX_FILES, "most_bytes": MAX_BYTES_OF_ALL}
 
 
 class Exports:
@@ -95,8 +95,8 @@ class Exports:
 
         file_name : the file's name on the person's computer; what cannot stand in a name here becomes "-".
 
-        Raises RecordingError for a name that is none, for a file that is empty, larger than MOST_BYTES, or another than
-        the one that has its name already; where all files would be more than MOST_FILES or MOST_BYTES_OF_ALL; and where
+        Raises RecordingError for a name that is none, for a file that is empty, larger than MAX_BYTES, or another than
+        the one that has its name already; where all files would be more than MAX_FILES or MAX_BYTES_OF_ALL; and where
         the disk refuses.
         """
         name = kept_name(file_name)
@@ -119,15 +119,15 @@ class Exports:
     async def _written(self, directory: int, temporary: str, pieces: AsyncIterator[bytes]) -> int:
         """Number of bytes in the new file so far."""
         kept = self._kept_before()
-        if kept.files + len(self._arriving) >= MOST_FILES:
+        if kept.files + len(self._arriving) >= MAX_FILES:
             raise _full(kept.files + len(self._arriving), kept.bytes + sum(self._arriving.values()))
         self._arriving[temporary] = 0
         with os.fdopen(os.open(temporary, _NEW_FILE, _MODE, dir_fd=directory), "wb") as file:
             os.fchmod(file.fileno(), _MODE)  # independent of the umask
             async for piece in pieces:
                 count = self._arriving[temporary] + len(piece)
-                if count > MOST_BYTES:
-                    raise _refused("export", "is too large", allowed=f"{MOST_BYTES >> 20} MB", next_step="split it")
+                if count > MAX_BYTES:
+                    raise _refused("export", "is too large", allowed=f"{MAX_BYTES >> 20} MB", next_step="split it")
                 self._arriving[temporary] = count
                 # a file completed meanwhile is in the directory and no longer arriving: looked up again near the end
                 self._require_room(kept)
@@ -138,7 +138,7 @@ class Exports:
     def _require_room(self, kept: Usage) -> None:
         """Raises RecordingError if stored and arriving files exceed the limits."""
         total = kept.bytes + sum(self._arriving.values())
-        if total > MOST_BYTES_OF_ALL:
+        if total > MAX_BYTES_OF_ALL:
             raise _full(kept.files + len(self._arriving), total)
 
     def _kept_before(self) -> Usage:
@@ -193,11 +193,11 @@ def kept_name(file_name: str) -> str:
     stem, dot, ending = file_name.removesuffix(SUFFIX).rpartition(".")
     if not dot:
         stem, ending = ending, ""
-    stem = _NOT_IN_A_NAME.sub("-", stem).strip("-_")[:_LONGEST_STEM]
+    stem = _NOT_IN_A_NAME.sub("-", stem).strip("-_")[:_MAX_STEM]
     name = f"{stem}.{ending}" if ending else stem
     if "/" in file_name or "\\" in file_name or not _NAME.fullmatch(name):
         allowed = "letters, digits, - and _, such as run-1.txt"
-        raise _refused("export", "is no name of a file", ascii(file_name[:_LONGEST_STEM]), allowed)
+        raise _refused("export", "is no name of a file", ascii(file_name[:_MAX_STEM]), allowed)
     return f"{name}{SUFFIX}"
 
 
@@ -218,7 +218,7 @@ def _full(files: int, total: int) -> RecordingError:
         "exports",
         "has no room for another file",
         f"{files} files with {total / 2**20:.1f} MB, those that are being brought among them",
-        f"{MOST_FILES} files with {MOST_BYTES_OF_ALL >> 20} MB",
+        f"{MAX_FILES} files with {MAX_BYTES_OF_ALL >> 20} MB",
         "delete exports that are not needed any more",
     )
 

@@ -12,7 +12,7 @@ from starlette.routing import Route
 
 from compd.errors import CompdError, RecordingError
 from compd.instruments import instrument_formats
-from compd.page.joining.exports import MOST_BYTES, Exports
+from compd.page.joining.exports import MAX_BYTES, Exports
 from compd.page.joining.named_files import gauges_and_plans
 from compd.page.recordings import Recordings
 from compd.page.requests import LOOKS_ONLY, answer, keys_of, may_change, refused
@@ -94,7 +94,7 @@ class JoinRoutes:
                 "exports": self._exports.listed(),
                 "formats": [[declared.name, declared.title] for declared in instrument_formats().values()],
                 "may_write": may_change(request),
-                "most_bytes": MOST_BYTES,
+                "most_bytes": MAX_BYTES,
             }
         )
 

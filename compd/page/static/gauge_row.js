@@ -5,8 +5,8 @@ import { drawSpark, rangeOf } from "./spark.js";
 
 const UNITS = { degC: "°C", percent: "%", um: "µm" };
 // Changes below this are drawn flat: mm for a length, else the quantity's unit.
-const LEAST_MM = 0.001;
-const LEAST_QUANTITY = 0.1;
+const MIN_MM = 0.001;
+const MIN_QUANTITY = 0.1;
 
 // A quantity's name ends with its unit, as in temperature_room_degC.
 export function quantity(name) {
@@ -73,7 +73,7 @@ export class GaugeRow {
   // The spark line, from its values at `times`.
   draw(times, values) {
     const isLength = this.unit === "mm";
-    drawSpark(this.spark, times, values, isLength ? LEAST_MM : LEAST_QUANTITY);
+    drawSpark(this.spark, times, values, isLength ? MIN_MM : MIN_QUANTITY);
     const range = rangeOf(values);
     const far = range ? range[1] - range[0] : NaN;
     write(this.cells.change, !Number.isFinite(far) ? "–" : isLength ? (far < 1 ? `${(far * 1000).toFixed(1)} µm` : `${far.toFixed(3)} mm`) : `${far.toFixed(2)} ${this.unit}`);

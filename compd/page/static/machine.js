@@ -5,7 +5,7 @@ import { Turn } from "./orbit_control.js";
 const RODS = { t1: ["supports", 0, "supports", 1], t2: ["supports", 1, "supports", 2], t3: ["supports", 2, "supports", 0], u1: ["supports", 0, "plate", 0], u2: ["supports", 0, "plate", 2], u3: ["supports", 1, "plate", 0], u4: ["supports", 1, "plate", 1], u5: ["supports", 2, "plate", 1], u6: ["supports", 2, "plate", 2] };
 const TRAIL_S = 10;
 // Least end of the colour scale, µm: noise must not look like a movement.
-const LEAST_UM = 1;
+const MIN_UM = 1;
 const VIEWS = { f: [0, 0], s: [Math.PI / 2, 0], t: [0, Math.PI / 2 - 1e-3] };
 
 // Blue below zero, grey at zero, vermilion above.
@@ -55,7 +55,7 @@ export class Machine {
     if (scene) {
       this.corrections_um = setpoint.correction_mm.map((value) => value * 1000);
       this.rods_um = Object.fromEntries(Object.entries(this.frame ?? {}).map(([name, k]) => [name, gauges[k].fault || gauges[k].value === undefined ? null : gauges[k].value * 1000]));
-      const largest = Math.max(...this.corrections_um.map(Math.abs), ...Object.values(this.rods_um).map((value) => Math.abs(value ?? 0)), LEAST_UM);
+      const largest = Math.max(...this.corrections_um.map(Math.abs), ...Object.values(this.rods_um).map((value) => Math.abs(value ?? 0)), MIN_UM);
       if (!document.getElementById("lock").checked) this.largest_um = largest;
       this.trail.push([minute?.at_s ?? setpoint.time_s, scene.tip]);
       while (!minute && this.trail.length && this.trail[0][0] < setpoint.time_s - TRAIL_S) this.trail.shift();

@@ -30,8 +30,8 @@ from compd.text import nan_to_null
 from compd.units import UM_PER_MM
 
 # Least cosine of effects that count as alike: a tenth of either's square is its own.
-LEAST_COSINE = 0.95
-MOST_ALIKE = 4
+MIN_COSINE = 0.95
+MAX_ALIKE = 4
 
 
 class Candidates:
@@ -170,11 +170,11 @@ class Candidates:
             for other, subset in self.losses.best_variants.items()
             if other != name and self.losses.candidates[subset.members[0]].kind == "effect"
         }
-        nearest = sorted(cosine_by_effect, key=lambda other: -cosine_by_effect[other])[:MOST_ALIKE]
+        nearest = sorted(cosine_by_effect, key=lambda other: -cosine_by_effect[other])[:MAX_ALIKE]
         return [
             {"effect": other, "cosine": cosine_by_effect[other]}
             for other in nearest
-            if cosine_by_effect[other] >= LEAST_COSINE
+            if cosine_by_effect[other] >= MIN_COSINE
         ]
 
     def _variant(self, k: int) -> dict[str, Any]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from compd.configuration import Machine
 
 # Most diagnoses at once. Each takes a processor and the memory of a process, on the daemon's computer.
-MOST_RUNNING = 2
+MAX_RUNNING = 2
 
 
 class Diagnoses:
@@ -33,13 +33,13 @@ class Diagnoses:
         """Begin one; arguments as for `DiagnosisJob`. Raises StateError if the limit is reached."""
         with self._lock:
             self._running = [job for job in self._running if not job.has_ended]
-            if len(self._running) >= MOST_RUNNING:
+            if len(self._running) >= MAX_RUNNING:
                 raise StateError(
                     Problem(
                         where="diagnosis",
                         what=f"{len(self._running)} run already on this server, of other recordings or models",
                         value=", ".join(job.path.stem for job in self._running),
-                        allowed=f"{MOST_RUNNING} at once",
+                        allowed=f"{MAX_RUNNING} at once",
                         next_step="wait for one of them to end, or cancel it where it was begun",
                     )
                 )

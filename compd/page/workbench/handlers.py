@@ -12,7 +12,7 @@ from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
 from compd.page.workbench.open_workbench import OpenWorkbench
 
 # Largest body (bytes): the numbers of some 100,000 rows.
-LONGEST_ROWS_BYTES = 1_000_000
+MAX_ROWS_BYTES = 1_000_000
 
 
 class Handler(NamedTuple):
@@ -59,7 +59,7 @@ async def _step(request: Request, workbench: OpenWorkbench) -> Response:
 
 async def _exclude(request: Request, workbench: OpenWorkbench) -> Response:
     """`rows` with a `reason` are left out; without one they count again."""
-    keys: Any = await keys_of(request, LONGEST_ROWS_BYTES)
+    keys: Any = await keys_of(request, MAX_ROWS_BYTES)
     rows, reason, revision = keys.get("rows"), keys.get("reason"), keys.get("revision")
     if not may_change(request):
         return refused(LOOKS_ONLY, 403)

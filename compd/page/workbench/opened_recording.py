@@ -19,7 +19,7 @@ from compd.plugins import NO_CODE
 from compd.text import nan_to_null
 
 # Approximate limit of rows in pictures; numbers always use all rows.
-MOST_PICTURED = 5000
+MAX_PICTURED = 5000
 # States of a row, in the order of their codes.
 ROW_STATES = ("used", "outlier", "left out")
 _SEED = 1
@@ -48,9 +48,9 @@ class OpenedRecording:
     def pictured(self) -> IntArray:
         """(R,) rows shown in pictures, ascending: all, or an even selection."""
         count = len(self.aligned.rows)
-        if count <= MOST_PICTURED:
+        if count <= MAX_PICTURED:
             return np.arange(count)
-        stretches = np.array_split(np.arange(count), MOST_PICTURED)
+        stretches = np.array_split(np.arange(count), MAX_PICTURED)
         rng = np.random.default_rng(_SEED)
         return np.array([rng.choice(stretch) for stretch in stretches])
 

@@ -16,8 +16,8 @@ from compd.model.library import gather_effects, load_library
 from compd.page.workbench.effects_text import Declaration, entries_of, with_entry, without_entry
 
 # Most combinations of searched constants, and most numbers, of an effect: more would take too long in a page.
-MOST_COMBINATIONS = 100
-MOST_NUMBERS = 36
+MAX_COMBINATIONS = 100
+MAX_NUMBERS = 36
 
 # Lock of the file, since several workbenches may have it open.
 _WRITING = threading.Lock()
@@ -116,23 +116,23 @@ def too_large(effect: Effect, where: str) -> list[Problem]:
     """Reasons why a page does not try an effect: it would take too long."""
     problems = []
     combinations = math.prod(len(constant.grid) for constant in effect.constants)
-    if combinations > MOST_COMBINATIONS:
+    if combinations > MAX_COMBINATIONS:
         problems.append(
             Problem(
                 where=where,
                 what=f"{', '.join(constant.name for constant in effect.constants)} are searched together",
                 value=f"{combinations} combinations",
-                allowed=f"{MOST_COMBINATIONS} in the page",
+                allowed=f"{MAX_COMBINATIONS} in the page",
                 next_step="let the formula be proportional to some of them, or write numbers for them",
             )
         )
-    if len(effect.parameters) > MOST_NUMBERS:
+    if len(effect.parameters) > MAX_NUMBERS:
         problems.append(
             Problem(
                 where=where,
                 what="has more parameters than a person can judge",
                 value=str(len(effect.parameters)),
-                allowed=f"{MOST_NUMBERS} in the page",
+                allowed=f"{MAX_NUMBERS} in the page",
             )
         )
     return problems

@@ -20,7 +20,7 @@ from compd.plan_file import TIP_COLUMNS
 from compd.planning import DWELL_S, MeasurementPlan, PlanFormat, recorded_limits, recorded_settings
 
 # Most plans whose files can still be downloaded.
-_MOST_KEPT = 8
+_MAX_KEPT = 8
 
 
 def form(workbench: Workbench, names: Sequence[str]) -> dict[str, Any]:
@@ -75,7 +75,7 @@ def _plan_contents(plan: MeasurementPlan, workbench: Workbench, asked: PlanReque
     key = hashlib.sha256(repr((plan.rivals, plan.rows)).encode()).hexdigest()[:16]
     workbench.plans.pop(key, None)
     workbench.plans[key] = plan
-    for oldest in list(workbench.plans)[:-_MOST_KEPT]:
+    for oldest in list(workbench.plans)[:-_MAX_KEPT]:
         del workbench.plans[oldest]
     placed = all(name in columns for name in TIP_COLUMNS)
     return {

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from compd.api import Range
 from compd.errors import CompdError, Problem
 
-FEWEST_ROWS, MOST_ROWS = 2, 400
-_MOST_RIVALS = 8
+MIN_ROWS, MAX_ROWS = 2, 400
+_MAX_RIVALS = 8
 _FIELDS = {"workspace_M_mm": "workspace", "temperature_degC": "temperature", "the next measurement": "workspace"}
 
 
@@ -83,8 +83,8 @@ class _Reader:
 
     def effects(self, key: str) -> list[str]:
         names = self._keys.get(key, [])
-        if not isinstance(names, list) or len(names) > _MOST_RIVALS:
-            self._add(key, str(names)[:80], f"a list of at most {_MOST_RIVALS} ids")
+        if not isinstance(names, list) or len(names) > _MAX_RIVALS:
+            self._add(key, str(names)[:80], f"a list of at most {_MAX_RIVALS} ids")
             return []
         unknown = [str(name)[:80] for name in names if not isinstance(name, str) or name not in self._known]
         if unknown:
@@ -93,10 +93,10 @@ class _Reader:
 
     def rows(self) -> int:
         rows = self._keys.get("rows")
-        if type(rows) is int and FEWEST_ROWS <= rows <= MOST_ROWS:
+        if type(rows) is int and MIN_ROWS <= rows <= MAX_ROWS:
             return rows
-        self._add("rows", str(rows)[:80], f"{FEWEST_ROWS} to {MOST_ROWS}")
-        return FEWEST_ROWS
+        self._add("rows", str(rows)[:80], f"{MIN_ROWS} to {MAX_ROWS}")
+        return MIN_ROWS
 
     def number(self, value: object, where: str) -> float | None:
         if value is None:

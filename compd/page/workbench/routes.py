@@ -111,7 +111,7 @@ DIAGNOSIS_HANDLERS = (
 # Name of a model file that the page may create.
 MODEL_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\.model\.yaml")
 # Most open workbenches: each takes memory, and any browser can open one.
-MOST_OPEN = 32
+MAX_OPEN = 32
 _NOT_OPEN = "it is not open any more: open it again"
 
 _BASE = "/workbench/{recording}/{model}"
@@ -205,11 +205,11 @@ class WorkbenchRoutes:
 
     def _close_oldest(self) -> OpenWorkbench | None:
         """Close the least recently used workbench if the limit is reached. Raises StateError if all are busy."""
-        if len(self._open) < MOST_OPEN:
+        if len(self._open) < MAX_OPEN:
             return None
         idle = [key for key, workbench in self._open.items() if not workbench.is_busy]
         if not idle:
-            raise too_many("the workbench", MOST_OPEN)
+            raise too_many("the workbench", MAX_OPEN)
         return self._open.pop(min(idle, key=lambda key: self._open[key].worker.used_s))
 
     def _of_open(self, handler: Handler) -> Callable[[Request], Awaitable[Response]]:

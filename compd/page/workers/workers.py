@@ -19,7 +19,7 @@ from compd.page.workers.worker import Worker
 from compd.page.workers.worker_process import serve
 
 # Most processes with their states in memory, on the daemon's computer.
-MOST_PROCESSES = 8
+MAX_PROCESSES = 8
 # Imports of the workers that the server's own process does without, in this order.
 PRELOADED = [
     "compd.page.workers.single_thread",
@@ -40,7 +40,7 @@ class Workers:
     starting : held by the worker's thread that makes room and starts a process; the first waits for what is imported.
     """
 
-    def __init__(self, most: int = MOST_PROCESSES) -> None:
+    def __init__(self, most: int = MAX_PROCESSES) -> None:
         """most : limit of processes at once."""
         self._context = multiprocessing.get_context("forkserver")
         self._most = most

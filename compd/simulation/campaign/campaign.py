@@ -32,7 +32,7 @@ from compd.simulation.truth.workspace import posture_at_scales
 from compd.simulation.truth.world import World
 
 # Longest step (s) of the time between sessions, for causes with a memory.
-LONGEST_WAIT_S = 300.0
+MAX_WAIT_S = 300.0
 
 
 class Campaign:
@@ -103,7 +103,7 @@ class Campaign:
 
     def _wait_until(self, time_s: float) -> None:
         while time_s - self._world.time_s > 1e-9:
-            self._stay(min(time_s - self._world.time_s, LONGEST_WAIT_S))
+            self._stay(min(time_s - self._world.time_s, MAX_WAIT_S))
 
     def _stay(self, time_s: float) -> None:
         self._world.advance_to(self._world.scale_mm, self._world.posture, time_s, 0.0)

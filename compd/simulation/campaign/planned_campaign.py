@@ -9,7 +9,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.configuration import Geometry
 from compd.operation_settings import Wiring
-from compd.simulation.campaign.campaign import LONGEST_WAIT_S
+from compd.simulation.campaign.campaign import MAX_WAIT_S
 from compd.simulation.campaign.campaign_plan import PASS_ROW_EVERY_S, REPEAT_AFTER_S
 from compd.simulation.campaign.row_log import LoggedRows, RowLog
 from compd.simulation.truth.cause import Cause
@@ -65,7 +65,7 @@ class PlannedCampaign:
 
     def _travel_or_wait(self, stage: Stage) -> None:
         """A stage without the reference; the gauges are read often enough to follow motion and temperatures."""
-        every_s = HELD_TIME_CONSTANT_S if stage.purpose == "settle" else LONGEST_WAIT_S
+        every_s = HELD_TIME_CONSTANT_S if stage.purpose == "settle" else MAX_WAIT_S
         steps = int(np.ceil(stage.duration_s / every_s))
         for k in range(steps):
             self._advance(stage, k * stage.duration_s / steps, (k + 1) * stage.duration_s / steps)

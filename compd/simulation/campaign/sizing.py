@@ -20,7 +20,7 @@ from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
 KEEP_ONE_IN = 6
 FIRST_SHARE = 0.2
 GOOD_ENOUGH = 0.05
-MOST_TRIES = 4
+MAX_TRIES = 4
 # Number and size of the weak disturbances in every campaign; size as a share of the reference's noise.
 WEAK_FLOORS = 0.2
 WEAK_CAUSES = 2
@@ -55,14 +55,14 @@ class CauseSizer:
     def size(self, hidden: HiddenCause) -> SizedCause:
         """The cause with the strength asked for, or with that for the size asked for, within its plausible range.
 
-        Assumes that the error is proportional to the strength, and corrects it in at most MOST_TRIES tries.
+        Assumes that the error is proportional to the strength, and corrects it in at most MAX_TRIES tries.
         """
         if hidden.strength is not None:
             floors = self.error_in_floors(self._build(hidden.id, hidden.strength))
             return SizedCause(self._build(hidden.id, hidden.strength), floors)
         kind = CAUSES[hidden.id]
         strength, floors = FIRST_SHARE * kind.max_strength, 0.0
-        for _ in range(MOST_TRIES):
+        for _ in range(MAX_TRIES):
             floors = self.error_in_floors(self._build(hidden.id, strength))
             if floors == 0 or abs(floors / hidden.floors - 1) < GOOD_ENOUGH:
                 break

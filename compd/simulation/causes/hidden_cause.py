@@ -16,8 +16,8 @@ from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism
 
 # Size of a drawn cause: rms error at the tip over the reference's noise, from barely visible to plain.
-LEAST_FLOORS = 1.0
-MOST_FLOORS = 6.0
+MIN_FLOORS = 1.0
+MAX_FLOORS = 6.0
 # Probability that a drawn cause is none of the library's.
 OUTSIDE_SHARE = 0.2
 
@@ -74,7 +74,7 @@ def draw_hidden(seed: int, mechanism: Mechanism) -> HiddenCause:
     outside = rng.uniform() < OUTSIDE_SHARE
     names = [name for name in possible_causes(mechanism) if CAUSES[name].in_library != outside]
     first, *_ = shuffle_causes(names, seed, "hidden")
-    return HiddenCause(first, None, float(rng.uniform(LEAST_FLOORS, MOST_FLOORS)))
+    return HiddenCause(first, None, float(rng.uniform(MIN_FLOORS, MAX_FLOORS)))
 
 
 def write_answer(path: Path, hidden: Sequence[SizedCause], weak: Sequence[Cause], seed: int) -> None:

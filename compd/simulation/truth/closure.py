@@ -21,7 +21,7 @@ Posture = NDArray[np.float64]
 
 # Tolerance: far below every physical cause (nm), far above rounding at 1 m (1e-13 mm).
 CLOSED_MM = 1e-11
-MOST_ITERATIONS = 25
+MAX_ITERATIONS = 25
 # Newton's method has diverged.
 LOST_MM = 1e5
 # Weights errors of the axes: as the millimetres that they displace at this radius.
@@ -124,7 +124,7 @@ def _newton(
 ) -> Posture:
     """The posture at which `equations`, together with rigidity, vanish. `what`, `wanted`: for the error's text."""
     posture = guess
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         error, gradient = equations(posture)
         departure, rigid = _rigidity(posture)
         residual = np.concatenate([error, departure])

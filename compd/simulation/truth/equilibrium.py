@@ -19,7 +19,7 @@ from compd.simulation.truth.warm_up import WarmUp
 from compd.simulation.truth.weather import Weather
 
 # Cosine of the largest tilt of the platform from its attitude at machine zero, 60 degrees.
-LEAST_UPRIGHT = 0.5
+MIN_UPRIGHT = 0.5
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class Equilibrium:
             link_mm,
             posture,
         )
-        if np.sum(posture[3] * machine.posture0[3]) < LEAST_UPRIGHT:
+        if np.sum(posture[3] * machine.posture0[3]) < MIN_UPRIGHT:
             raise KinematicsError(
                 Problem(
                     where="simulated machine",

@@ -18,7 +18,7 @@ from compd.simulation.truth.mechanism import Mechanism
 
 # Equation (1): the two ball shanks of a revolute joint are averaged.
 _WEIGHTS = {"S": 1.0, "B": 1.0, "Ra": 0.5, "Rb": 0.5}
-MOST_ITERATIONS = 10
+MAX_ITERATIONS = 10
 
 
 class IndicatedTip:
@@ -51,7 +51,7 @@ class IndicatedTip:
     def _supports_M(self, measured_mm: FloatArray) -> FloatArray:
         """(3, 3) supports with these nine distances (9,), equation (3): Newton's method, starting at the drawing."""
         supports_M, plate_M = self._mechanism.supports0_M, self._mechanism.plate0_M
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             residual_mm = measured_mm - distances_mm(supports_M, plate_M)
             if np.abs(residual_mm).max() < CLOSED_MM:
                 break

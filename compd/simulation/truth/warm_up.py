@@ -64,7 +64,7 @@ def usual_heat(links: int, share: float) -> Heat:
 
 
 # Longest step: weather changes over minutes, and each step takes the room temperature at its middle.
-LONGEST_STEP_S = 20.0
+MAX_STEP_S = 20.0
 
 
 class WarmUp:
@@ -99,7 +99,7 @@ class WarmUp:
     def advance(self, time_s: float, moving_share: float) -> None:
         """Advance by `time_s`; the drives moved during `moving_share` of it."""
         heat_W = self._standing_W() + moving_share * self._moving_W
-        steps = max(1, int(np.ceil(time_s / LONGEST_STEP_S)))
+        steps = max(1, int(np.ceil(time_s / MAX_STEP_S)))
         for _ in range(steps):
             step_s = time_s / steps
             self._network.advance(step_s, self._weather.room_degC(self.time_s + step_s / 2), heat_W)

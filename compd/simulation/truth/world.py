@@ -30,8 +30,8 @@ from compd.simulation.truth.workspace import STROKE_SHARE, draw_points_mm
 
 # Fastest change (K/s) at a real part's thermometer: 94 W in each kilogram of steel. A part held 20 K away by a water
 # jacket begins ten times as fast.
-_FASTEST_K_PER_S = 0.2
-_FASTEST_HELD_K_PER_S = 20.0 / HELD_TIME_CONSTANT_S
+_MAX_K_PER_S = 0.2
+_MAX_HELD_K_PER_S = 20.0 / HELD_TIME_CONSTANT_S
 
 Mode = Literal["zero", "tour", "plan", "commanded", "following", "blocked"]
 
@@ -154,8 +154,8 @@ class World:
     @property
     def unnatural_K_per_s(self) -> float:
         """Fastest warm-up (K/s) of its parts if faster than in nature; else 0."""
-        natural = _FASTEST_HELD_K_PER_S if self._rows else _FASTEST_K_PER_S
-        return 0.0 if natural * self._speedup <= _FASTEST_K_PER_S else natural * self._speedup
+        natural = _MAX_HELD_K_PER_S if self._rows else _MAX_K_PER_S
+        return 0.0 if natural * self._speedup <= _MAX_K_PER_S else natural * self._speedup
 
     def hold(self, quantities: Mapping[str, float]) -> None:
         """Hold temperatures of parts, room, air and load on the tip at these values from now on, by name with unit.

@@ -26,7 +26,7 @@ from typing import Any
 
 from compd.errors import CompdError
 
-LONGEST_REQUEST = 65536  # bytes
+MAX_REQUEST = 65536  # bytes
 Answer = Mapping[str, Any]
 Handler = Callable[[Mapping[str, Any]], Answer]
 
@@ -42,7 +42,7 @@ class _Client(socketserver.StreamRequestHandler):
 
     def handle(self) -> None:
         try:
-            while line := self.rfile.readline(LONGEST_REQUEST):
+            while line := self.rfile.readline(MAX_REQUEST):
                 complete = line.endswith(b"\n")
                 answer = _answer(self.server.handlers, line) if complete else _error("too_long", f"{len(line)} bytes")
                 self.wfile.write(json.dumps(answer).encode() + b"\n")

@@ -13,7 +13,7 @@ from compd.errors import CompdError, Problem
 from compd.instruments import LENGTH_AXES, POSITION_AXES, Samples
 
 # Fewest samples of a dwell that gives a point: an instrument takes the mean of some readings.
-LEAST_LOOKS = 3
+MIN_LOOKS = 3
 
 
 class Looks:
@@ -89,5 +89,5 @@ class Looks:
         still = np.concatenate([[False], ~np.array(self._moving, dtype=bool), [False]])
         begins, ends = np.flatnonzero(~still[:-1] & still[1:]), np.flatnonzero(still[:-1] & ~still[1:])
         return [
-            slice(int(begin), int(end)) for begin, end in zip(begins, ends, strict=True) if end - begin >= LEAST_LOOKS
+            slice(int(begin), int(end)) for begin, end in zip(begins, ends, strict=True) if end - begin >= MIN_LOOKS
         ]

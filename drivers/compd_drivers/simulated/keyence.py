@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from compd_drivers.simulated.shared import CommandDevice
 
 # DL-RS1A
-LARGEST_MM = 199.9990  # display of a head without a value
+MAX_MM = 199.9990  # display of a head without a value
 RS1A_COMMAND_ERROR = "ER,{},00\r\n"
 RS1A_GO, RS1A_ALARM = "02", "16"  # judgement of a head: inside its limits, or no value
 RS1A_CODES = {"+199.9990": "over_range", "-199.9990": "under_range", "---------": "sensor_fault"}
@@ -50,8 +50,8 @@ class SimulatedDlRs1a(CommandDevice):
     @staticmethod
     def _shown(value_mm: float) -> str:
         if not math.isfinite(value_mm):
-            return f"{-LARGEST_MM:+09.4f}"
-        return f"{min(LARGEST_MM, max(-LARGEST_MM, value_mm)):+09.4f}"
+            return f"{-MAX_MM:+09.4f}"
+        return f"{min(MAX_MM, max(-MAX_MM, value_mm)):+09.4f}"
 
 
 class SimulatedDlEn1(CommandDevice):

@@ -20,7 +20,7 @@ from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quali
 
 REQUEST = b"?\r"
 END = b"\r\n"
-LONGEST_REPLY = 12  # bytes: +01.2345mm CR LF
+MAX_REPLY = 12  # bytes: +01.2345mm CR LF
 # As narrow as the manual allows: anything that does not fit exactly is damage on the wire.
 _VALUE = re.compile(rb"([+-]\d{2}\.\d{4})(mm|in)")
 _ERROR = re.compile(rb"ER(\d{2})")
@@ -53,12 +53,12 @@ class MyGauge(Gauge[ByteLine]):
         return (Channel("value"),)
 
     def traffic(self) -> Sequence[tuple[int, int]]:
-        return [(len(REQUEST), LONGEST_REPLY)]
+        return [(len(REQUEST), MAX_REPLY)]
 
     def read(self, line: ByteLine) -> Sequence[Reading]:
         """Raises LineFault: MISMATCH unless the reply is whole and in the configured unit; others as the line does."""
         time_s = line.send(REQUEST)
-        reply = line.receive_until(END, LONGEST_REPLY).removesuffix(END)
+        reply = line.receive_until(END, MAX_REPLY).removesuffix(END)
         if error := _ERROR.fullmatch(reply):
             return [bad(time_s, _ERRORS.get(error[1], Quality.DEVICE_ERROR), reply.decode())]
         value = _VALUE.fullmatch(reply)

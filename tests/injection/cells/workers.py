@@ -22,7 +22,7 @@ from tests.support.simulated import run_directory
 LOOK_EVERY_S = 1.0
 TRIES = 3
 # In a row: it is the computer then, and not a cell.
-MOST_FAILURES = 3
+MAX_FAILURES = 3
 
 
 class Tried(NamedTuple):
@@ -86,7 +86,7 @@ def _work(todo: Queue[str | None], done: Queue[Tried]) -> None:
     with pauses.watched(), ExitStack() as running:
         machine: InjectedMachine | None = None
         failures = 0
-        while failures < MOST_FAILURES and (name := _next(todo)) is not None:
+        while failures < MAX_FAILURES and (name := _next(todo)) is not None:
             cell = by_name[name]
             try:
                 if machine is None or machine.expands is not cell.expands:

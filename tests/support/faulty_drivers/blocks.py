@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, RegisterLine, bad, good
 from compd.twins import SimulatedRegisterDevice
-from tests.support.faulty_drivers.comparator import LARGEST_MM, AsciiDevice
+from tests.support.faulty_drivers.comparator import MAX_MM, AsciiDevice
 
 
 class PairDevice(AsciiDevice):
@@ -17,7 +17,7 @@ class PairDevice(AsciiDevice):
 
     def shown(self) -> bytes:
         values = [self.sense(name) for name in ("a", "b")]
-        if any(abs(value) >= LARGEST_MM for value in values):
+        if any(abs(value) >= MAX_MM for value in values):
             return b"ER2\r\n"
         return ",".join("--------" if math.isnan(v) else f"{v:+08.4f}" for v in values).encode() + b"\r\n"
 

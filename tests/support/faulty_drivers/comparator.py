@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from compd.gauge import ByteLine, Channel, Gauge, LineFault, Quality, Reading, bad, good
 from compd.twins import Sense, SimulatedByteDevice
 
-LARGEST_MM = 99.9999
+MAX_MM = 99.9999
 
 
 class AsciiDevice(SimulatedByteDevice):
@@ -42,7 +42,7 @@ class ComparatorDevice(AsciiDevice):
         value_mm = self.sense("value")
         if math.isnan(value_mm):
             return "ER1"
-        return f"{value_mm:+08.4f}mm" if abs(value_mm) < LARGEST_MM + 5e-5 else "ER2"
+        return f"{value_mm:+08.4f}mm" if abs(value_mm) < MAX_MM + 5e-5 else "ER2"
 
 
 class Comparator(Gauge[ByteLine]):

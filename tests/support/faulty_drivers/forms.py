@@ -6,7 +6,7 @@ import math
 import re
 
 from compd.gauge import LineFault, Quality
-from tests.support.faulty_drivers.comparator import LARGEST_MM, AsciiDevice, Comparator, ComparatorDevice
+from tests.support.faulty_drivers.comparator import MAX_MM, AsciiDevice, Comparator, ComparatorDevice
 
 
 class InchDevice(AsciiDevice):
@@ -35,7 +35,7 @@ class CodeDevice(ComparatorDevice):
 
     def number(self) -> str:
         value_mm = self.sense("value")
-        return "ER1" if math.isnan(value_mm) else f"{value_mm if abs(value_mm) < 50 else LARGEST_MM:+08.4f}mm"
+        return "ER1" if math.isnan(value_mm) else f"{value_mm if abs(value_mm) < 50 else MAX_MM:+08.4f}mm"
 
 
 class Code(Comparator):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from compd.gauge import ByteLine, Reading
-from tests.support.faulty_drivers.comparator import LARGEST_MM, Comparator
+from tests.support.faulty_drivers.comparator import MAX_MM, Comparator
 
 
 class GainOfNegatives(Comparator):
@@ -61,7 +61,7 @@ class SaturatedAtTen(Comparator):
 
 class WrongAtItsEnd(Comparator):
     def converted(self, value: float) -> float:
-        return 0.0 if value >= LARGEST_MM else value
+        return 0.0 if value >= MAX_MM else value
 
 
 class SignSwallowed(Comparator):

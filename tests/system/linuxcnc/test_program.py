@@ -24,7 +24,7 @@ from tests.support.simulated import HEXAPOD
 pytestmark = [pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
 
 SPEEDUP = 60.0
-LONGEST_S = 120.0
+MAX_S = 120.0
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def machine() -> Iterator[LinuxCnc]:
 
 
 def run(machine: LinuxCnc, program: Path) -> TipErrors:
-    start_s, end_s = machine.run(program, LONGEST_S, lambda _: machine.arms())
+    start_s, end_s = machine.run(program, MAX_S, lambda _: machine.arms())
     return tip_errors(Mechanism(load(HEXAPOD).geometry), read_motion_log(machine.motion_log, start_s, end_s))
 
 

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import pytest
 
 from compd.page.connections import ConnectionLimits
-from compd.page.limited_protocol import HEAD_WITHIN_S, LARGEST_HEAD_BYTES, UNKNOWN_WITHIN_S
+from compd.page.limited_protocol import HEAD_WITHIN_S, MAX_HEAD_BYTES, UNKNOWN_WITHIN_S
 from tests.support.event_stream import EventStream, connected, cookie_of, host_of, request
 from tests.support.live_page import memory_mb, page_process
 
@@ -29,10 +29,10 @@ ANSWER_WITHIN_S = 0.8 * HEAD_WITHIN_S
 # Of the server's timers and this computer.
 MORE_S = 3.0
 GROWTH_MB = 30.0
-LONGEST_LOG_BYTES = 2000
+MAX_LOG_BYTES = 2000
 HUGE_BYTES = 10 * 10**9
 # Buffers of the system, and what is sent before the refusal has come.
-MOST_SENT_BYTES = 50e6
+MAX_SENT_BYTES = 50e6
 # Each of them is answered before a newcomer is taken.
 MANY_WHOLE = 500
 
@@ -59,7 +59,7 @@ def page(tmp_path):
         yield served
         assert memory_mb(pid) - before_mb < GROWTH_MB
         text = log.read_text()[logged:]
-        assert len(text) < LONGEST_LOG_BYTES, text
+        assert len(text) < MAX_LOG_BYTES, text
         assert "Traceback" not in text
         until_released(pid, before)
 
@@ -143,7 +143,7 @@ def test_a_head_that_comes_byte_by_byte_has_no_longer(page):
 
 
 def test_a_head_without_an_end_and_what_is_no_http_are_refused(page):
-    endless = b"GET / HTTP/1.1\r\nX: " + b"x" * (2 * LARGEST_HEAD_BYTES)
+    endless = b"GET / HTTP/1.1\r\nX: " + b"x" * (2 * MAX_HEAD_BYTES)
     many = "\r\n".join(["GET / HTTP/1.1", f"Host: {host_of(page.address)}", *(f"X{k}: 1" for k in range(500)), "", ""])
     with EventStream(page.address) as events:
         for sent in (
@@ -188,7 +188,7 @@ def test_a_huge_body_that_comes_is_not_read(page, field):
             while sent < HUGE_BYTES:
                 connection.sendall(piece)
                 sent += len(piece)
-        assert sent < MOST_SENT_BYTES
+        assert sent < MAX_SENT_BYTES
 
 
 def test_who_does_not_read_the_answer_does_not_stay(page):

@@ -29,7 +29,7 @@ TONES = {
 SIZES = {"monitor": {"width": 1366, "height": 768}, "tablet": {"width": 768, "height": 1024}}
 # As long as the daemon's own: it names gauges.
 REASON = "scale_1.position timeout (no byte came), frame_u.u1 line_lost (the port is gone); the last good set is used"
-LEAST_CONTRAST = 4.5
+MIN_CONTRAST = 4.5
 
 # Text of the banner with the ratio of contrast to its ground (WCAG 2.2, 1.4.3): to the darkest and the lightest of a
 # hatched one.
@@ -106,7 +106,7 @@ def test_a_state_has_its_word_its_reason_and_its_colour(tab, page, state):
     assert bool(shown(tab, "tip")) == state.valid
     contrasts = tab.evaluate(CONTRASTS)
     assert {"state", "sign", "reason", "role"} <= set(contrasts)
-    assert min(contrasts.values()) >= LEAST_CONTRAST, contrasts
+    assert min(contrasts.values()) >= MIN_CONTRAST, contrasts
 
 
 def test_every_sign_is_one_of_its_own(tab, page):
@@ -149,7 +149,7 @@ def test_without_a_daemon_no_number_of_before_is_left(tab, page):
     assert style[0] == GROUNDS["gone"]
     assert "gradient" in style[1]
     contrasts = tab.evaluate(CONTRASTS)
-    assert min(contrasts.values()) >= LEAST_CONTRAST, contrasts
+    assert min(contrasts.values()) >= MIN_CONTRAST, contrasts
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -16,7 +16,7 @@ from compd.errors import CompdError, ConfigurationError, PluginError, RecordingE
 from compd.model.effects import Effect, Parameter
 from compd.model_file import ModelFile
 from compd.planning import MeasurementPlan
-from compd.result_tables import MOST_ROWS, data_frame, html_table
+from compd.result_tables import MAX_ROWS, data_frame, html_table
 from tests.support.measured import SIGMA_UM, gauges, hidden, record
 
 ROWS = 300
@@ -319,8 +319,8 @@ def test_html_of_results_escapes_what_people_wrote(path: Path, tmp_path: Path) -
 
 
 def test_long_tables_are_cut_in_a_notebook_and_say_so() -> None:
-    text = html_table("", {"row": list(range(MOST_ROWS + 3))})
-    assert text.count("<tr ") == MOST_ROWS + 1
+    text = html_table("", {"row": list(range(MAX_ROWS + 3))})
+    assert text.count("<tr ") == MAX_ROWS + 1
     assert "3 more rows" in text
 
 

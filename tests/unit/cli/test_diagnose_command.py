@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from compd.cli.measurements.diagnose import diagnose
 from compd.diagnosis import WIDTH, CandidateResult, Diagnosis, summary_lines
 from compd.diagnosis.findings import UntestedEffect
-from compd.diagnosis.words.summary_lines import MOST_LINES
+from compd.diagnosis.words.summary_lines import MAX_LINES
 from compd.model.library import find_effect
 from compd.report import print_diagnosis
 from tests.support.diagnoses import (
@@ -57,7 +57,7 @@ def output(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 def test_it_begins_with_the_twelve_lines_and_a_line(output: tuple[Path, str]) -> None:
     lines = output[1].split("\n")
     end = lines.index("-" * WIDTH)
-    assert 3 <= end <= MOST_LINES
+    assert 3 <= end <= MAX_LINES
     assert max(map(len, lines[:end])) <= WIDTH
     assert lines[0].startswith("identified: What is missing is link_expansion: ")
     assert lines[1].startswith("Found:    link_expansion: the rods between joints and scale grow with")

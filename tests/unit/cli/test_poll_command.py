@@ -21,7 +21,7 @@ from tests.support.running_daemon import supervised
 from tests.support.serial_gateway import SerialGateway, serial_gateway
 
 TIMEOUT_S = 60.0
-WATCH_HZ, MOST_SETPOINTS = 20.0, 400
+WATCH_HZ, MAX_SETPOINTS = 20.0, 400
 UNITS, EXCHANGE_S, WAIT_S = 2, 0.001, 1.0
 # The second poll that costs the other unit its reading: from then on it is asked every 100 s.
 MISSES = 2
@@ -60,7 +60,7 @@ def test_a_unit_that_has_come_back_is_asked_at_once(tmp_path: Path) -> None:
             watched = client.watch(WATCH_HZ)
 
             def until_polled(gauge: str, times: int, quality: str) -> None:
-                for _ in islice(watched, MOST_SETPOINTS):
+                for _ in islice(watched, MAX_SETPOINTS):
                     part = gauge_status(client.status(), gauge)
                     if part["faults"].get(quality, 0) >= times or (quality == "ok" and part["ok"] >= times):
                         return

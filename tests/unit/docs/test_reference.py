@@ -42,7 +42,7 @@ from docs.generate.protocol import c_struct, packet_rows
 from docs.generate.schema import ModelSchema, key_unit
 from tests.support.paths import ROOT
 
-LARGEST_TABLE = 4
+MAX_TABLE = 4
 MESSAGES = [*REQUESTS.values(), *SENT_MESSAGES.values()]
 FILES = [ModelDocument, EffectEntry, ParameterEntry, ModelStep, FormulaDeclaration, FormulaParameter]
 THRESHOLDS = [
@@ -83,7 +83,7 @@ def test_a_page_has_a_title_and_tables_of_few_columns(name: str) -> None:
     text = page(name)
     assert text.startswith("# ")
     rows = [line for line in text.split("\n") if line.startswith("| ")]
-    assert max((len(re.findall(r"(?<!\\)\|", row)) - 1 for row in rows), default=0) <= LARGEST_TABLE
+    assert max((len(re.findall(r"(?<!\\)\|", row)) - 1 for row in rows), default=0) <= MAX_TABLE
 
 
 @pytest.mark.parametrize("name", generate.page_names())

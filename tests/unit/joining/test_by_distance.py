@@ -10,7 +10,7 @@ import pytest
 
 from compd.arrays import FloatArray
 from compd.joining.assignment import Assignment, NoAssignment
-from compd.joining.by_distance import LEAST_POINTS, assign_by_distance
+from compd.joining.by_distance import MIN_POINTS, assign_by_distance
 from tests.support.points_at_rest import MACHINE_MM, NOISE_MM, in_own_frame, measured, random_places
 
 
@@ -81,7 +81,7 @@ def test_symmetrical_places_are_refused() -> None:
         (lambda rng, place_mm: rng.uniform(-100, 100, place_mm.shape), "no choice of dwells|at no dwell"),
         (lambda rng, place_mm: measured(rng, place_mm) * [1, 1, -1], "mirror image"),
         (lambda rng, place_mm: measured(rng, place_mm) / 25.4, "no choice of dwells"),
-        (lambda rng, place_mm: measured(rng, place_mm[: LEAST_POINTS - 1]), "too few different places"),
+        (lambda rng, place_mm: measured(rng, place_mm[: MIN_POINTS - 1]), "too few different places"),
         (lambda rng, place_mm: np.linspace(0, 1, 9)[:, None] * [10.0, 20.0, 30.0], "on one line"),
         (
             lambda rng, place_mm: np.vstack([measured(rng, place_mm[:20]), in_own_frame(random_places(rng, 10))]),

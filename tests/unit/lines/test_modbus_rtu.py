@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from pymodbus.framer.rtu import FramerRTU
 
-from compd.gauge import MOST_SKIPPED_BYTES, LineFault, Quality
+from compd.gauge import MAX_SKIPPED_BYTES, LineFault, Quality
 from compd.lines.kinds.modbus_rtu.master import RtuMaster, crc16, gap_s
 from compd.lines.stream import StreamLine
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
@@ -295,7 +295,7 @@ def test_as_many_bytes_are_told_as_a_configuration_may_skip() -> None:
         port = {"kind": "modbus_rtu", "port": "/dev/ttyUSB0", "baud": 9600, "format": "8N1", "timeout_s": 0.1}
         return {**port, "skip_bytes": skip_bytes}
 
-    most = bytes(MOST_SKIPPED_BYTES)
+    most = bytes(MAX_SKIPPED_BYTES)
     assert f"`skip_bytes: {len(most)}`" in fault_of(behind(most, counting_slave())).detail
     SETTINGS.validate_python(line(len(most)))
     assert "skip_bytes" not in fault_of(behind(most + b"\0", counting_slave())).detail

@@ -20,7 +20,7 @@ from compd.gauge import LineFault, Quality
 from compd.lines import open_line, open_stream
 from compd.lines.kinds.modbus_rtu.master import RtuMaster
 from compd.lines.port import Port, SerialPort, TcpPort
-from compd.lines.stream import FEWEST_RESTS, MOST_DRAIN_TIMEOUTS, MOST_GIVEN_UP, SHORTEST_REST, StreamLine
+from compd.lines.stream import MAX_DRAIN_TIMEOUTS, MAX_GIVEN_UP, MIN_REST, MIN_RESTS, StreamLine
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 
 TIMEOUT_S = 0.1
@@ -107,7 +107,7 @@ def test_a_line_that_is_never_quiet_is_named() -> None:
     assert port.written == []
     start_s = clock.now_s
     line.drain()
-    assert clock.now_s - start_s < 2 * MOST_DRAIN_TIMEOUTS * TIMEOUT_S, "draining ends, too"
+    assert clock.now_s - start_s < 2 * MAX_DRAIN_TIMEOUTS * TIMEOUT_S, "draining ends, too"
 
 
 def test_drain_waits_for_quiet_and_gives_what_came() -> None:
@@ -349,13 +349,13 @@ def test_tcp_refused_is_a_lost_line() -> None:
 def test_the_rest_of_a_reply_is_waited_for_half_of_the_timeout_and_after_that_for_all_of_it() -> None:
     """A device that has become slower is not given up time and again."""
     clock = InstantClock()
-    port = ScriptedPort(clock, [b"+1.234\r\n"] * FEWEST_RESTS)
+    port = ScriptedPort(clock, [b"+1.234\r\n"] * MIN_RESTS)
     line = StreamLine(port, 0.15, 0.0, clock)
     assert line.rest_timeout_s == 0.15
-    for _ in range(FEWEST_RESTS):
+    for _ in range(MIN_RESTS):
         line.receive(8)
-    assert line.rest_timeout_s == SHORTEST_REST * 0.15
-    for waited_s in (*[SHORTEST_REST * 0.15] * MOST_GIVEN_UP, 0.15, 0.15):
+    assert line.rest_timeout_s == MIN_REST * 0.15
+    for waited_s in (*[MIN_REST * 0.15] * MAX_GIVEN_UP, 0.15, 0.15):
         port.script, start_s = [b"+1.23"], clock.now_s
         with pytest.raises(LineFault) as caught:
             line.receive(8)
@@ -364,4 +364,4 @@ def test_the_rest_of_a_reply_is_waited_for_half_of_the_timeout_and_after_that_fo
         line.drain(0.0)
     port.script = [b"+1.234\r\n"]
     line.receive(8)
-    assert line.rest_timeout_s == SHORTEST_REST * 0.15, "a whole reply came"
+    assert line.rest_timeout_s == MIN_REST * 0.15, "a whole reply came"

@@ -172,7 +172,7 @@ def test_the_stream_leaves_what_is_not_a_living_daemon(what: str) -> None:
         elif what == "no JSON":
             daemon.send(b"HTTP/1.1 400\n")
         else:
-            stream._buffer = b"x" * (bridge.LONGEST_LINE + 1)
+            stream._buffer = b"x" * (bridge.MAX_LINE + 1)
         assert stream.poll() == []
         assert not stream.greeted
         daemon.close()

@@ -9,7 +9,7 @@ import pytest
 
 from compd.gauge import Quality
 from compd.live.loop.commands import Target
-from compd.live.machine.reasons import LONGEST_REASON_BYTES
+from compd.live.machine.reasons import MAX_REASON_BYTES
 from compd.setpoint_states import State
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine
 from tests.support.live_models import thermal, warm, with_noise
@@ -186,7 +186,7 @@ def test_a_reason_names_gauges_in_groups_and_is_never_long():
     for k, channel in enumerate(lengths):
         tripod.faults[channel] = list(Quality)[1 + k % (len(Quality) - 1)]
     reason = tripod.step().reason
-    assert len(reason.encode()) <= LONGEST_REASON_BYTES
+    assert len(reason.encode()) <= MAX_REASON_BYTES
     assert "STATUS names all" in reason
 
 

@@ -13,23 +13,23 @@ from compd.live.loop.limits import limit_correction
 from compd.operation_settings import LimitSettings
 from compd.setpoint_states import State
 
-LARGEST_MM = 0.2
+MAX_MM = 0.2
 SLEW_MM_PER_S = 0.5
 PERIOD_S = 0.005
 STEP_MM = SLEW_MM_PER_S * PERIOD_S
 ROUNDING_MM = 1e-11
 
-CLAMP = LimitSettings(correction_mm=LARGEST_MM, slew_mm_per_s=SLEW_MM_PER_S, on_limit="clamp")
-REFUSE = LimitSettings(correction_mm=LARGEST_MM, slew_mm_per_s=SLEW_MM_PER_S, on_limit="refuse")
+CLAMP = LimitSettings(correction_mm=MAX_MM, slew_mm_per_s=SLEW_MM_PER_S, on_limit="clamp")
+REFUSE = LimitSettings(correction_mm=MAX_MM, slew_mm_per_s=SLEW_MM_PER_S, on_limit="refuse")
 
 any_wanted = st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=3, max_size=3)
-within = st.lists(st.floats(-LARGEST_MM, LARGEST_MM), min_size=3, max_size=3)
+within = st.lists(st.floats(-MAX_MM, MAX_MM), min_size=3, max_size=3)
 
 
 @given(wanted=any_wanted, previous=within, limits=st.sampled_from([CLAMP, REFUSE]))
 def test_whatever_is_wanted_the_applied_correction_keeps_both_limits(wanted, previous, limits):
     result = limit_correction(np.array(wanted), np.array(previous), PERIOD_S, limits)
-    assert np.all(np.abs(result.applied_mm) <= LARGEST_MM + ROUNDING_MM)
+    assert np.all(np.abs(result.applied_mm) <= MAX_MM + ROUNDING_MM)
     assert np.all(np.abs(result.applied_mm - previous) <= STEP_MM + ROUNDING_MM)
     assert (result.state is State.OK) == (result.reason == "")
 
@@ -46,7 +46,7 @@ def test_ok_means_untouched_and_anything_else_is_named(wanted, previous, limits)
 @given(wanted=within)
 def test_a_constant_wish_is_reached_and_never_overshot(wanted):
     applied = np.zeros(3)
-    for _ in range(math.ceil(LARGEST_MM / STEP_MM) + 1):
+    for _ in range(math.ceil(MAX_MM / STEP_MM) + 1):
         result = limit_correction(np.array(wanted), applied, PERIOD_S, CLAMP)
         assert np.all(np.abs(result.applied_mm) <= np.abs(wanted) + ROUNDING_MM)
         applied = result.applied_mm
@@ -62,7 +62,7 @@ def test_the_first_correction_starts_from_zero():
 
 
 def test_a_clamped_correction_says_link_wanted_and_allowed():
-    previous = np.array([0.0, LARGEST_MM, 0.0])
+    previous = np.array([0.0, MAX_MM, 0.0])
     result = limit_correction(np.array([0.0, 0.312, 0.0]), previous, PERIOD_S, CLAMP)
     assert result.state is State.CLAMPED
     assert result.applied_mm.tolist() == previous.tolist()

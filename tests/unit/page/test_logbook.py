@@ -12,7 +12,7 @@ from compd.errors import DaemonError, Problem
 from compd.page.guard import COOKIE, Guard, Token, hashed
 from compd.page.orders import Orders
 from compd.page.recordings import Recordings
-from compd.page.requests import LONGEST_LINE, asked_by
+from compd.page.requests import MAX_LINE, asked_by
 from compd.page.server import Server
 from tests.support.asgi_client import AsgiClient
 from tests.support.scripted_page import LOOKS, ORDERS, ScriptedLink
@@ -120,7 +120,7 @@ def test_a_line_of_the_log_is_one_line(guarded):
     for line in changes(lines):
         for value in line.values():
             assert value.isprintable()
-            assert len(value) <= LONGEST_LINE
+            assert len(value) <= MAX_LINE
 
 
 def test_a_name_of_any_length_leaves_role_and_address():
@@ -128,4 +128,4 @@ def test_a_name_of_any_length_leaves_role_and_address():
     by = asked_by({"token": token, "client": ("10.0.0.5", 1234)})
     assert by.startswith("a?nn")
     assert by.endswith("(operate) from 10.0.0.5")
-    assert len(by) <= LONGEST_LINE
+    assert len(by) <= MAX_LINE

@@ -13,11 +13,11 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Guard, Token, hashed
 from compd.page.history import History
 from compd.page.recordings import Recordings
-from compd.page.requests import LONGEST_BODY_BYTES
+from compd.page.requests import MAX_BODY_BYTES
 from compd.page.server import STATIC, Server, _ended, packed
 
 HOST = "127.0.0.1:7760"
-LARGEST_PAGE_BYTES = 150_000
+MAX_PAGE_BYTES = 150_000
 OWN = {"Origin": f"http://{HOST}"}
 
 
@@ -45,7 +45,7 @@ def test_a_page_is_small():
     files = [path for path in STATIC.rglob("*") if path.is_file() and "LICENSE" not in path.name]
     others = ("workbench", "join")  # views of their own
     loaded = [path for path in files if not str(path.relative_to(STATIC)).startswith(others)]
-    assert sum(path.stat().st_size for path in loaded) <= LARGEST_PAGE_BYTES
+    assert sum(path.stat().st_size for path in loaded) <= MAX_PAGE_BYTES
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_nothing_else_is(open_page, path):
 
 
 @pytest.mark.parametrize("path", ["/arm", "/orders/zero", "/recordings"])
-@pytest.mark.parametrize("body", [b"", b"{", b"[]", b"3", b"\xff", b'"' + b"x" * LONGEST_BODY_BYTES])
+@pytest.mark.parametrize("body", [b"", b"{", b"[]", b"3", b"\xff", b'"' + b"x" * MAX_BODY_BYTES])
 def test_a_body_that_is_no_order_is_refused(open_page, path, body):
     assert open_page("operate").post(path, content=body, headers=OWN).status_code in (400, 413)
 

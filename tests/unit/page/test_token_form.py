@@ -8,7 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from compd.live.service import WRONG_TOKEN_REST_S
-from compd.page.guard import COOKIE, LONGEST_FORM_BYTES, MOST_HEADERS, Guard, Token, WrongTokens, hashed
+from compd.page.guard import COOKIE, MAX_FORM_BYTES, MAX_HEADERS, Guard, Token, WrongTokens, hashed
 from compd.page.recordings import Recordings
 from compd.page.server import Server
 from tests.support.hand_clock import HandClock
@@ -89,7 +89,7 @@ def test_wrong_tokens_from_one_address_keep_nobody_at_another_waiting(clock):
         ({"Origin": "null"}, b"token=anna%27s", 403),
         ({"Origin": ""}, b"token=anna%27s", 403),
         ({**OWN, "Sec-Fetch-Site": "cross-site"}, b"token=anna%27s", 403),
-        (OWN, b"token=" + b"a" * LONGEST_FORM_BYTES, 403),
+        (OWN, b"token=" + b"a" * MAX_FORM_BYTES, 403),
         ({**OWN, "Content-Length": "100000000000000000000"}, b"token=anna%27s", 403),
         ({**OWN, "Content-Length": "\xb2"}, b"token=anna%27s", 403),
         (OWN, b"&".join([b"token=anna%27s"] * 9), 403),
@@ -163,7 +163,7 @@ def test_its_own_page_loads_what_it_needs(client, site):
 
 
 def test_a_request_has_a_number_of_headers(client):
-    assert client.get("/", headers={f"X-{k}": "1" for k in range(MOST_HEADERS)}).status_code == 431
+    assert client.get("/", headers={f"X-{k}": "1" for k in range(MAX_HEADERS)}).status_code == 431
 
 
 def test_a_body_without_a_token_is_not_read():

@@ -24,7 +24,7 @@ LINES = st.lists(st.one_of(st.just(""), st.lists(NUMBERS, min_size=3, max_size=3
 def parse(body: str, least_bytes_for_arrow: int) -> tuple[Table | None, ProblemList]:
     problems = ProblemList(Path("run.csv"))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(csv_table, "_LEAST_BYTES_FOR_ARROW", least_bytes_for_arrow)
+        patch.setattr(csv_table, "_MIN_BYTES_FOR_ARROW", least_bytes_for_arrow)
         content = f"{','.join(NAMES)}\n{body}".encode()
         return parse_table(Path("run.csv"), content, problems, lambda names: names[0] == NAMES[0]), problems
 

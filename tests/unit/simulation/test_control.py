@@ -14,7 +14,7 @@ import yaml
 from compd.configuration import Configuration, load
 from compd.errors import CompdError, ConfigurationError, Problem
 from compd.simulation.truth.world import World
-from compd.simulation.wires.control import LONGEST_REQUEST, Answer, ControlSocket
+from compd.simulation.wires.control import MAX_REQUEST, Answer, ControlSocket
 from compd.simulation.wires.daemon_configuration import Port, daemon_configuration
 from compd.simulation.wires.sensing import Sensing
 from tests.support.simulated import HEXAPOD, TRIPOD, ask, run_directory, section
@@ -68,7 +68,7 @@ def test_a_bad_request_is_answered_and_harms_nothing(client: socket.socket, requ
 
 
 def test_an_endless_request_is_cut_off(client: socket.socket) -> None:
-    client.sendall(b"x" * LONGEST_REQUEST)
+    client.sendall(b"x" * MAX_REQUEST)
     lines = client.makefile("rb")
     assert json.loads(lines.readline())["code"] == "too_long"
     assert lines.readline() == b""

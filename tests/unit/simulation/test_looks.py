@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from compd.errors import CompdError
-from compd.simulation.wires.instrument_sampling import LEAST_LOOKS, Looks
+from compd.simulation.wires.instrument_sampling import MIN_LOOKS, Looks
 
 
 def seen(time_s: float, x_mm: float, moving: bool) -> dict[str, Any]:
@@ -30,7 +30,7 @@ def looks_of(link: int | None = None) -> Looks:
     for k, off in enumerate(noise):
         looks.add(seen(0.5 + 0.1 * k, 20.0 + off, False))
     looks.add(seen(0.9, 25.0, True))
-    for _ in range(LEAST_LOOKS - 1):
+    for _ in range(MIN_LOOKS - 1):
         looks.add(seen(1.0, 30.0, False))
     return looks
 

@@ -34,8 +34,8 @@ _END = b"EOF::"
 _NUMBER_BYTES = 8
 # Longest header and file (bytes). The header has some twenty lines; 100 million samples are half an hour at the fastest
 # rate, 50 kHz.
-_LONGEST_HEADER = 64 * 1024
-_LONGEST_FILE = 800_000_000
+_MAX_HEADER = 64 * 1024
+_MAX_FILE = 800_000_000
 _NUMBER = re.compile(r"\+?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _SHOWN = 5
 # Options for text or for positions, without a meaning here.
@@ -54,7 +54,7 @@ def read_carto(path: Path, options: ReadOptions) -> InstrumentExport:
         no end, values that are no numbers.
     """
     try:
-        content = read_small_file(path, _LONGEST_FILE)
+        content = read_small_file(path, _MAX_FILE)
     except OSError as error:
         raise RecordingError(
             Problem(where=str(path), what=f"cannot be read: {error.strerror or error}", next_step="check the path")
@@ -80,7 +80,7 @@ class _CartoReader:
         self.problems: list[Problem] = []
 
     def read(self, content: bytes) -> InstrumentExport | None:
-        data = _DATA.search(content[:_LONGEST_HEADER])
+        data = _DATA.search(content[:_MAX_HEADER])
         if not content.lstrip().startswith(MAGIC):
             self._add(":1", "is no CARTO .rtx", "", "a file that begins with HEADER::", "check --as")
         elif data is None:

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from openpyxl.worksheet._read_only import ReadOnlyWorksheet
 
 # Most rows of a sheet, and most columns of an instrument's list.
-MOST_ROWS = 1_048_576
-MOST_COLUMNS = 500
+MAX_ROWS = 1_048_576
+MAX_COLUMNS = 500
 # Kinds of cells. COMMA: a number as text, with a comma; ERROR: of the spreadsheet; NO_VALUE: a formula without one.
 EMPTY, TEXT, NUMBER, DATE, COMMA, ERROR, NO_VALUE = range(7)
 # Kinds that stand for a value, in a list below its header.
@@ -116,13 +116,13 @@ class SheetReader:
         # what the file says of its size may be wrong, and is what rows are padded to
         sheet.reset_dimensions()
         for number, cells in enumerate(cast(Any, sheet).iter_rows(), start=1):
-            if number > MOST_ROWS or len(cells) > MOST_COLUMNS:
+            if number > MAX_ROWS or len(cells) > MAX_COLUMNS:
                 raise RecordingError(
                     Problem(
                         where=f"{self.place}, row {number}",
                         what="is beyond what a list can have",
                         value=f"{len(cells)} columns",
-                        allowed=f"{MOST_ROWS} rows, {MOST_COLUMNS} columns",
+                        allowed=f"{MAX_ROWS} rows, {MAX_COLUMNS} columns",
                         next_step="delete what stands far to the right or below, or save the list as CSV",
                     )
                 )

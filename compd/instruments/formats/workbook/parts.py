@@ -12,7 +12,7 @@ from compd.errors import Problem, RecordingError
 from compd.instruments.read_limits import ReadLimits
 
 # Largest file (bytes) on the disk.
-MOST_BYTES = 200_000_000
+MAX_BYTES = 200_000_000
 # Exceptions of reading a damaged file; a SyntaxError stands for malformed XML.
 BROKEN = (
     *(ValueError, KeyError, IndexError, TypeError, AttributeError, SyntaxError, EOFError, OSError, OverflowError),
@@ -75,13 +75,13 @@ def check_workbook_file(path: Path, limits: ReadLimits) -> None:
             names = archive.namelist()
     except BROKEN as error:
         raise RecordingError(unreadable(path, why_broken(error))) from error
-    if size > MOST_BYTES or unpacked > limits.unpacked_bytes:
+    if size > MAX_BYTES or unpacked > limits.unpacked_bytes:
         raise RecordingError(
             Problem(
                 where=str(path),
                 what="is too large for a list of measurements",
                 value=f"{size} bytes, unpacked {unpacked}",
-                allowed=f"{MOST_BYTES} bytes, unpacked {limits.unpacked_bytes}",
+                allowed=f"{MAX_BYTES} bytes, unpacked {limits.unpacked_bytes}",
                 next_step="save the sheet as CSV",
             )
         )

@@ -10,7 +10,7 @@ from compd.lines.modbus_serial import CONFIRMED, WRITES, SerialMaster
 from compd.lines.stream import shown
 
 START, END = b":", b"\r\n"
-SHORTEST_FRAME = 11  # colon; unit, function, exception or byte count, LRC in two digits each; CR LF
+MIN_FRAME = 11  # colon; unit, function, exception or byte count, LRC in two digits each; CR LF
 COUNTED = 3  # bytes until the byte count
 
 
@@ -27,7 +27,7 @@ class AsciiMaster(SerialMaster):
         return self._stream.send(START + (request + bytes([lrc(request)])).hex().upper().encode() + END)
 
     def _receive(self, unit: int) -> bytes:
-        text = self._stream.receive_head(SHORTEST_FRAME)
+        text = self._stream.receive_head(MIN_FRAME)
         head = _decoded(text[: 1 + 2 * COUNTED], text)
         # a shortest frame has no data; a reply has as much as it counts, a confirmation as every one
         more = 0 if head[1] & 0x80 else CONFIRMED - 1 if head[1] in WRITES else head[2]

@@ -5,11 +5,11 @@ Source: Modbus over Serial Line V1.02 (frame, CRC, 3.5 characters of silence).
 
 from __future__ import annotations
 
-from compd.gauge import MOST_SKIPPED_BYTES, LineFault, Quality
+from compd.gauge import MAX_SKIPPED_BYTES, LineFault, Quality
 from compd.lines.modbus_serial import CONFIRMED, WRITES, SerialMaster
 from compd.lines.stream import StreamLine, shown
 
-SHORTEST_FRAME = 5  # unit, function, exception or byte count, CRC
+MIN_FRAME = 5  # unit, function, exception or byte count, CRC
 CONFIRMATION = 2 + CONFIRMED + 2  # of a write
 
 
@@ -46,8 +46,8 @@ def crc16(data: bytes) -> int:
 def _frame_length(begin: bytes) -> int:
     """Bytes of the frame that begins so, with three bytes or more: as it counts, or as a write confirms."""
     if begin[1] & 0x80:
-        return SHORTEST_FRAME
-    return CONFIRMATION if begin[1] in WRITES else SHORTEST_FRAME + begin[2]
+        return MIN_FRAME
+    return CONFIRMATION if begin[1] in WRITES else MIN_FRAME + begin[2]
 
 
 class RtuMaster(SerialMaster):
@@ -65,9 +65,9 @@ class RtuMaster(SerialMaster):
         return self._stream.send(request + crc16(request).to_bytes(2, "little"))
 
     def _receive(self, unit: int) -> bytes:
-        frame = self._stream.receive_head(SHORTEST_FRAME)
+        frame = self._stream.receive_head(MIN_FRAME)
         try:
-            frame += self._stream.receive_rest(frame, _frame_length(frame) - SHORTEST_FRAME)
+            frame += self._stream.receive_rest(frame, _frame_length(frame) - MIN_FRAME)
             if crc16(frame):
                 raise LineFault(Quality.CRC, shown(frame))
         except LineFault as fault:
@@ -83,7 +83,7 @@ class RtuMaster(SerialMaster):
 
         A transceiver that changes its direction late, or a line without bias resistors, makes a byte of an edge.
         """
-        for count in range(1, MOST_SKIPPED_BYTES + 1):
+        for count in range(1, MAX_SKIPPED_BYTES + 1):
             came = begin[count:] + self._stream.received
             if len(came) < 3 or came[0] != unit or came[1] & 0x7F != self._function:
                 continue

@@ -39,7 +39,7 @@ logging.getLogger("pymodbus").propagate = False
 LAST_TRANSACTION = 0xFFFF
 # Longest silence (s) of a connection beyond the gateway's wait; it is then closed, since a device may have forgotten
 # it. Above the waits of a slow gateway for two units (usually 1 to 2 s each).
-LONGEST_SILENCE_S = 5.0
+MAX_SILENCE_S = 5.0
 
 
 class ModbusTcp:
@@ -197,7 +197,7 @@ class ModbusTcp:
         now_s = self._clock.monotonic()
         self._unanswered += 1
         self._busy_until_s = max(self._busy_until_s, time_s) + self._gateway_wait_s
-        if self._received or now_s - self._last_bytes_s > LONGEST_SILENCE_S + self._gateway_wait_s:
+        if self._received or now_s - self._last_bytes_s > MAX_SILENCE_S + self._gateway_wait_s:
             self.close()
         raise LineFault(Quality.TIMEOUT, f"no answer to this request within {until_s - time_s:.3g} s")
 

@@ -36,8 +36,8 @@ from compd.source_time import Arrival
 # Wait (s) for the network before paho checks the broker's presence.
 SLICE_S = 0.1
 # Most messages of one call of `messages`; more wait in the socket.
-MOST_MESSAGES = 1000
-LONGEST_PASSWORD = 65535  # bytes, MQTT 3.1.1, 3.1.3.5
+MAX_MESSAGES = 1000
+MAX_PASSWORD = 65535  # bytes, MQTT 3.1.1, 3.1.3.5
 
 
 class MqttSubscriber:
@@ -108,7 +108,7 @@ class MqttSubscriber:
         while not self._came and self._work(deadline_s):
             pass
         count = len(self._came)
-        while count < MOST_MESSAGES:
+        while count < MAX_MESSAGES:
             self._work(-math.inf)
             if len(self._came) == count:
                 break
@@ -135,7 +135,7 @@ class MqttSubscriber:
             password = None
             if settings.password_file is not None:
                 password = Path(settings.password_file).read_text(encoding="utf-8").rstrip("\r\n")
-                if len(password.encode()) > LONGEST_PASSWORD:
+                if len(password.encode()) > MAX_PASSWORD:
                     raise ValueError(f"{settings.password_file} is too long for a password")
             self._client.username_pw_set(settings.user, password)
         if settings.tls is not None:

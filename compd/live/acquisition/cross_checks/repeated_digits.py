@@ -20,7 +20,7 @@ from compd.live.acquisition.cross_checks.machine_view import Contradiction, Mach
 _STREAK = 40.0
 # A gauge scatters if its last change is at most this many of its usual times ago.
 _SCATTERING = 5.0
-_FEWEST_CHANGES = 100
+_MIN_CHANGES = 100
 
 
 class RepeatedDigits:
@@ -33,7 +33,7 @@ class RepeatedDigits:
         changes = memory.changes[:n]
         usual_s = (memory.last_change_s[:n] - memory.first_change_s[:n]) / np.maximum(changes - 1.0, 1.0)
         since_s = memory.shown_s[:n] - memory.last_change_s[:n]
-        able = view.believed & (changes >= _FEWEST_CHANGES) & (noise >= memory.step_mm[:n])
+        able = view.believed & (changes >= _MIN_CHANGES) & (noise >= memory.step_mm[:n])
         scatter = able & (since_s <= _SCATTERING * usual_s)
         if not scatter.any():
             return

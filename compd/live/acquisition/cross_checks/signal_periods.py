@@ -24,7 +24,7 @@ from compd.units import UM_PER_MM
 # Age (s) from which steps no longer count: a link is moved on purpose once in a while.
 MEMORY_S = 3600.0
 # Fewest steps in CMM mode.
-FEWEST_STEPS = 2
+MIN_STEPS = 2
 # Longest wait (s) after a step until all other lengths have been read; the step is undecided after that.
 _WAIT_S = 2.0
 _QUARTERS = 4
@@ -107,7 +107,7 @@ class SignalPeriods:
             self._steps.pop(i)
             return
         controlled = self._looks[-1].setpoint_mm is not None
-        enough = len(steps) >= (1 if controlled else FEWEST_STEPS)
+        enough = len(steps) >= (1 if controlled else MIN_STEPS)
         text = self._text(steps, sum_mm, tolerance_mm, controlled)
         if enough and abs(sum_mm) >= self._period_mm - tolerance_mm:
             self._steps.pop(i)

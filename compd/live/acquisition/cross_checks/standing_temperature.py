@@ -14,7 +14,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView
 
-_FEWEST_OTHERS = 2
+_MIN_OTHERS = 2
 
 
 class StandingTemperature:
@@ -34,7 +34,7 @@ class StandingTemperature:
                 self._before[i] = changes, view.value.copy()
                 continue
             others = [j for j in places if j != i and view.believed[j] and not np.isnan(before[1][j])]
-            if len(others) < _FEWEST_OTHERS:
+            if len(others) < _MIN_OTHERS:
                 continue
             risen_K = view.value[others] - before[1][others]
             if abs(risen_K.sum()) == np.abs(risen_K).sum() and np.abs(risen_K).min() >= self._changed_K:

@@ -11,9 +11,9 @@ from compd.arrays import FloatArray
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView
 
 # Shortest time (s) over which a speed is taken; below it the times of readings make it uncertain.
-_SHORTEST_S = 0.05
+_MIN_S = 0.05
 # Longest interval (s) of setpoints; beyond it the tip's path is unknown.
-_LONGEST_S = 1.0
+_MAX_S = 1.0
 
 
 class TipSpeed:
@@ -32,11 +32,11 @@ class TipSpeed:
         scales = view.of_kind("scale")
         now = (float(setpoint["time_s"]), np.array(setpoint["tip_M_mm"]), view.value.copy())
         last = self._last
-        if last is not None and now[0] - last[0] < _SHORTEST_S:
+        if last is not None and now[0] - last[0] < _MIN_S:
             return
         self._last, before_s = now, self._oldest_s
         self._oldest_s = min(now[0], float(view.memory.time_s[scales].min()))
-        if last is None or now[0] - last[0] > _LONGEST_S:
+        if last is None or now[0] - last[0] > _MAX_S:
             return
         # the motion of a scale without readings for a while began at its last one
         speed = float(np.linalg.norm(now[1] - last[1])) / (now[0] - before_s)

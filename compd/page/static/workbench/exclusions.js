@@ -2,7 +2,7 @@
 import { CommandLine } from "../command_line.js";
 import { element, micro, signed } from "../format.js";
 
-const MOST_TOLD = 12;
+const MAX_TOLD = 12;
 
 export class Exclusions {
   constructor(place, selection) {
@@ -67,7 +67,7 @@ export class Exclusions {
     const reasons = new Map();
     for (const [row, reason] of Object.entries(this.bench.summary.excluded)) reasons.set(reason, [...(reasons.get(reason) ?? []), Number(row)]);
     const others = Object.entries(this.bench.summary.left_out).filter(([reason]) => reason !== "excluded by a person");
-    const entries = [...reasons].slice(0, MOST_TOLD).map(([reason, rows]) => {
+    const entries = [...reasons].slice(0, MAX_TOLD).map(([reason, rows]) => {
       const command = new CommandLine(this.bench.summary.commands.include.replace("ROWS", rowsText(rows)));
       const back = element("button", { type: "button", class: "include", onclick: () => this.bench.attempt(() => this.bench.change("exclusions", { rows })) }, "Let them count again");
       return element("li", {}, `${rowsText(rows)}: ${reason} `, back, command.row);

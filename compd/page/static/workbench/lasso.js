@@ -1,7 +1,7 @@
 // A line drawn around marks, by mouse or finger.
 import { ink } from "../format.js";
 
-const LEAST_STEP_PX = 3;
+const MIN_STEP_PX = 3;
 
 export class Lasso {
   // wanted: whether a press begins a lasso (event -> bool); around: called with a function of x and y, true inside
@@ -17,7 +17,7 @@ export class Lasso {
       if (!this.line.length) return;
       event.stopImmediatePropagation();
       const [x, y] = this.line.at(-1);
-      if (Math.hypot(event.offsetX - x, event.offsetY - y) < LEAST_STEP_PX) return;
+      if (Math.hypot(event.offsetX - x, event.offsetY - y) < MIN_STEP_PX) return;
       this.line.push([event.offsetX, event.offsetY]);
       draw();
     });

@@ -2,7 +2,7 @@
 import { element, micro } from "../format.js";
 
 // Most quantities listed as followed by the residual.
-const MOST_TRENDS = 3;
+const MAX_TRENDS = 3;
 
 export class Strip {
   // verdict: element for the comparison in words
@@ -18,7 +18,7 @@ export class Strip {
     this.left_out_rms = null;
     const { verdict, trends, rows, recorded_rows } = bench.summary;
     const sample = rows < recorded_rows ? [element("p", { class: "note", id: "sample" }, `Too long to be shown whole: everything here, also what is fitted, is of a sample of ${rows} of its ${recorded_rows} rows, spread evenly. The command lines go through all rows.`)] : [];
-    this.verdict.replaceChildren(element("p", {}, verdict), ...sample, ...(trends.length ? [element("p", { class: "note" }, `${trends.slice(0, MOST_TRENDS).join("; ")}.`)] : []));
+    this.verdict.replaceChildren(element("p", {}, verdict), ...sample, ...(trends.length ? [element("p", { class: "note" }, `${trends.slice(0, MAX_TRENDS).join("; ")}.`)] : []));
     this.try();
   }
 

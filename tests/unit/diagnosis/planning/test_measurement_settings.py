@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compd.errors import CompdError
-from compd.planning.measurement_settings import MOST_LEVELS, settings_of
+from compd.planning.measurement_settings import MAX_LEVELS, settings_of
 
 ROWS = 60
 RNG = np.random.default_rng(1)
@@ -17,7 +17,7 @@ STOPS = np.repeat([15.0, 20.0, 25.0, 60.0], ROWS // 4)
 
 def test_a_column_of_many_values_is_set_within_its_range_and_rounded_inwards() -> None:
     (setting,) = settings_of({"elevation_deg": ELEVATION}, {})
-    assert len(setting.values) == MOST_LEVELS
+    assert len(setting.values) == MAX_LEVELS
     assert ELEVATION.min() <= setting.values[0] < ELEVATION.min() + 0.02
     assert ELEVATION.max() - 0.02 < setting.values[-1] <= ELEVATION.max()
     np.testing.assert_array_equal(setting.values, np.round(setting.values, 2))

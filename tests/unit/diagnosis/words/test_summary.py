@@ -11,7 +11,7 @@ import pytest
 from compd.diagnosis.findings import CandidateResult, GrossRows, UntestedEffect
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.diagnosis.words.phrases import physics_clause
-from compd.diagnosis.words.summary_lines import MOST_LINES, WIDTH, summary_lines
+from compd.diagnosis.words.summary_lines import MAX_LINES, WIDTH, summary_lines
 from compd.model.library import load_library
 from tests.support.diagnoses import Noise, description, diagnosis, external_recording, formula, step
 from tests.support.diagnosis_situations import (
@@ -85,7 +85,7 @@ def test_every_verdict_fits_whatever_there_is_to_say(verdict: Verdict, source: s
         variants += [replace(made, steps=()), replace(made, steps=(), depends_on=(), constant=None)]
     for variant in variants:
         lines = summary_lines(variant)
-        assert len(lines) <= MOST_LINES
+        assert len(lines) <= MAX_LINES
         assert max(map(len, lines)) <= WIDTH
         assert lines[0].startswith(f"{verdict}: ")
         assert lines[-1].startswith(" ") or lines[-1].startswith("Next:")

@@ -14,7 +14,7 @@ import pytest
 import structlog
 
 from compd.live.processes import log_relay
-from compd.live.processes.log_relay import BURST_LINES, LINES_PER_S, LONGEST_LINE_BYTES, READ_BYTES, LogRelay
+from compd.live.processes.log_relay import BURST_LINES, LINES_PER_S, MAX_LINE_BYTES, READ_BYTES, LogRelay
 from tests.support.wire_rig import PATIENCE_S, InstantClock
 
 LARGE_PIPE = 1 << 20
@@ -134,9 +134,9 @@ def test_a_line_that_is_too_long_is_cut_and_the_next_is_whole(bench: Bench, dial
         dial.print("y" * 5000)
         assert bench.relayed() == []
     dial.print("\nnext\n")
-    assert bench.relayed() == ["y" * LONGEST_LINE_BYTES + " ...\n", "next\n"]
-    dial.print("z" * LONGEST_LINE_BYTES + "\n")
-    assert bench.relayed() == ["z" * LONGEST_LINE_BYTES + "\n"], "just short enough"
+    assert bench.relayed() == ["y" * MAX_LINE_BYTES + " ...\n", "next\n"]
+    dial.print("z" * MAX_LINE_BYTES + "\n")
+    assert bench.relayed() == ["z" * MAX_LINE_BYTES + "\n"], "just short enough"
 
 
 def test_bytes_that_are_no_text_are_replaced(bench: Bench, dial: Pipe) -> None:

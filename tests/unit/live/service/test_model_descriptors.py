@@ -156,7 +156,7 @@ def test_where_closing_hangs_no_more_descriptors_are_taken(pair, file, monkeypat
     go_on = threading.Event()
     real_close = os.close
     monkeypatch.setattr(os, "close", lambda descriptor: (go_on.wait(), real_close(descriptor)))
-    for _ in range(descriptor_bin.MOST_WAITING + 1):
+    for _ in range(descriptor_bin.MAX_WAITING + 1):
         pair.bin.put(os.dup(file))
     while not pair.bin.is_full:
         pair.bin.put(os.dup(file))

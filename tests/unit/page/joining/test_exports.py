@@ -115,7 +115,7 @@ def test_a_directory_that_is_a_link_is_not_followed(exports, tmp_path):
 
 
 def test_all_files_together_have_a_limit_of_bytes(exports, monkeypatch):
-    monkeypatch.setattr(module, "MOST_BYTES_OF_ALL", 100)
+    monkeypatch.setattr(module, "MAX_BYTES_OF_ALL", 100)
     exports.directory.mkdir()
     (exports.directory / "not listed (1).bin").write_bytes(b"x" * 60)
     assert keep(exports, "a.txt", b"a" * 30)
@@ -127,7 +127,7 @@ def test_all_files_together_have_a_limit_of_bytes(exports, monkeypatch):
 
 
 def test_all_files_together_have_a_limit_of_number(exports, monkeypatch):
-    monkeypatch.setattr(module, "MOST_FILES", 3)
+    monkeypatch.setattr(module, "MAX_FILES", 3)
     for name in ("a", "b", "c"):
         keep(exports, name)
     with pytest.raises(RecordingError, match="3 files"):
@@ -136,7 +136,7 @@ def test_all_files_together_have_a_limit_of_number(exports, monkeypatch):
 
 
 def test_files_that_come_at_once_count_together(exports, monkeypatch):
-    monkeypatch.setattr(module, "MOST_BYTES_OF_ALL", 100)
+    monkeypatch.setattr(module, "MAX_BYTES_OF_ALL", 100)
     both_begun = asyncio.Barrier(2)
 
     async def slowly(byte):
@@ -160,7 +160,7 @@ def test_files_that_come_at_once_count_together(exports, monkeypatch):
 
 
 def test_a_temporary_file_counts_and_goes_when_its_process_has_ended(exports, monkeypatch):
-    monkeypatch.setattr(module, "MOST_BYTES_OF_ALL", 100)
+    monkeypatch.setattr(module, "MAX_BYTES_OF_ALL", 100)
     exports.directory.mkdir()
     left = exports.directory / LEFT
     left.write_bytes(b"x" * 90)
@@ -198,6 +198,6 @@ def test_who_may_operate_deletes_and_who_may_look_does_not(tmp_path):
     assert operate.get("/join/exports").json() == {
         "files": 0,
         "bytes": 0,
-        "most_files": module.MOST_FILES,
-        "most_bytes": module.MOST_BYTES_OF_ALL,
+        "most_files": module.MAX_FILES,
+        "most_bytes": module.MAX_BYTES_OF_ALL,
     }

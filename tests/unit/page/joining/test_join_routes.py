@@ -289,7 +289,7 @@ def test_a_name_that_could_be_a_path_is_no_export(client, recordings, name):
 
 def test_an_export_that_is_empty_or_too_large_leaves_nothing(client, recordings, monkeypatch):
     before = files(recordings)
-    monkeypatch.setattr(exports, "MOST_BYTES", 1000)
+    monkeypatch.setattr(exports, "MAX_BYTES", 1000)
     for content, reason in ((b"", "is empty"), (b"1 2 3\n" * 1000, "too large")):
         answer = client.post("/join/exports", params={"name": "a.txt"}, content=content)
         assert (answer.status_code, reason in answer.json()["reason"]) == (409, True)

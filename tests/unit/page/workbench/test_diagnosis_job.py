@@ -12,7 +12,7 @@ import pytest
 
 from compd.diagnosis import STAGES
 from compd.errors import StateError
-from compd.page.workbench.diagnoses import MOST_RUNNING, Diagnoses
+from compd.page.workbench.diagnoses import MAX_RUNNING, Diagnoses
 from compd.page.workbench.diagnosis_job import DiagnosisJob
 from tests.support.measured import gauges, hidden, record
 from tests.support.other_process import is_alive
@@ -75,9 +75,9 @@ def test_what_cannot_be_opened_is_told(tmp_path):
 
 def test_more_than_a_few_at_once_are_refused_and_there_is_room_after_an_end(path):
     diagnoses = Diagnoses()
-    jobs = [diagnoses.begin(path, None, None, 0) for _ in range(MOST_RUNNING)]
+    jobs = [diagnoses.begin(path, None, None, 0) for _ in range(MAX_RUNNING)]
     try:
-        with pytest.raises(StateError, match=f"{MOST_RUNNING} run already.*") as refusal:
+        with pytest.raises(StateError, match=f"{MAX_RUNNING} run already.*") as refusal:
             diagnoses.begin(path, None, None, 0)
         assert path.stem in str(refusal.value)
         jobs[0].cancel()

@@ -11,7 +11,7 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.guard import CONTENT_SECURITY_POLICY, Guard, Token, hashed
 from compd.page.recordings import Recordings
 from compd.page.server import Server
-from compd.page.workbench.diagnoses import MOST_RUNNING
+from compd.page.workbench.diagnoses import MAX_RUNNING
 from tests.support.measured import gauges, hidden, record
 
 HOST = "127.0.0.1:7760"
@@ -82,7 +82,7 @@ def test_its_page_runs_its_own_scripts_in_a_sandbox(client):
 
 
 def test_too_many_are_refused_in_words(client):
-    for k in range(MOST_RUNNING):
+    for k in range(MAX_RUNNING):
         assert begun(client, f"{k}.model.yaml")[0].status_code == 200
     refusal, _ = begun(client)
     assert refusal.status_code == 409

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from compd.diagnosis import error_fall, summary_lines
-from compd.diagnosis.words.summary_lines import MOST_LINES
+from compd.diagnosis.words.summary_lines import MAX_LINES
 from compd.report import evidence
 from compd.report.diagnosis_evidence import formula_list, step_rows
 from tests.support import diagnosis_situations as situations
@@ -19,7 +19,7 @@ def test_it_is_plain_data_that_says_what_the_report_says(situation):
     answer = json.loads(json.dumps(evidence(diagnosis), allow_nan=False))
     assert answer["verdict"] == diagnosis.verdict
     assert answer["lines"] == summary_lines(diagnosis)
-    assert len(answer["lines"]) <= MOST_LINES
+    assert len(answer["lines"]) <= MAX_LINES
     for number, effect in enumerate(answer["effects"]):
         report = dict(step_rows(number, diagnosis, error_fall(diagnosis)))
         shared = {"error, rows left out", "explains", "by noise alone"}

@@ -71,7 +71,7 @@ def test_what_cannot_be_opened_leaves_nothing_behind(client_of, directory):
 
 
 def test_only_so_many_are_open_and_the_oldest_makes_room(client_of, monkeypatch):
-    monkeypatch.setattr(routes, "MOST_OPEN", 2)
+    monkeypatch.setattr(routes, "MAX_OPEN", 2)
     client = client_of("view")
     for model in ("b.model.yaml", "c.model.yaml"):
         assert client.post("/workbench/open", json={"recording": "run", "model": model}, headers=OWN).status_code == 200

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from compd.errors import RecordingError, StateError
-from compd.page.workbench.handlers import LONGEST_ROWS_BYTES
-from compd.page.workbench.opened_recording import MOST_PICTURED
+from compd.page.workbench.handlers import MAX_ROWS_BYTES
+from compd.page.workbench.opened_recording import MAX_PICTURED
 from compd.page.workbench.workbench import Workbench
 from compd.recording import read_recording
 from tests.support.measured import gauges, hidden, record
@@ -41,7 +41,7 @@ def test_very_many_rows_are_left_out_at_once(tmp_path):
     workbench = Workbench(path, tmp_path / "tripod.model.yaml", None)
     every_other = list(range(2, 6_000, 2))
     assert len(workbench.exclude(every_other, "fog", workbench.revision)["excluded"]) == len(every_other)
-    assert len(json.dumps({"rows": list(range(100_002)), "reason": "fog"})) < LONGEST_ROWS_BYTES
+    assert len(json.dumps({"rows": list(range(100_002)), "reason": "fog"})) < MAX_ROWS_BYTES
 
 
 def test_what_leaves_nothing_to_compare_is_taken_back(workbench, path):
@@ -81,7 +81,7 @@ def test_a_long_recording_is_thinned_for_pictures_and_numbers_are_of_all_rows(tm
     path = record(tmp_path, gauges(12_000, 1), [hidden("link_expansion", 2.0)])
     workbench = Workbench(path, tmp_path / "tripod.model.yaml", None)
     header, every = (json.loads(workbench.opened.rows(all_rows=every).partition(b"\n")[0]) for every in (False, True))
-    assert header["arrays"][0]["shape"] == [MOST_PICTURED]
+    assert header["arrays"][0]["shape"] == [MAX_PICTURED]
     assert every["arrays"][0]["shape"] == [12_000]
     assert workbench.candidates.ranked()[0]["effect"] == "link_expansion"
     trial = workbench.candidates.trial("link_expansion", 0)
