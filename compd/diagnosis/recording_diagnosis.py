@@ -15,10 +15,9 @@ from compd.diagnosis.candidate_result import candidate_results, explained_fracti
 from compd.diagnosis.candidates.candidates import CandidatePool, library_pool, periodic_candidates
 from compd.diagnosis.candidates.plausibility import estimate_parameters
 from compd.diagnosis.candidates.proxies import proxy_candidates
-from compd.diagnosis.constant_finding import describe_constant
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
-from compd.diagnosis.findings import CandidateResult, DiagnosisStep, Rival, UntestedEffect
+from compd.diagnosis.findings import CandidateResult, ConstantFinding, DiagnosisStep, Rival, UntestedEffect
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.rival_selection import named_members
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
@@ -31,6 +30,33 @@ from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.diagnosis.words.summary import summary
 from compd.model.effects import Effect, FittedEffect
+
+
+def describe_constant(
+    problem: DiagnosisProblem, explanation: Explanation, named: Mapping[int, FittedEffect], constant_um: FloatArray
+) -> ConstantFinding | None:
+    """The constant that was taken off or found, and the effects that it may come from; None where there is none.
+
+    named : the fitted effect of each named member.  constant_um : (m,) what was taken off beside these: the mean of
+    what an effect does is the effect's.
+    """
+    aligned, losses = problem.aligned, explanation.losses
+    if explanation.constants:
+        member = explanation.constants[0]
+        values, std = named[member].theta, np.sqrt(np.diag(named[member].covariance))
+        rivals = find_rivals(losses, explanation.members, member)
+        effects = [losses.candidates[rival.member].effect for rival in rivals]
+    elif aligned.registration_columns.shape[2] and not aligned.registered:
+        values, std = constant_um, np.full(len(aligned.labels), np.nan)
+        effects = [candidate.effect for candidate in problem.same_as_nuisance]
+    else:
+        return None
+    return ConstantFinding(
+        by_axis_um=dict(zip(aligned.labels, values.tolist(), strict=True)),
+        std_um=dict(zip(aligned.labels, std.tolist(), strict=True)),
+        effects=tuple(effect.id for effect in effects),
+        separated_by=effects[0].separated_by if effects else "",
+    )
 
 
 def diagnose(

@@ -95,7 +95,7 @@ class MachineModel:
 
     @cached_property
     def structure(self) -> NDArray[np.void]:
-        """(1,) The machine as the compensation's kernel reads it; see `compd.model.structures.solver_structures.MODEL`."""
+        """(1,) The machine as the compensation's kernel reads it; see `compd.model.structures.MODEL`."""
         structure = np.zeros(1, dtype=MODEL)
         model, n, k = structure[0], self.links, self.joint_weights.shape[1]
         model["links"], model["joints"], model["axes"] = n, k, len(self.revolute_axes_P)

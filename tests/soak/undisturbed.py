@@ -25,7 +25,7 @@ from compd.live.machine import MachineZero
 from compd.live.memory import Doubt
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.simulation import World
-from compd.simulation.wires.sensing import Sensing
+from compd.simulation.wires.server import Sensing
 
 # All gauges are polled one after the other, a round in this time, s; now and then the computer is late.
 ROUND_S = (0.02, 0.035)

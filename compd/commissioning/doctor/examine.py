@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from compd.commissioning.daemon_health import DaemonStatus, Health, daemon_status
-from compd.commissioning.doctor.ports import port_findings
 from compd.commissioning.doctor.system import (
     clock_findings,
     disk_findings,
@@ -15,7 +14,16 @@ from compd.commissioning.doctor.system import (
     unit_finding,
 )
 from compd.configuration import Configuration
+from compd.line_settings import LineSettings
+from compd.lines import definition_of
 from compd.probes import Computer, Finding, Verdict, advice, good, unknown
+
+
+def port_findings(computer: Computer, lines: Mapping[str, LineSettings], daemon_runs: bool) -> Iterator[Finding]:
+    """For every line of a configuration. daemon_runs : its devices are then not connected to a second time."""
+    for name, line in lines.items():
+        yield from definition_of(line).probe(computer, f"line {name}", line, daemon_runs)
+
 
 # Values of the shipped configurations, for a computer without a configuration.
 _USUAL_PRIORITY = 40

@@ -1,7 +1,7 @@
 """A round of polls: every gauge of a line is polled in turn, its readings are published or discarded.
 
 A gauge that does not answer rests for a short time, so that an absent unit does not slow the others on its line, and
-for a longer one where it makes them stale (`compd.live.acquisition.absent_gauges`). Where replies do not say whose they
+for a longer one where it makes them stale (`compd.live.acquisition.polled_round`). Where replies do not say whose they
 are, the readings of a round are published when it has ended and nothing more came
 (`compd.live.acquisition.reply_order`).
 """
@@ -13,15 +13,56 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+import structlog
+
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality, Reading
 from compd.line_settings import PolledLineSettings
 from compd.lines import Line, explained, shown
-from compd.live.acquisition.absent_gauges import AbsentGauges
 from compd.live.acquisition.polled_gauge import DAMAGED, MAX_REST_S, BackOff, PolledGauge
 from compd.live.acquisition.reply_order import ReplyOrder
 from compd.live.acquisition.round_trigger import RoundBuffer, send_trigger
 from compd.live.memory import PollRequests
+
+log = structlog.get_logger()
+
+# An absent gauge takes at most 1 % of its line's time: the rest after a missed reply, in times of its cost.
+TIMES_COST = 100
+# Missed replies in a row that count as an absence; a single reply may get lost.
+MISSES = 2
+
+
+class AbsentGauges:
+    """Absent gauges of one line; used by the line's thread."""
+
+    def __init__(self) -> None:
+        self._asked_s: dict[PolledGauge, float] = {}  # time of a poll without an answer since another gauge answered
+        self._misses: dict[PolledGauge, int] = {}  # consecutive misses that made another gauge's reading stale
+
+    def missed(self, gauge: PolledGauge, asked_s: float) -> None:
+        """`gauge` was asked at the monotonic time `asked_s` (s), and did not answer."""
+        self._asked_s[gauge] = asked_s
+
+    def answered(self, gauge: PolledGauge, now_s: float) -> None:
+        """`gauge` answers at the monotonic time `now_s` (s); its new readings are not published yet."""
+        self._misses.pop(gauge, None)
+        self._asked_s.pop(gauge, None)
+        if self._asked_s:
+            # gauges polled after the first may have waited behind it in the gateway's queue
+            absent, asked_s = next(iter(self._asked_s.items()))
+            if gauge.fresh(asked_s) and not gauge.fresh(now_s):
+                self._count(absent, now_s - asked_s, now_s)
+            self._asked_s.clear()
+
+    def _count(self, absent: PolledGauge, cost_s: float, now_s: float) -> None:
+        misses = self._misses[absent] = self._misses.get(absent, 0) + 1
+        if misses < MISSES:
+            return
+        rest_s = TIMES_COST * cost_s
+        absent.rests_until_s = now_s + rest_s
+        if misses == MISSES:
+            log.warning("gauge is polled seldom", gauge=absent.name, cost_s=round(cost_s, 3), rest_s=round(rest_s, 1))
+
 
 # Shortest period (s) of polling rounds. Modbus TCP answers in 0.1 ms; polling it without a pause would starve the other
 # lines of the interpreter and keep a processor busy.

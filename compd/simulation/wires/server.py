@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from compd.clock import Clock
-from compd.configuration import Configuration
+from compd.configuration import Configuration, resolve_channel
 from compd.line_settings import LineSettings, PolledLineSettings
 from compd.lines import PushedDefinition, definition_of
 from compd.plugins import SIMULATED_GAUGES, load
@@ -22,11 +22,56 @@ from compd.simulation.truth.world import World
 from compd.simulation.wires.control import Answer, ControlSocket, Handler
 from compd.simulation.wires.daemon_configuration import Port, daemon_configuration, daemon_path
 from compd.simulation.wires.live_world import LiveWorld
-from compd.simulation.wires.sensing import Sensing
 from compd.simulation.wires.simulated_line import SimulatedLine
 from compd.simulation.wires.simulation_directory import CONTROL_SOCKET, PORTS, SimulationDirectory
 from compd.simulation.wires.tcp_port import ANY, claimed_port
-from compd.twins import SimulatedPushedLine
+from compd.twins import Sense, SimulatedPushedLine
+
+# Source by unit for a channel that is not wired or that the simulated machine does not have; otherwise 0.
+_IDLE_SOURCE = {"degC": "temperature_room_degC", "hPa": "pressure_hPa", "pct": "humidity_pct"}
+
+
+class Sensed(Protocol):
+    """A source of readings by name: a `World`, or a `LiveWorld`."""
+
+    @property
+    def names(self) -> Sequence[str]: ...
+    def sense(self, name: str) -> float: ...
+
+
+class Sensing:
+    """Gives each gauge its `Sense`: values of its channels, with the gauge's own sign."""
+
+    def __init__(self, configuration: Configuration, world: Sensed) -> None:
+        self._world = world
+        wiring = configuration.wiring
+        wires = [
+            *((f"scale_{wire.link}", wire.gauge, wire.sign) for wire in wiring.scale),
+            *((f"joint_{k + 1}", wire.gauge, wire.sign) for k, wire in enumerate(wiring.joint)),
+            *((f"frame_{wire.distance}", wire.gauge, wire.sign) for wire in wiring.frame),
+            *((wire.name, wire.gauge, 1) for wire in wiring.quantities),
+        ]
+        wired = {
+            resolve_channel(gauge, configuration.gauges, configuration.drivers): (name, sign)
+            for name, gauge, sign in wires
+        }
+        self._sources: dict[str, dict[str, Callable[[], float]]] = {}
+        for gauge, driver in configuration.gauge_objects().items():
+            self._sources[gauge] = {}
+            for channel in driver.channels:
+                name, sign = wired.get(f"{gauge}.{channel.name}", ("", 1))
+                if name not in world.names:
+                    name, sign = _IDLE_SOURCE.get(channel.unit, ""), 1
+                self._sources[gauge][channel.name] = self._source(name, sign)
+
+    def of(self, gauge: str) -> Sense:
+        """The function by which the simulated device of this gauge asks for its channels' values."""
+        sources = self._sources[gauge]
+        return lambda channel: sources[channel]()
+
+    def _source(self, name: str, sign: int) -> Callable[[], float]:
+        return (lambda: sign * self._world.sense(name)) if name else (lambda: 0.0)
+
 
 # Step in which the world warms up and bends. Its scales follow the motion without steps.
 STEP_S = 0.02

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from compd.commissioning.doctor import system
-from compd.commissioning.doctor.examine import examine, is_fit, what_to_do
-from compd.commissioning.doctor.ports import port_findings
+from compd.commissioning.doctor.examine import examine, is_fit, port_findings, what_to_do
 from compd.commissioning.doctor.system import (
     clock_findings,
     disk_findings,

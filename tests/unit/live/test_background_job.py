@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from compd.live.service.background_job import BackgroundJob
 from compd.live.service.messages import ErrorCode, ProtocolError
+from compd.live.service.zero_capture import BackgroundJob
 
 TIMEOUT_S = 20
 

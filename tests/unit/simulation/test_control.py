@@ -16,7 +16,7 @@ from compd.errors import CompdError, ConfigurationError, Problem
 from compd.simulation.truth.world import World
 from compd.simulation.wires.control import MAX_REQUEST, Answer, ControlSocket
 from compd.simulation.wires.daemon_configuration import Port, daemon_configuration
-from compd.simulation.wires.sensing import Sensing
+from compd.simulation.wires.server import Sensing
 from tests.support.simulated import HEXAPOD, TRIPOD, ask, run_directory, section
 
 SHIPPED = pytest.mark.parametrize("path", [TRIPOD, HEXAPOD], ids=["tripod", "hexapod"])

@@ -12,8 +12,7 @@ import pytest
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.effect_fit import fit, initial_effect
 from compd.comparison.neighbour_block import neighbour_blocks
-from compd.comparison.stream.block_fit import fit_blocks
-from compd.comparison.stream.clusters import RowClusters
+from compd.comparison.stream.block_fit import RowClusters, fit_blocks
 from compd.comparison.stream.sample import draw_sample
 from compd.model.library import load_library
 from compd.recording import Recording, read_recording

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.comparison.stream.magnitude_histogram import MagnitudeHistogram
+from compd.comparison.stream.residual_totals import MagnitudeHistogram
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])

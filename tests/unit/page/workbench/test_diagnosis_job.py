@@ -92,7 +92,7 @@ def test_more_than_a_few_at_once_are_refused_and_there_is_room_after_an_end(path
 
 PARENT = """
 import multiprocessing, time
-from compd.page.workers.worker_process import end_with_the_parent
+from compd.page.workers.workers import end_with_the_parent
 child = multiprocessing.get_context("spawn").Process(target=end_with_the_parent, daemon=True)
 child.start()
 print(child.pid, flush=True)
