@@ -32,13 +32,7 @@ class Rows(NamedTuple):
 
 
 def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wanted: Wanted | None) -> Rows:
-    readings = (values.joint_mm, values.frame_mm) if wanted else (values.scale_mm, values.joint_mm, values.frame_mm)
-    starts = (warm.supports_M_mm, 2), (warm.origin_M_mm, 1), (warm.rotation_M_P, 2)
-    targets = ((wanted.tip_M_mm, 1), (wanted.tip_P_mm, 1), (wanted.attitude_M_P, 2)) if wanted else ()
-    parts = [*((reading, 1) for reading in readings), *starts, *targets]
-    lead: tuple[int, ...] = ()
-    if any(part.ndim > core for part, core in parts):
-        lead = np.broadcast_shapes(*(part.shape[: part.ndim - core] for part, core in parts))
+    lead = _lead(values, warm, wanted)
     count = math.prod(lead)
     names = model.program.quantities
     references = model.program.references
@@ -50,33 +44,62 @@ def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wante
         quantities[:, len(names) :] = [
             value_at_zero(name, at_zero) if value is None else value for name, value in references
         ]
-    wanted_mm, attitude_M_P = np.empty((count, 6)), np.empty((count, 3, 3))
-    if wanted:
-        wanted_mm[:, :3] = _row_copy(wanted.tip_M_mm, lead, 1)
-        wanted_mm[:, 3:] = _row_copy(wanted.tip_P_mm, lead, 1)
-        attitude_M_P[:] = _row_copy(wanted.attitude_M_P, lead, 2)
+    starts_lead = lead if warm.supports_M_mm.ndim > 2 else ()
     return Rows(
         lead,
         GaugeRows(
             _row_copy(values.scale_mm, lead, 1),
             _row_copy(values.joint_mm, lead, 1),
             _row_copy(values.frame_mm, lead, 1),
-            _row_copy(np.asarray(values.time_s), lead, 0),
+            _row_copy(values.time_s, lead, 0),
         ),
         quantities,
-        WantedRows(wanted_mm, attitude_M_P),
+        _wanted_rows(wanted, lead, count) if wanted else _UNREAD if count == 1 else _unread(count),
         WarmRows(
-            _row_copy(warm.supports_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 2),
-            _row_copy(warm.origin_M_mm, lead if warm.supports_M_mm.ndim > 2 else (), 1),
-            _row_copy(warm.rotation_M_P, lead if warm.supports_M_mm.ndim > 2 else (), 2),
+            _row_copy(warm.supports_M_mm, starts_lead, 2),
+            _row_copy(warm.origin_M_mm, starts_lead, 1),
+            _row_copy(warm.rotation_M_P, starts_lead, 2),
         ),
     )
 
 
-def _row_copy(values: FloatArray, lead: tuple[int, ...], core: int) -> FloatArray:
+def _lead(values: GaugeValues, warm: WarmStart, wanted: Wanted | None) -> tuple[int, ...]:
+    """The leading axes of all arguments together."""
+    parts = [
+        (values.joint_mm, 1), (values.frame_mm, 1),
+        (warm.supports_M_mm, 2), (warm.origin_M_mm, 1), (warm.rotation_M_P, 2),
+    ]  # fmt: skip
+    if wanted:
+        parts += [(wanted.tip_M_mm, 1), (wanted.tip_P_mm, 1), (wanted.attitude_M_P, 2)]
+    else:
+        parts.append((values.scale_mm, 1))
+    for part, core in parts:
+        if part.ndim > core:
+            return np.broadcast_shapes(*(part.shape[: part.ndim - core] for part, core in parts))
+    return ()
+
+
+def _wanted_rows(wanted: Wanted, lead: tuple[int, ...], count: int) -> WantedRows:
+    rows = WantedRows(np.empty((count, 6)), np.empty((count, 3, 3)))
+    rows.target_mm[:, :3] = _row_copy(wanted.tip_M_mm, lead, 1)
+    rows.target_mm[:, 3:] = _row_copy(wanted.tip_P_mm, lead, 1)
+    rows.attitude_M_P[:] = _row_copy(wanted.attitude_M_P, lead, 2)
+    return rows
+
+
+def _unread(count: int) -> WantedRows:
+    return WantedRows(np.empty((count, 6)), np.empty((count, 3, 3)))
+
+
+# What is handed over where nothing is wanted: the kernel does not read it.
+_UNREAD = _unread(1)
+
+
+def _row_copy(values: FloatArray | float, lead: tuple[int, ...], core: int) -> FloatArray:
     """(N, ...): a contiguous copy, since the kernel takes no read-only array."""
     if not lead:
         return np.array(values, dtype=np.float64, ndmin=core + 1, order="C")
+    values = np.asarray(values)
     shape = values.shape[values.ndim - core :]
     return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64, order="C").reshape(
         math.prod(lead), *shape
