@@ -51,8 +51,9 @@ by its name on this page:
 
 ```pycon
 >>> import compd
->>> from compd.comparison.criteria import ComparisonCriteria, with_value
->>> from compd.diagnosis.criteria import Criteria
+>>> from compd.comparison import ComparisonCriteria
+>>> from compd.diagnosis import Criteria
+>>> from compd.threshold import with_value
 >>> files = compd.simulate_campaign("tripod-cmm", "monday.csv", seed=5, hidden=125)
 >>> monday = compd.open_recording("monday.csv", criteria=ComparisonCriteria(outlier_sigmas=6.0))
 >>> compd.diagnose(monday).verdict

@@ -102,7 +102,7 @@ def _check_options(written: WrittenForm, link: int | None, points: bool, unit: s
         )
     where = f"--as {written.name}"
     if link is None and POSITION_AXES not in written.axes:
-        problems.append(Problem(where=where, what="is one length", next_step="say of which link: --link 1"))
+        problems.append(Problem(where=where, what="is one length", next_step="name the link: --link 1"))
     if points and not written.holds_points:
         problems.append(Problem(where=where, what="is a track", next_step="leave --points out"))
     if link is not None and LENGTH_AXES not in written.axes:

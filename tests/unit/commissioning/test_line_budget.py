@@ -18,7 +18,7 @@ from compd.commissioning.line_budget import (
 )
 from compd.commissioning.line_warnings import budget_warnings, line_warnings
 from compd.configuration import load
-from compd.line_settings import character_bits
+from compd.line_settings.pace import character_bits
 from compd.lines.kinds.modbus_ascii.settings import ModbusAsciiLine
 from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
 from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine

@@ -14,7 +14,7 @@ from compd.compensation import compensation
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import GaugeValues, WarmStart
 from compd.model import MachineModel, machine_constants
-from compd.model import tip_derivatives as derivatives
+from compd.model import tip_derivative as derivatives
 from compd.model.effects import Effect, FittedEffect, evaluate_basis
 from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD, constants_of
 

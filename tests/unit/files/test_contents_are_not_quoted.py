@@ -12,8 +12,6 @@ from typing import NamedTuple
 
 import pytest
 import structlog
-from compd.lines.mqtt_tls import tls_context
-from compd.lines.opc_ua_login import _certificate, _private_key
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -28,6 +26,8 @@ from compd.gauge_description import read_capture
 from compd.gauge_tools import gauge_of_file
 from compd.instruments import ReadOptions, instrument_formats, preview_export, read_export
 from compd.lines import PortArguments
+from compd.lines.kinds.mqtt.subscriber import tls_context
+from compd.lines.kinds.opc_ua.login import _certificate, _private_key
 from compd.live.machine import load_zero
 from compd.live.machine.machine_zero import FILE_NAME as ZERO_NAME
 from compd.live.memory import TrustMemory

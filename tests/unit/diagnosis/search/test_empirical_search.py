@@ -15,7 +15,7 @@ from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import error_fall
 from compd.model.library import find_effect
-from compd.report import findings_table
+from compd.report.diagnosis_evidence import findings_table
 from tests.support.hidden_effects import LIBRARY, record_with_effects
 from tests.support.paths import SHARED
 from tests.support.sampled import sampled
