@@ -4,6 +4,13 @@ A gauge that does not answer rests for a short time, so that an absent unit does
 for a longer one where it makes them stale (`compd.live.acquisition.polled_round`). Where replies do not say whose they
 are, the readings of a round are published when it has ended and nothing more came
 (`compd.live.acquisition.reply_order`).
+
+Polling interval of an unresponsive gauge whose silence makes the others on its line stale.
+
+A gateway before a serial bus serves no unit while it waits for one that does not answer, whatever the line's timeout
+is. What such a request has cost is known when the next gauge answers. Where that gauge's reading has gone stale
+meanwhile, twice in a row, the silent gauge is asked again only after `TIMES_COST` as long. A gauge that costs no other
+gauge a reading rests as `PolledGauge` has it.
 """
 
 from __future__ import annotations

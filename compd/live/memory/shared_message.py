@@ -1,4 +1,17 @@
-"""Python data in a shared record."""
+"""Python data in a shared record.
+
+Bytes that one process replaces now and then, and others read: the old ones or the new ones, never a mixture.
+
+A record is a header of 16 bytes and the content:
+
+    version    8 bytes: odd while the record is being written, and another number after every write
+    length, checksum   one word of 8 bytes: the length times 2**32, plus the CRC-32 of the content
+    content    `length` bytes
+
+A reader copies the content, then looks whether the version is even and has stayed the same, and whether the checksum
+fits. The checksum is for processors that do not keep the order of writes, and for a writer that was killed in between.
+Nobody waits for anybody: a reader that finds no whole record keeps what it has and looks again later.
+"""
 
 from __future__ import annotations
 

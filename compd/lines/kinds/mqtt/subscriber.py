@@ -8,6 +8,12 @@ A message that wakes the thread has arrived just then. One that was there alread
 socket was seen empty, and that time counts: a thread that cannot keep up has old values, not new ones.
 
 Source: MQTT 3.1.1 (OASIS), chapters 3.1 to 3.3 (CONNECT, CONNACK, PUBLISH), 3.8 and 3.9 (SUBSCRIBE, SUBACK).
+
+TLS to an MQTT broker: the context with the certificates of the configuration, and why a handshake has failed.
+
+The broker's certificate must be vouched for and have the `host` of the line among its names. There is no way round.
+
+Source: OpenSSL, `X509_V_ERR_*` in x509_vfy.h, for the codes of a certificate that is refused.
 """
 
 from __future__ import annotations
