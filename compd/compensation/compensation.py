@@ -70,16 +70,16 @@ def _compensate(
     memory, machine_tool = warm.effects, wanted is not None
     if not model.program.given:
         passes = _EFFECT_PASSES if machine_tool else 1
-        solved = _solve(model, rows, memory, machine_tool, passes, None, None)
+        solved = _solve(model, rows, memory, machine_tool, passes)
         return _result(model, rows, solved, memory, {}, machine_tool)
     # the kernel computes without effects, Python what its effects add there, and the kernel the whole
     without = replace(model, effects=())
-    bare = _solve(without, rows, EffectMemory(), machine_tool, 1, None, None)
+    bare = _solve(without, rows, EffectMemory(), machine_tool, 1)
     effects_at_mm = bare.results["scale_setpoint_mm"][:, : model.links].copy() if machine_tool else rows.gauges.scale_mm
     for _ in range(_EFFECT_PASSES if machine_tool else 1):
         inputs = _effect_inputs(model, rows, bare.results, values, effects_at_mm)
         given_mm, memories = python_effects(model, inputs, memory, machine_tool)
-        solved = _solve(model, rows, memory, machine_tool, 1, effects_at_mm, given_mm)
+        solved = _solve(model, rows, memory, machine_tool, 1, GivenRows(effects_at_mm, given_mm))
         effects_at_mm = solved.results["scale_setpoint_mm"][:, : model.links].copy()
     return _result(model, rows, solved, memory, memories, machine_tool)
 
@@ -98,8 +98,7 @@ def _solve(
     memory: EffectMemory,
     machine_tool: bool,
     passes: int,
-    effects_at_mm: FloatArray | None,
-    given_mm: FloatArray | None,
+    given: GivenRows | None = None,
 ) -> _Solved:
     program = model.program
     count, links = rows.gauges.scale_mm.shape
@@ -115,10 +114,7 @@ def _solve(
         rows.gauges,
         rows.quantities,
         rows.wanted,
-        GivenRows(
-            _not_given(count, links) if effects_at_mm is None else effects_at_mm,
-            np.empty((0, 0, program.size)) if given_mm is None else given_mm,
-        ),
+        given or _nothing_given(count, links, program.size),
         rows.warm,
         solved.memory.arrays,
         SolvedRows(_uninitialised(1, WORKSPACE), solved.results),
@@ -128,8 +124,8 @@ def _solve(
 
 
 @lru_cache(maxsize=8)
-def _not_given(count: int, links: int) -> FloatArray:
-    return np.full((count, links), np.nan)
+def _nothing_given(count: int, links: int, size: int) -> GivenRows:
+    return GivenRows(np.full((count, links), np.nan), np.empty((0, 0, size)))
 
 
 def _uninitialised(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:

@@ -81,9 +81,9 @@ def _lead(values: GaugeValues, warm: WarmStart, wanted: Wanted | None) -> tuple[
 
 def _wanted_rows(wanted: Wanted, lead: tuple[int, ...], count: int) -> WantedRows:
     rows = WantedRows(np.empty((count, 6)), np.empty((count, 3, 3)))
-    rows.target_mm[:, :3] = _row_copy(wanted.tip_M_mm, lead, 1)
-    rows.target_mm[:, 3:] = _row_copy(wanted.tip_P_mm, lead, 1)
-    rows.attitude_M_P[:] = _row_copy(wanted.attitude_M_P, lead, 2)
+    rows.target_mm[:, :3] = _over(lead, wanted.tip_M_mm, 1)
+    rows.target_mm[:, 3:] = _over(lead, wanted.tip_P_mm, 1)
+    rows.attitude_M_P[:] = _over(lead, wanted.attitude_M_P, 2)
     return rows
 
 
@@ -97,13 +97,16 @@ _UNREAD = _unread(1)
 
 def _row_copy(values: FloatArray | float, lead: tuple[int, ...], core: int) -> FloatArray:
     """(N, ...): a contiguous copy, since the kernel takes no read-only array."""
+    return np.array(_over(lead, values, core), dtype=np.float64, ndmin=core + 1, order="C")
+
+
+def _over(lead: tuple[int, ...], values: FloatArray | float, core: int) -> FloatArray | float:
+    """Values with one leading axis in place of `lead`; as they are where there is none."""
     if not lead:
-        return np.array(values, dtype=np.float64, ndmin=core + 1, order="C")
+        return values
     values = np.asarray(values)
     shape = values.shape[values.ndim - core :]
-    return np.array(np.broadcast_to(values, (*lead, *shape)), dtype=np.float64, order="C").reshape(
-        math.prod(lead), *shape
-    )
+    return np.broadcast_to(values, (*lead, *shape)).reshape(math.prod(lead), *shape)
 
 
 def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:

@@ -129,7 +129,7 @@ def with_zero_of(state: CycleState, zero: MachineZero | StateError) -> CycleStat
 
 def _pack_fields(kind: type, record: Any) -> tuple[Any, ...]:
     get, arrays, parts = _FIELDS[kind]
-    values = list(get(record))
+    values = [*get(record)]
     for index in arrays:
         if (value := values[index]) is not None:
             values[index] = value.tobytes()
