@@ -24,10 +24,11 @@ from compd.plugins import GAUGES, load, names
 from docs.generate import configuration as configuration_page
 from docs.generate import gauges as gauges_page
 from tests.support.paths import CONFIG, ROOT
+from tests.unit.docs.test_paths import pages
 
 FOLDER = Path(compd.lines.kinds.__path__[0])
 # By people, not by a program: a list of kinds there has to be completed by hand.
-WRITTEN = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md")), *sorted((ROOT / "drivers").rglob("*.md"))]
+WRITTEN = [*pages(), *sorted((ROOT / "drivers").rglob("*.md"))]
 
 
 def port(kind: str) -> PortArguments:
