@@ -83,9 +83,32 @@ Results show themselves as tables in a notebook. Those with `to_dataframe()` nee
 """
 
 
+# As a reader types them: the examples of each use the files and values of those before it.
+ORDER = (
+    "load_machine",
+    "simulate_campaign",
+    "open_recording",
+    "compare",
+    "diagnose",
+    "load_effects",
+    "add_effect",
+    "open_model",
+    "compare_stream",
+    "open_sample",
+    "fit_stream",
+    "plan_measurement",
+    "connect",
+    "Effect",
+    "Parameter",
+    "Constant",
+    "memoryless_basis",
+    "CompdError",
+)
+
+
 def page() -> str:
     """Markdown with one directive for each name."""
-    public = {name: getattr(compd, name) for name in compd.__all__}
+    public = {name: getattr(compd, name) for name in ORDER}
     functions = [f"compd.{name}" for name, value in public.items() if inspect.isfunction(value)]
     classes = [f"compd.{name}" for name, value in public.items() if inspect.isclass(value)]
     effects = [name for name in classes if not issubclass(getattr(compd, name.removeprefix("compd.")), Exception)]

@@ -12,9 +12,9 @@ import pytest
 
 import compd
 from compd.errors import CompdError
+from docs.generate.python import ORDER
 from tests.support.paths import ROOT
 
-NAMES = [name for name in compd.__all__ if name != "__version__"]
 HEAVY = ("numba", "plotly", "pandas", "numpy", "scipy", "pydantic")
 
 
@@ -30,7 +30,7 @@ def test_one_name_imports_its_own_module_only() -> None:
     assert done.stdout.strip() == "[]"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ORDER)
 def test_every_public_name_is_there_and_documented(name: str) -> None:
     value = getattr(compd, name)
     assert value.__name__ == name
@@ -51,6 +51,10 @@ def test_a_name_that_is_not_there() -> None:
         compd.compere  # noqa: B018
 
 
+def test_the_reference_page_has_every_name() -> None:
+    assert sorted([*ORDER, "__version__"]) == sorted(compd.__all__)
+
+
 def test_the_version_is_the_installed_one() -> None:
     assert compd.__version__.count(".") == 2
 
@@ -62,7 +66,7 @@ def test_the_examples_of_the_docstrings_are_true(tmp_path: Path, monkeypatch: py
     monkeypatch.chdir(tmp_path)
     parser, runner = doctest.DocTestParser(), doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
     tried, said = 0, ""
-    for name in NAMES:
+    for name in ORDER:
         test = parser.get_doctest(getattr(compd, name).__doc__ or "", {}, name, None, None)
         said += "".join(_run(runner, test))
         tried += len(test.examples)
