@@ -29,7 +29,7 @@ export class Reading {
   show({ sources, table, choices }) {
     if (sources && !this.formats) {
       this.formats = sources.formats;
-      this.fields.shape.options(this.formats, "as found");
+      this.fields.shape.options(this.formats, "detected");
     }
     for (const field of Object.values(this.fields)) if (choices[field.key] == null && field.control !== document.activeElement) field.clear();
     this.guess.disabled = !choices.columns;
@@ -43,8 +43,8 @@ export class Reading {
     const { shape, unit, angle_unit, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
     const { assumed } = table;
     const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
-    shape.automatic(`as found: ${this.formats.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
-    unit.automatic(lengthUnit && !choices.unit ? `as found: ${lengthUnit[1]}` : "as the file says");
+    shape.automatic(`detected: ${this.formats.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
+    unit.automatic(lengthUnit && !choices.unit ? `detected: ${lengthUnit[1]}` : "as the file says");
     angle_unit.offer(table.roles.some((role) => /^r[xyz]$/.test(role)));
     angle_unit.automatic("as the file says");
     decimal.automatic(assumed["decimal mark"] && !choices.decimal ? `detected: ${assumed["decimal mark"]}` : "detected");
