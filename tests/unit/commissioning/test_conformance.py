@@ -21,7 +21,7 @@ from compd.conformance.value_cases import share_of
 from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad, good
 from compd.gauge_tools import polled_drivers
 from compd.lines import RtuMaster
-from compd.simulation.wires.device import SimulatedByteDevice
+from compd.twins import SimulatedByteDevice
 from tests.support.sampled import sampled
 
 NAMES = polled_drivers()

@@ -13,8 +13,8 @@ from compd.gauge import LineFault, Quality
 from compd.lines.line_definition import PolledDefinition
 from compd.lines.port_arguments import PortArguments
 from compd.lines.registry import KINDS
-from compd.simulation.wires.device import SimulatedByteDevice
 from compd.simulation.wires.simulated_line import SimulatedLine
+from compd.twins import SimulatedByteDevice
 from tests.support.wire_rig import SETTINGS, outcome, rig
 
 RTU = {"kind": "modbus_rtu", "port": "x", "baud": 115200, "format": "8N1", "timeout_s": 0.1}

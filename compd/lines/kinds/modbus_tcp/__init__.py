@@ -9,12 +9,12 @@ from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
 from compd.lines.tcp_definition import TcpDefinition
 
 if TYPE_CHECKING:
-    from compd.lines.kinds.modbus_tcp.master import ModbusTcp as ModbusTcpMaster
+    from compd.lines.kinds.modbus_tcp.master import ModbusTcp
     from compd.lines.line import WrapPort
     from compd.twins import PolledTwin
 
 
-class ModbusTcp(TcpDefinition):
+class ModbusTcpDefinition(TcpDefinition):
     """Modbus registers over TCP."""
 
     kind = "modbus_tcp"
@@ -25,7 +25,7 @@ class ModbusTcp(TcpDefinition):
     broadcast_answered = True
     tries_drivers = True
 
-    def open(self, settings: ModbusTcpLine, clock: Clock, wrap_port: WrapPort) -> ModbusTcpMaster:
+    def open(self, settings: ModbusTcpLine, clock: Clock, wrap_port: WrapPort) -> ModbusTcp:
         """The line; its port is within its library, and stays as it is."""
         from compd.lines.kinds.modbus_tcp.master import ModbusTcp
 
@@ -44,4 +44,4 @@ class ModbusTcp(TcpDefinition):
         return TWIN
 
 
-KIND = ModbusTcp()
+KIND = ModbusTcpDefinition()
