@@ -12,10 +12,10 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tests.support.paths import ROOT
 
@@ -36,6 +36,14 @@ Address = tuple[str, int]
 BEGINS = "begins"
 
 
+class Attacked(NamedTuple):
+    """The daemon's sockets, and the machine's true tip in {M}, mm."""
+
+    unix: str
+    tcp: Address
+    tip_mm: Sequence[float]
+
+
 def _connected(tcp: Address) -> socket.socket:
     connection = socket.create_connection(tcp, CONNECTED_WITHIN_S)
     connection.settimeout(CONNECTED_WITHIN_S)
@@ -54,60 +62,60 @@ def _flood(tcp: Address, line: bytes) -> None:
                     pass
 
 
-def status(unix: str, tcp: Address) -> None:
-    _flood(tcp, b'{"class":"STATUS"}\n')
+def status(at: Attacked) -> None:
+    _flood(at.tcp, b'{"class":"STATUS"}\n')
 
 
-def version(unix: str, tcp: Address) -> None:
-    _flood(tcp, b'{"class":"VERSION"}\n')
+def version(at: Attacked) -> None:
+    _flood(at.tcp, b'{"class":"VERSION"}\n')
 
 
-def deaf(unix: str, tcp: Address) -> None:
+def deaf(at: Attacked) -> None:
     """Twenty watchers that never read."""
-    connections = [_connected(tcp) for _ in range(20)]
+    connections = [_connected(at.tcp) for _ in range(20)]
     for connection in connections:
         connection.sendall(b'{"class":"WATCH"}\n')
     signal.pause()
 
 
-def idle(unix: str, tcp: Address) -> None:
+def idle(at: Attacked) -> None:
     """More connections than there is room for, which ask nothing."""
     kept = []
     for _ in range(60):
         with contextlib.suppress(OSError):
-            kept.append(_connected(tcp))
+            kept.append(_connected(at.tcp))
     signal.pause()
 
 
-def endless(unix: str, tcp: Address) -> None:
+def endless(at: Attacked) -> None:
     """A line that never ends."""
     while True:
-        with contextlib.suppress(OSError), _connected(tcp) as connection:
+        with contextlib.suppress(OSError), _connected(at.tcp) as connection:
             while True:
                 connection.sendall(b"x" * 65536)
 
 
-def noise(unix: str, tcp: Address) -> None:
+def noise(at: Attacked) -> None:
     """Random bytes."""
     generator = random.Random(1)
     while True:
-        with contextlib.suppress(OSError), _connected(tcp) as connection:
+        with contextlib.suppress(OSError), _connected(at.tcp) as connection:
             while True:
                 connection.sendall(generator.randbytes(4096))
 
 
-def churn(unix: str, tcp: Address) -> None:
+def churn(at: Attacked) -> None:
     """Connections that send half a message and are reset."""
     while True:
-        with contextlib.suppress(OSError), _connected(tcp) as connection:
+        with contextlib.suppress(OSError), _connected(at.tcp) as connection:
             connection.sendall(b'{"class":"WATCH","rate_hz":')
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
         time.sleep(PAUSE_S)
 
 
-def models(unix: str, tcp: Address) -> None:
+def models(at: Attacked) -> None:
     """Models that are no files: a FIFO, a device without end, deep nesting."""
-    folder = Path(unix).parent
+    folder = Path(at.unix).parent
     fifo, nested = folder / "fifo.yaml", folder / "nested.yaml"
     with contextlib.suppress(FileExistsError):
         os.mkfifo(fifo)
@@ -116,7 +124,7 @@ def models(unix: str, tcp: Address) -> None:
         for path in (fifo, Path("/dev/zero"), nested, folder):
             with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as connection:
                 connection.settimeout(CONNECTED_WITHIN_S)
-                connection.connect(unix)
+                connection.connect(at.unix)
                 connection.sendall(b'{"class":"MODEL","file":"%s"}\n' % os.fsencode(path))
                 lines = connection.makefile("rb")
                 lines.readline()  # VERSION
@@ -124,14 +132,19 @@ def models(unix: str, tcp: Address) -> None:
         time.sleep(PAUSE_S)
 
 
-def _aim(tcp: Address) -> dict[str, Any]:
-    """A target where the tip is."""
-    with _connected(tcp) as connection:
+def _aim(at: Attacked) -> dict[str, Any]:
+    """A target where the tip is truly.
+
+    Where a setpoint says that it is may be wrong by that setpoint's bound, and would stay so while later bounds are
+    smaller.
+    """
+    with _connected(at.tcp) as connection:
         connection.sendall(b'{"class":"WATCH"}\n')
         for line in connection.makefile("rb"):
             message = json.loads(line)
             if message.get("valid"):
-                return {"class": "TARGET", "tip_B0_mm": message["tip_B0_mm"]}
+                off = zip(message["tip_B0_mm"], at.tip_mm, message["tip_M_mm"], strict=True)
+                return {"class": "TARGET", "tip_B0_mm": [there + true - said for there, true, said in off]}
     raise OSError("no valid setpoint")
 
 
@@ -141,25 +154,25 @@ def _send_targets(connection: socket.socket, target: Mapping[str, Any], times_s:
     connection.sendall(b"".join(lines))
 
 
-def targets(unix: str, tcp: Address) -> None:
-    target = _aim(tcp)
-    with _connected(tcp) as connection:
+def targets(at: Attacked) -> None:
+    target = _aim(at)
+    with _connected(at.tcp) as connection:
         while True:
             _send_targets(connection, target, [time.monotonic()] * TARGETS_AT_ONCE)
             time.sleep(TARGETS_AT_ONCE / TARGETS_PER_S)
 
 
-def target_bursts(unix: str, tcp: Address) -> None:
-    target = _aim(tcp)
-    with _connected(tcp) as connection:
+def target_bursts(at: Attacked) -> None:
+    target = _aim(at)
+    with _connected(at.tcp) as connection:
         while True:
             time.sleep(BURST_S)
             _send_targets(connection, target, _times_of_a_burst(BURST_S))
 
 
-def target_burst_closed(unix: str, tcp: Address) -> None:
-    target = _aim(tcp)
-    with _connected(tcp) as connection:
+def target_burst_closed(at: Attacked) -> None:
+    target = _aim(at)
+    with _connected(at.tcp) as connection:
         _send_targets(connection, target, _times_of_a_burst(10 * BURST_S))
     signal.pause()
 
@@ -185,7 +198,7 @@ ATTACKS: dict[str, tuple[str, str]] = {
     "target_burst_closed": ("a controller that goes while its targets wait", "5000 targets at once, then closed"),
 }
 _CONTROLLERS = (targets, target_bursts, target_burst_closed)
-_ATTACKS: dict[str, Callable[[str, Address], None]] = {
+_ATTACKS: dict[str, Callable[[Attacked], None]] = {
     function.__name__: function
     for function in (
         *(status, version, deaf, idle, endless, noise, churn, models),
@@ -194,7 +207,7 @@ _ATTACKS: dict[str, Callable[[str, Address], None]] = {
 }
 
 
-def main(name: str, unix: str, host: str, port: str) -> None:
+def main(name: str, unix: str, host: str, port: str, *tip_mm: str) -> None:
     """Until it is killed; the daemon's end is its end too.
 
     It takes little processor time from the simulated machine: the daemon is attacked, not the computer.
@@ -202,7 +215,7 @@ def main(name: str, unix: str, host: str, port: str) -> None:
     print(BEGINS, flush=True)
     os.nice(CONTROLLERS_NICENESS if _ATTACKS[name] in _CONTROLLERS else NICENESS)
     with contextlib.suppress(OSError):
-        _ATTACKS[name](unix, (host, int(port)))
+        _ATTACKS[name](Attacked(unix, (host, int(port)), [float(mm) for mm in tip_mm]))
 
 
 def attack(name: str) -> Callable[[InjectedMachine], None]:
@@ -211,9 +224,10 @@ def attack(name: str) -> Callable[[InjectedMachine], None]:
 
 
 @contextmanager
-def attacking(name: str, unix: Path, tcp: Address) -> Iterator[None]:
+def attacking(name: str, at: Attacked) -> Iterator[None]:
     """The client runs during the block."""
-    command = [sys.executable, "-m", "tests.injection.clients", name, str(unix), tcp[0], str(tcp[1])]
+    where = [at.unix, at.tcp[0], str(at.tcp[1]), *map(str, at.tip_mm)]
+    command = [sys.executable, "-m", "tests.injection.clients", name, *where]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None

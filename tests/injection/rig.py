@@ -23,7 +23,7 @@ import yaml
 from compd.demo.processes import START_TIMEOUT_S, Command, run_commands
 from compd.errors import DaemonError
 from compd.setpoint_states import State
-from tests.injection.clients import attacking
+from tests.injection.clients import Attacked, attacking
 from tests.injection.ends import LOOPBACK
 from tests.injection.injector import Injector
 from tests.injection.truth import PREFERRED, REST_EVERY_S, SETTLED_S, Truth
@@ -193,7 +193,8 @@ class InjectedMachine:
 
     def attack(self, name: str) -> None:
         """A hostile client from now on."""
-        self._attacks.enter_context(attacking(name, self.daemon.socket, self._tcp))
+        at = Attacked(str(self.daemon.socket), self._tcp, self.truth.tip_mm())
+        self._attacks.enter_context(attacking(name, at))
 
     def signal(self, process: str, number: signal.Signals) -> None:
         """Send a signal to one of the daemon's processes."""

@@ -103,6 +103,11 @@ class Truth:
         end_s = time.monotonic() + duration_s
         until("a rest", lambda: self._seen[-1].from_s > end_s)
 
+    def tip_mm(self) -> list[float]:
+        """The true tip as of the last answer."""
+        tip_mm: list[float] = self._seen[-1].tip_mm.tolist()
+        return tip_mm
+
     def at(self, from_s: float, to_s: float) -> np.ndarray | None:
         """(3,) the true tip, if the machine stood still from `from_s` to `to_s` and it is known; else None.
 
