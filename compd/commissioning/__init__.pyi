@@ -1,6 +1,4 @@
 from .blind_spots import BLIND_SPOTS as BLIND_SPOTS
-from .blind_spots import DRIFT_UM as DRIFT_UM
-from .blind_spots import figures_of as figures_of
 from .blind_spots import shown_by as shown_by
 from .cycle_time import cycle_warnings as cycle_warnings
 from .cycle_time import measure_cycle as measure_cycle
@@ -12,6 +10,8 @@ from .daemon_health import warnings_of as warnings_of
 from .doctor.examine import examine as examine
 from .doctor.examine import is_fit as is_fit
 from .doctor.examine import what_to_do as what_to_do
+from .drift_costs import DRIFT_UM as DRIFT_UM
+from .fault_costs import figures_of as figures_of
 from .jump_trials import BelievedJump as BelievedJump
 from .jump_trials import FeignedJump as FeignedJump
 from .jump_trials import feigned_jumps as feigned_jumps

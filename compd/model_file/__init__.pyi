@@ -8,4 +8,4 @@ from .model_file import EffectNumber as EffectNumber
 from .model_file import ModelFile as ModelFile
 from .model_file import Range as Range
 from .model_file import parameter_estimates as parameter_estimates
-from .model_file import read_model_file as read_model_file
+from .model_reader import read_model_file as read_model_file

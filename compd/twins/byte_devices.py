@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from compd.twins.device import SimulatedByteDevice
+from compd.twins.device import Listener, SimulatedByteDevice
 from compd.twins.latch import Latch, TriggeredDevices
-from compd.twins.polled_twin import Listener
 
 
 class ByteDevices:

@@ -8,10 +8,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 # Present value at the device's sensor by channel name, in the channel's unit; nan: the sensor is off.
 Sense = Callable[[str], float]
+
+
+class Listener(Protocol):
+    """Receives a line's bytes and returns replies."""
+
+    def receive(self, data: bytes) -> bytes: ...
 
 
 class SimulatedByteDevice(ABC):

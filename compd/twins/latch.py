@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
-from compd.twins.device import Sense, SimulatedByteDevice, SimulatedRegisterDevice
+from compd.twins.device import Listener, Sense, SimulatedByteDevice, SimulatedRegisterDevice
 
 
 class Latch:
@@ -43,14 +42,10 @@ class _LatchedSense:
         self._values = {channel: self._sense(channel) for channel in self._channels}
 
 
-class _Listener(Protocol):
-    def receive(self, data: bytes) -> bytes: ...
-
-
 class TriggeredDevices:
     """Devices on a line of bytes that a round trigger latches; none of them answers it."""
 
-    def __init__(self, devices: _Listener, trigger: bytes, latch: Latch) -> None:
+    def __init__(self, devices: Listener, trigger: bytes, latch: Latch) -> None:
         """`trigger`: the bytes of the round trigger."""
         self._devices = devices
         self._trigger = trigger

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
+from compd.twins.device import Listener
 from compd.twins.line_fault import SILENT
 from compd.twins.wire_ends import End
 
@@ -14,12 +15,6 @@ DAMAGED_BIT = 0x80
 # A fault's effect on a reply.
 Damage = Callable[[bytes], bytes]
 LATE = "late"
-
-
-class Listener(Protocol):
-    """Receives a line's bytes and returns replies."""
-
-    def receive(self, data: bytes) -> bytes: ...
 
 
 def _garble(reply: bytes) -> bytes:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 from compd.commissioning import BLIND_SPOTS, DRIFT_UM, figures_of, shown_by
-from compd.commissioning.blind_spots import BlindSpot, Figures
+from compd.commissioning.blind_spots import BlindSpot
+from compd.commissioning.fault_costs import Figures
 from compd.configuration import load_machine
 from docs.generate import fault_cells
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.commissioning.blind_spots import BLIND_SPOTS, drift_costs, figures_of
+from compd.commissioning.blind_spots import BLIND_SPOTS
 from compd.commissioning.cycle_time import CycleTime, cycle_warnings, measure_cycle, python_effect_times
+from compd.commissioning.drift_costs import drift_costs
+from compd.commissioning.fault_costs import figures_of
 from compd.commissioning.jump_trials import (
     LATE_BUSY_S,
     LATE_S,

@@ -12,7 +12,8 @@ import yaml
 
 from compd.errors import StateError
 from compd.model_file.model_document import ModelStep, read_stored
-from compd.model_file.model_file import ModelFile, read_model_file
+from compd.model_file.model_file import ModelFile
+from compd.model_file.model_reader import read_model_file
 from tests.support.measured import hidden
 
 FORMULA = {
