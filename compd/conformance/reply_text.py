@@ -1,8 +1,7 @@
 """Constant parts of a device's replies (letters, an address, an end), and forgeries that change them.
 
-The checksum in a device's replies, learned from samples, for forged replies with a right one.
-
-Without it a driver would refuse a forged reply for its checksum, and nothing would be known of all else that it checks.
+A forged reply has a right checksum, which is learned from samples: a driver that refuses it for another reason shows
+what else it checks.
 """
 
 from __future__ import annotations

@@ -24,8 +24,7 @@ class FleetEstimate:
     effect, parameter : as the effect's equation names it; with ``_1``, ``_x`` where there is one per link or axis.
     value, standard_error : in `unit`; a standard error that is not known is nan.
     p_value : probability that noise alone resembles the effect as much, corrected for all effects that were tried; nan
-    for
-        an effect that the model has already.
+        for an effect that the model has already.
     plausible : whether the value lies in the range that the effect declares; None if not examined.
     rivals : effects that would explain this recording as well, in this one's place.
     """

@@ -69,9 +69,8 @@ def add_token(path: Path, role_and_name: str) -> str:
     beside = path.with_name(path.name + ".new")
     descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-        if (
-            os.geteuid() == 0 and path.exists()
-        ):  # an administrator adds one; the file stays readable for the page's user
+        # where an administrator adds one, the file stays readable for the page's user
+        if os.geteuid() == 0 and path.exists():
             owner = path.stat()
             os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
         file.write(text)

@@ -5,9 +5,8 @@ an outlier. Each pass adds up the normal equations of a Gauss-Newton step over a
 standard errors. The sample knows the scale of the weights within 0.5 %, which moves no parameter by more than a
 hundredth of its standard error; where the sample has all rows, the result is that of `fit`.
 
-The blocks of neighbouring rows that standard errors rest on, of a recording that comes in parts.
-
-They are those of `compd.comparison.neighbour_block`, but that a visit is looked for in neighbouring parts alone.
+Standard errors rest on blocks of neighbouring rows: those of `compd.comparison.neighbour_block`, but that a visit is
+looked for in neighbouring parts alone.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
 """A round of polls: every gauge of a line is polled in turn, its readings are published or discarded.
 
 A gauge that does not answer rests for a short time, so that an absent unit does not slow the others on its line, and
-for a longer one where it makes them stale (`compd.live.acquisition.polled_round`). Where replies do not say whose they
-are, the readings of a round are published when it has ended and nothing more came
-(`compd.live.acquisition.reply_order`).
-
-Polling interval of an unresponsive gauge whose silence makes the others on its line stale.
+for a longer one where it makes them stale. Where replies do not say whose they are, the readings of a round are
+published when it has ended and nothing more came (`compd.live.acquisition.reply_order`).
 
 A gateway before a serial bus serves no unit while it waits for one that does not answer, whatever the line's timeout
 is. What such a request has cost is known when the next gauge answers. Where that gauge's reading has gone stale

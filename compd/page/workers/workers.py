@@ -1,6 +1,6 @@
 """The workers of one page's server: a limited number of processes, forked from one with their imports.
 
-Main function of a worker's process: opens its state at the first question, and answers until the end of input.
+A worker opens its state at the first question, and answers until the end of its input.
 
 A message to it is (question, arguments, whether steps are told); a question is the name of a function that gets the
 state first. Messages from it are (kind, content, kept): "step" with a text; "answer" with bytes; "error" with the
