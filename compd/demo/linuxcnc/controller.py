@@ -168,6 +168,8 @@ class LinuxCnc:
         self.do("press", name="compd-arm")
         try:
             self.wait_for("compd.armed", True, PRESSED_S)
+            # the feed is inhibited until the servo thread has run with it
+            self.wait_for("compd-inhibit", False, PRESSED_S)
         except DaemonError:
             return False
         return True
