@@ -18,7 +18,7 @@ def table(frozen: slice, machine: str = "model", digits: int = 6) -> Table:
     measured = np.round(PLACES_MM + np.random.default_rng(9).normal(0.0, 1e-3, PLACES_MM.shape), digits)
     measured[frozen] = measured[frozen][:1]
     names = ["scale_1_mm", "scale_2_mm", "scale_3_mm"] if machine == "scales" else [f"model_{a}_mm" for a in "xyz"]
-    columns = dict(zip(names, PLACES_MM.T, strict=True))
+    columns = dict(zip(names, PLACES_MM.T.copy(), strict=True))
     columns |= {f"reference_{a}_mm": column for a, column in zip("xyz", measured.T, strict=True)}
     return Table(Path("visit.csv"), {}, columns, np.arange(N) + FIRST_ROW)
 
