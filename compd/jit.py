@@ -28,6 +28,7 @@ SCALAR = float64
 VECTOR = float64[:]
 MATRIX = float64[:, :]
 INTEGERS = int64[:]
+INTEGER_ROWS = int64[:, :]
 # Of a loop's arguments: contiguous, with the axis of the rows in front where there is one.
 NUMBERS = float64[::1]
 ROWS = float64[:, ::1]

@@ -7,11 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from compd.arrays import FloatArray
-from compd.configuration import Geometry, ToolOnPlateSettings, ToolOnPlatformSettings
+from compd.arrays import FloatArray, IntArray
+from compd.configuration import (
+    COORDINATES,
+    Actuator,
+    Geometry,
+    MechanismDescription,
+    SlidingActuator,
+    ToolOnPlateSettings,
+    ToolOnPlatformSettings,
+    TurningActuator,
+)
 from compd.model import MachineModel, MachineParts, machine_constants, machine_model
 from compd.model.effects import MachineDetails
-from compd.model.kinematics import Arrangement, Contact, ToolOnPlate, ToolOnPlatform
+from compd.model.kinematics import ACTUATOR_KINDS, Actuators, Arrangement, Contact, ToolOnPlate, ToolOnPlatform
 from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix, to_outer
 
@@ -26,28 +35,77 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
     positive as in equations (1), (6) and (7).
     Raises KinematicsError where the machine zero that it describes is unreachable or near-singular.
     """
-    base = geometry.base
+    base, mechanism = geometry.base, geometry.mechanism
     rotation_M_B = rotation_matrix(np.array(base.rotation_B0_in_M_rad))
     origin_M_mm = np.array(base.origin_B0_in_M_mm)
     attitude_rad = np.array(geometry.tool.zero_rotation_P_in_M_rad)
     tool, contact = _tool(geometry.tool)
     model = machine_model(
         MachineParts(
-            supports_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.supports_B_mm)),
-            plate_points_M_mm=geometry.plate_points_M_mm,
-            base_joints_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.joints_B_mm)),
-            support_of_joint=np.array(base.support_of_joint) - 1,
-            platform_joints_P_mm=geometry.platform.joints_P_mm,
-            revolute_axes_P=np.array(geometry.platform.revolute_axes_P).reshape(-1, 3),
+            supports_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.supports_B_mm or np.zeros((3, 3)))),
+            plate_points_M_mm=geometry.plate_points_M_mm or np.full((3, 3), np.nan),
+            rotation_M_B=rotation_M_B,
+            base_joints_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array([rod.base_B_mm for rod in mechanism.rods])),
+            support_of_joint=np.array(base.support_of_joint or np.ones(geometry.links, dtype=np.int64)) - 1,
+            platform_joints_P_mm=[rod.platform_P_mm for rod in mechanism.rods],
+            revolute_axes_P=_hinge_axes(mechanism, rotation_M_B),
+            hinges=_hinges(mechanism),
+            actuators=_actuators(mechanism, rotation_M_B),
+            actuator_guess_mm=[_guess_mm(actuator) for actuator in mechanism.actuators],
             arrangement=tool,
             zero_contact=contact,
-            zero_rotation_M_P=None if geometry.links == 3 else rotation_matrix(attitude_rad),
+            zero_rotation_M_P=None if geometry.kinematics == "tripod_3spr" else rotation_matrix(attitude_rad),
             joint_weights=joint_weights(wiring, geometry.links),
             weight_N=geometry.platform.weight_N,
             weight_at_P_mm=geometry.platform.weight_at_P_mm,
         )
     )
     return replace(model, constants=machine_constants(model, machine_details(geometry)))
+
+
+def _hinges(mechanism: MechanismDescription) -> IntArray:
+    """(k, 2): the rod of each hinge, from 0, and whether the base carries it."""
+    hinges = [[hinge.rod - 1, int(hinge.axis_B is not None)] for hinge in mechanism.hinges]
+    return np.array(hinges, dtype=np.int64).reshape(-1, 2)
+
+
+def _hinge_axes(mechanism: MechanismDescription, rotation_M_B: FloatArray) -> FloatArray:
+    """(k, 3): in {P} of a hinge on the platform, in {M} of one on the base."""
+    axes = [
+        hinge.axis_P if hinge.axis_B is None else rotation_M_B @ np.array(hinge.axis_B) for hinge in mechanism.hinges
+    ]
+    return np.array(axes, dtype=np.float64).reshape(-1, 3)
+
+
+def _actuators(mechanism: MechanismDescription, rotation_M_B: FloatArray) -> Actuators:
+    """The actuators in {M}, as the kernels take them."""
+    count = len(mechanism.actuators)
+    cosine_B, sine_B, radius_mm = (
+        np.tile([1.0, 0.0, 0.0], (count, 1)),
+        np.tile([0.0, 1.0, 0.0], (count, 1)),
+        np.ones(count),
+    )
+    for i, actuator in enumerate(mechanism.actuators):
+        if isinstance(actuator, SlidingActuator):
+            cosine_B[i] = actuator.along_B
+        elif isinstance(actuator, TurningActuator):
+            cosine_B[i], sine_B[i], radius_mm[i] = actuator.cosine_B, actuator.sine_B, actuator.radius_mm
+    return Actuators(
+        np.array([ACTUATOR_KINDS.index(actuator.kind) for actuator in mechanism.actuators]),
+        cosine_B @ rotation_M_B.T,
+        sine_B @ rotation_M_B.T,
+        radius_mm,
+        np.array([rod.actuator - 1 for rod in mechanism.rods]),
+        np.array([rod.length_mm for rod in mechanism.rods]),
+        np.array([int(name in mechanism.target_fixes) for name in COORDINATES]),
+    )
+
+
+def _guess_mm(actuator: Actuator) -> float:
+    """About where an actuator stands at machine zero; an extended rod has any length above 0 there."""
+    if isinstance(actuator, TurningActuator):
+        return actuator.zero_rad * actuator.radius_mm
+    return actuator.zero_mm if isinstance(actuator, SlidingActuator) else 1.0
 
 
 def machine_details(geometry: Geometry) -> MachineDetails:

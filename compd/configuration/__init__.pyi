@@ -12,6 +12,11 @@ from .machine_configuration import examine as examine
 from .machine_configuration import gauges_of as gauges_of
 from .machine_configuration import in_order as in_order
 from .machine_configuration import load as load
+from .mechanism import COORDINATES as COORDINATES
+from .mechanism import Actuator as Actuator
+from .mechanism import MechanismDescription as MechanismDescription
+from .mechanism import SlidingActuator as SlidingActuator
+from .mechanism import TurningActuator as TurningActuator
 from .places import place_problems as place_problems
 from .places import place_warnings as place_warnings
 from .schema import json_schema as json_schema

@@ -57,6 +57,10 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "apart": None,
     "standing_temperature_K": VoteSettings().standing_temperature_K,
     "tip_error_um": None,
+    "actuators": [],
+    "rods": [],
+    "hinges": [],
+    "target_fixes": [],
 }
 # Speed limits (mm/s) of drivers up to 0.2.0, which were part of the hashes.
 _FORMER_SPEED_LIMITS: Mapping[str, float] = {

@@ -13,7 +13,8 @@ from pydantic import AfterValidator, Field, ValidationError
 
 from compd.configuration import crosscheck
 from compd.configuration.effect_files import EffectFile, EffectFiles
-from compd.configuration.geometry import LINKS, Geometry, contradictions
+from compd.configuration.geometry import LINKS, Geometry
+from compd.configuration.geometry_checks import contradictions
 from compd.configuration.hashes import NOT_IN_ZERO, hash_of
 from compd.configuration.plausible import implausible
 from compd.configuration.sections import Sections
@@ -283,10 +284,9 @@ def examine(path: Path) -> Examined:
         Problem(where=document.where(("geometry", *location)), what=what, value=value, allowed=allowed, next_step=step)
         for location, what, value, allowed, step in contradictions(part["geometry"])
     ]
-    kinematics = getattr(part["geometry"], "kinematics", None)
     checked = Sections(
         document,
-        LINKS[kinematics] if kinematics is not None else None,
+        _links(part["geometry"]),
         part["lines"] or {},
         gauges,
         drivers,
@@ -371,6 +371,12 @@ def _why_not_made(driver: type[Gauge[Any]], options: GaugeOptions) -> str | None
     if not names or len(set(names)) < len(names):
         return f"the driver has {'two channels of one name' if names else 'no channels'}"
     return None
+
+
+def _links(geometry: Any) -> int | None:
+    """Number of links of a geometry, or of its readable part; None where it cannot be read."""
+    kinematics, rods = getattr(geometry, "kinematics", None), getattr(geometry, "rods", None)
+    return LINKS[kinematics] if kinematics is not None else len(rods) if rods else None
 
 
 def _line_number(where: str) -> int:

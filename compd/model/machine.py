@@ -14,6 +14,7 @@ from compd.errors import KinematicsError, Problem
 from compd.model.effects import AtZero, EffectProgram, FittedEffect, MachineConstants, MachineDetails, build_program
 from compd.model.kernels import require
 from compd.model.kinematics import (
+    Actuators,
     Arrangement,
     Contact,
     FrameGeometry,
@@ -21,7 +22,7 @@ from compd.model.kinematics import (
     base_pose,
     distances_mm,
     forward_kinematics,
-    inverse_kinematics,
+    inverse_by_actuators,
     link_forces,
     solve_frame,
 )
@@ -34,7 +35,8 @@ class MachineModel:
     """Geometry and parameters of one machine; frozen, its arrays read-only. Build it with `machine_model`.
 
     frame : supports, plate points, base joints.  platform_joints_P_mm : (n, 3).
-    revolute_axes_P : (3, 3) unit vectors for the tripod, (0, 3) for the hexapod.
+    revolute_axes_P : (k, 3), unit vectors of the hinges, in {M} where the base carries one.  hinges : (k, 2), as in
+        `Mechanism`.  actuators : what moves the links; see `Actuators`.
     arrangement : where the tool is.  joint_weights : (n, k), see `compd.model.kinematics.joint_shortening`.
     weight_N : the moving platform's, at weight_at_P_mm (3,).
     effects : in their order.  covariance : (P, P) of all their fitted numbers jointly.
@@ -44,6 +46,8 @@ class MachineModel:
     frame: FrameGeometry
     platform_joints_P_mm: FloatArray
     revolute_axes_P: FloatArray
+    hinges: IntArray
+    actuators: Actuators
     arrangement: Arrangement
     joint_weights: FloatArray
     weight_N: float
@@ -55,13 +59,18 @@ class MachineModel:
 
     @property
     def links(self) -> int:
-        """Number of links: 3 or 6."""
+        """Number of links, 3 to 6."""
         return int(self.platform_joints_P_mm.shape[0])
+
+    @property
+    def scales(self) -> int:
+        """Number of actuators, each with the place of a scale."""
+        return len(self.actuators.kinds)
 
     @property
     def attitude_is_free(self) -> bool:
         """Whether a target has an attitude of its own; a tripod's follows from its tip."""
-        return len(self.revolute_axes_P) == 0
+        return bool(self.actuators.fixed[3:].any())
 
     @cached_property
     def live_effects(self) -> tuple[FittedEffect, ...]:
@@ -96,6 +105,7 @@ class MachineModel:
     @cached_property
     def structure(self) -> NDArray[np.void]:
         """(1,) The machine as the compensation's kernel reads it; see `compd.model.structures.MODEL`."""
+        require_extending(self.actuators, self.hinges)
         structure = np.zeros(1, dtype=MODEL)
         model, n, k = structure[0], self.links, self.joint_weights.shape[1]
         model["links"], model["joints"], model["axes"] = n, k, len(self.revolute_axes_P)
@@ -107,6 +117,7 @@ class MachineModel:
         model["support_of_joint"][:n] = self.frame.support_of_joint
         model["platform_joints_P_mm"][:n] = self.platform_joints_P_mm
         model["revolute_axes_P"][: len(self.revolute_axes_P)] = self.revolute_axes_P
+        model["hinges"][: len(self.hinges)] = self.hinges
         model["joint_weights"][:n, :k] = self.joint_weights
         model["zero_base_joints_M_mm"][:n] = self.zero.base_joints_M_mm
         model["zero_link_length_mm"][:n] = self.zero.link_length_mm
@@ -119,24 +130,33 @@ class MachineModel:
 
     def mechanism(self, base_joints_M_mm: FloatArray) -> Mechanism:
         """The links with the base joints (..., n, 3) where they are now."""
-        return Mechanism(base_joints_M_mm, self.platform_joints_P_mm, self.revolute_axes_P)
+        return Mechanism(base_joints_M_mm, self.platform_joints_P_mm, self.revolute_axes_P, self.hinges)
 
 
 class MachineParts(NamedTuple):
     """A machine at machine zero, all in {M} but what moves with the platform; lengths in mm.
 
-    supports_M_mm, plate_points_M_mm : (3, 3).  base_joints_M_mm, platform_joints_P_mm : (n, 3), n = 3 or 6.
-    support_of_joint : (n,), counted from 0.  revolute_axes_P : (3, 3), any length, or (0, 3).
-    zero_contact : the tip in {M} and in {P}.  zero_rotation_M_P : (3, 3) for the hexapod, None for the tripod.
+    supports_M_mm, plate_points_M_mm : (3, 3); of a frame without reference points, which stands still, the origin of
+        {B0} three times and nan.  rotation_M_B : (3, 3), axes of {B0}; read where there are no reference points.
+    base_joints_M_mm, platform_joints_P_mm : (n, 3), n from 3 to 6; base joints with sliding actuators at 0, and the
+        centres of the circles of turning ones.
+    support_of_joint : (n,), counted from 0.  revolute_axes_P : (k, 3), any length.  hinges : (k, 2).
+    actuators : see `Actuators`.  actuator_guess_mm : (m,), about where they stand at machine zero.
+    zero_contact : the tip in {M} and in {P}.  zero_rotation_M_P : (3, 3), the attitude at machine zero, or None for
+        that of a platform parallel to its base: the guess where a target leaves the attitude free.
     joint_weights : (n, k).  weight_N at weight_at_P_mm (3,).
     """
 
     supports_M_mm: ArrayLike
     plate_points_M_mm: ArrayLike
+    rotation_M_B: ArrayLike
     base_joints_M_mm: ArrayLike
     support_of_joint: ArrayLike
     platform_joints_P_mm: ArrayLike
     revolute_axes_P: ArrayLike
+    hinges: IntArray
+    actuators: Actuators
+    actuator_guess_mm: ArrayLike
     arrangement: Arrangement
     zero_contact: Contact
     zero_rotation_M_P: ArrayLike | None
@@ -160,46 +180,60 @@ def machine_model(parts: MachineParts) -> MachineModel:
         _read_only, (parts.plate_points_M_mm, parts.platform_joints_P_mm, parts.joint_weights)
     )
     _check_shapes(supports, plate, base_joints, carriers, platform_joints, weights)
-    distances, _ = distances_mm(supports, plate)
-    origin, rotation = base_pose(supports)
-    offsets = to_inner(rotation, np.zeros(3), base_joints - supports[carriers])
-    frame = FrameGeometry(plate, _read_only(offsets), carriers, supports, _read_only(origin), _read_only(rotation))
-    require(
-        solve_frame(frame, distances).reason,
-        "frame at machine zero",
-        "check supports and plate points, and that rods u1..u6 join them in the order of equation (3)",
-    )
-    mechanism = Mechanism(base_joints, platform_joints, axes)
+    frame, distances = _frame_at_zero(supports, plate, _read_only(parts.rotation_M_B), base_joints, carriers)
+    mechanism = Mechanism(base_joints, platform_joints, axes, parts.hinges)
     attitude = (
         _parallel_attitude(base_joints, platform_joints) if parts.zero_rotation_M_P is None else parts.zero_rotation_M_P
     )
-    pose = inverse_kinematics(mechanism, *parts.zero_contact, attitude)
+    reached = inverse_by_actuators(mechanism, parts.actuators, *parts.zero_contact, attitude, parts.actuator_guess_mm)
+    pose = reached.pose
     check = "check the tip and the attitude at machine zero, base joints, platform joints and revolute axes"
     require(pose.reason, "links at machine zero", check)
     # forward kinematics must lead back to machine zero as well: the first cycle starts from there
+    mechanism = mechanism._replace(base_joints_M_mm=reached.base_joints_M_mm)
     require(
         forward_kinematics(mechanism, pose.link_length_mm, pose.origin_M_mm, pose.rotation_M_P).reason,
         "links at machine zero",
         check,
     )
     zero = AtZero(
-        base_joints,
+        _read_only(reached.base_joints_M_mm),
         _read_only(pose.origin_M_mm),
         _read_only(pose.rotation_M_P),
         Contact(*map(_read_only, parts.zero_contact)),
         _read_only(pose.link_length_mm),
+        _read_only(reached.actuator_mm),
         _read_only(distances),
     )
     return MachineModel(
         frame,
         platform_joints,
         axes,
+        parts.hinges,
+        parts.actuators,
         parts.arrangement,
         weights,
         float(parts.weight_N),
         _read_only(parts.weight_at_P_mm),
         zero,
     )
+
+
+def require_extending(actuators: Actuators, hinges: IntArray) -> None:
+    """Raise KinematicsError unless each actuator extends one link and the platform carries every hinge.
+
+    Compensation and predictions take these machines; forward and inverse kinematics take all.
+    """
+    links, scales = len(actuators.of_link), len(actuators.kinds)
+    if actuators.kinds.any() or links != scales or hinges[:, 1].any():
+        raise KinematicsError(
+            Problem(
+                where="machine",
+                what="has actuators that move base joints, or hinges that the base carries",
+                allowed="in compensation and predictions: actuators that extend one link each, hinges on the platform",
+                next_step="use its kinematics alone: compd.model.kinematics",
+            )
+        )
 
 
 def machine_constants(model: MachineModel, details: MachineDetails) -> MachineConstants:
@@ -220,6 +254,7 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
     return MachineConstants(
         platform_joints_P_mm=model.platform_joints_P_mm,
         revolute_axes_P=model.revolute_axes_P,
+        hinges=model.hinges,
         arrangement=model.arrangement,
         zero_directions_M=directions_M,
         zero_axes_M=axes_M / np.linalg.norm(axes_M, axis=1, keepdims=True),
@@ -234,6 +269,22 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         instrument_M_mm=np.array(details.instrument_M_mm),
         zero=zero,
     )
+
+
+def _frame_at_zero(
+    supports: FloatArray, plate: FloatArray, rotation_M_B: FloatArray, base_joints: FloatArray, carriers: IntArray
+) -> tuple[FrameGeometry, FloatArray]:
+    """The frame, and its nine distances at machine zero."""
+    distances, _ = distances_mm(supports, plate)
+    origin, rotation = (supports[0], rotation_M_B) if np.isnan(plate).any() else base_pose(supports)
+    offsets = to_inner(rotation, np.zeros(3), base_joints - supports[carriers])
+    frame = FrameGeometry(plate, _read_only(offsets), carriers, supports, _read_only(origin), _read_only(rotation))
+    require(
+        solve_frame(frame, distances).reason,
+        "frame at machine zero",
+        "check supports and plate points, and that rods u1..u6 join them in the order of equation (3)",
+    )
+    return frame, np.asarray(distances)
 
 
 def _parallel_attitude(base_joints_M_mm: FloatArray, platform_joints_P_mm: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from compd.arrays import BoolArray, FloatArray
 from compd.model.effects import MachineConstants, Observations
 from compd.model.kernels import GaugeRows, joint_shortening
 from compd.model.kinematics import Movement, Pose, ToolOnPlatform, forward_kinematics, link_length_mm, solve_frame
-from compd.model.machine import MachineModel
+from compd.model.machine import MachineModel, require_extending
 from compd.rotation import to_outer
 
 
@@ -52,6 +52,7 @@ def observe(
     A row that has no pose is nan in everything that the pose gives.
     Raises CompdError where a quantity is a column of the reference.
     """
+    require_extending(model.actuators, model.hinges)
     zero = model.zero
     frame = solve_frame(model.frame, zero.distances_mm + frame_mm)
     shortening_mm, _ = joint_shortening(model.joint_weights, joint_mm)
@@ -119,6 +120,7 @@ def observe_external(
     constants = MachineConstants(
         platform_joints_P_mm=no_vectors,
         revolute_axes_P=no_vectors,
+        hinges=np.zeros((0, 2), dtype=np.int64),
         arrangement=ToolOnPlatform(unknown),
         zero_directions_M=no_vectors,
         zero_axes_M=no_vectors,

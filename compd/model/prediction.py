@@ -75,6 +75,7 @@ def perturb_machine(
         _add_to_points(base_joints_M_mm, "base_joint", deltas),
         _add_to_points(model.platform_joints_P_mm, "platform_joint", deltas),
         _add_to_points(model.revolute_axes_P, "revolute_axis", deltas),
+        model.hinges,
     )
     tool_mm = _add(model.arrangement.tool_mm, "tool", deltas)
     to_length_mm = deltas.get("scale", 0.0) + deltas.get("link", 0.0)

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from compd.model import MachineModel, MachineParts, machine_model
-from compd.model.kinematics import Contact, ToolOnPlate, ToolOnPlatform
+from compd.model.kinematics import Actuators, Contact, ToolOnPlate, ToolOnPlatform
 from tests.support.paths import VECTORS
 
 Floats = NDArray[np.float64]
@@ -49,6 +49,24 @@ def rotation(axis: str, degrees: float) -> Floats:
     return R
 
 
+def extending(links: int) -> dict[str, Any]:
+    """Parts of a machine whose actuators extend one link each: three with hinges on the platform, or six."""
+    hinges = 6 - links
+    return {
+        "hinges": np.array([[i, 0] for i in range(hinges)], dtype=np.int64).reshape(-1, 2),
+        "actuators": Actuators(
+            np.zeros(links, dtype=np.int64),
+            np.tile([1.0, 0.0, 0.0], (links, 1)),
+            np.tile([0.0, 1.0, 0.0], (links, 1)),
+            np.ones(links),
+            np.arange(links),
+            np.zeros(links),
+            np.array([1, 1, 1] + 3 * [int(links == 6)]),
+        ),
+        "actuator_guess_mm": np.ones(links),
+    }
+
+
 def tripod_parts() -> dict[str, Any]:
     """The tripod's parts at machine zero, as `machine_model` takes them."""
     tool = np.array([0.0, 0.0, -60.0])
@@ -56,6 +74,7 @@ def tripod_parts() -> dict[str, Any]:
     supports = ring(250, 90, 210, 330, z_mm=700)
     return {
         "supports_M_mm": supports,
+        "rotation_M_B": np.eye(3),
         "plate_points_M_mm": ring(350, 150, 270, 30),
         "base_joints_M_mm": supports,
         "support_of_joint": [0, 1, 2],
@@ -65,6 +84,7 @@ def tripod_parts() -> dict[str, Any]:
         "zero_contact": Contact(np.array([0.0, 0.0, 190.0]), tool),
         "zero_rotation_M_P": None,
         "joint_weights": TRIPOD_WEIGHTS,
+        **extending(3),
         "weight_N": 80.0,
         "weight_at_P_mm": np.zeros(3),
     }
@@ -75,6 +95,7 @@ def hexapod_parts() -> dict[str, Any]:
     tool = np.array([0.0, 0.0, -80.0])
     return {
         "supports_M_mm": ring(300, 90, 210, 330, z_mm=900),
+        "rotation_M_B": np.eye(3),
         "plate_points_M_mm": ring(420, 150, 270, 30),
         "base_joints_M_mm": ring(300, 82, 98, 202, 218, 322, 338, z_mm=900),
         "support_of_joint": [0, 0, 1, 1, 2, 2],
@@ -84,6 +105,7 @@ def hexapod_parts() -> dict[str, Any]:
         "zero_contact": Contact(np.array([0.0, 0.0, 320.0]), tool),
         "zero_rotation_M_P": np.eye(3),
         "joint_weights": np.kron(np.eye(6), [1.0, 1.0]),
+        **extending(6),
         "weight_N": 120.0,
         "weight_at_P_mm": np.zeros(3),
     }

@@ -200,7 +200,7 @@ def machine_structure(constants: MachineConstants) -> NDArray[np.void]:
     machine["instrument_M_mm"] = constants.instrument_M_mm
     machine["zero_rotation_M_P"] = math.nan if constants.zero is None else constants.zero.rotation_M_P
     for name in (
-        *("platform_joints_P_mm", "revolute_axes_P", "zero_directions_M", "zero_axes_M"),
+        *("platform_joints_P_mm", "revolute_axes_P", "hinges", "zero_directions_M", "zero_axes_M"),
         *("zero_axial_force_N", "zero_axial_per_force"),
     ):
         values = getattr(constants, name)

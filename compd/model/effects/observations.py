@@ -42,7 +42,8 @@ class AtZero(NamedTuple):
 
     base_joints_M_mm : (n, 3).  platform_origin_M_mm : (3,).  rotation_M_P : (3, 3).
     contact : tip_M_mm (3,), tip_P_mm (3,).
-    link_length_mm : (n,), l0.  distances_mm : (9,), t0_1..t0_3, u0_1..u0_6.
+    link_length_mm : (n,), l0.  actuator_mm : (m,), where the actuators stand.
+    distances_mm : (9,), t0_1..t0_3, u0_1..u0_6.
     """
 
     base_joints_M_mm: FloatArray
@@ -50,13 +51,15 @@ class AtZero(NamedTuple):
     rotation_M_P: FloatArray
     contact: Contact
     link_length_mm: FloatArray
+    actuator_mm: FloatArray
     distances_mm: FloatArray
 
 
 class MachineConstants(NamedTuple):
     """What effects need of the machine beyond the readings; computed once per machine, nan where it is not described.
 
-    platform_joints_P_mm (n, 3), revolute_axes_P (k, 3): at machine zero's temperature, unbent.
+    platform_joints_P_mm (n, 3), revolute_axes_P (k, 3): at machine zero's temperature, unbent.  hinges (k, 2): the
+    link of each axis, and whether the base carries it, as in `Mechanism`.
     arrangement: where the tool is; its tool_mm (3,) in {P}, or in {M} where the tool stands on the plate, as at machine
         zero.
     zero_directions_M (n, 3): unit vectors of the links at machine zero, from base to platform.
@@ -72,6 +75,7 @@ class MachineConstants(NamedTuple):
 
     platform_joints_P_mm: FloatArray
     revolute_axes_P: FloatArray
+    hinges: IntArray
     arrangement: Arrangement
     zero_directions_M: FloatArray
     zero_axes_M: FloatArray
@@ -252,7 +256,7 @@ class Observations:
     def axial_force_N(self) -> FloatArray:
         """(N, n) axial link forces from the external force and the platform's weight; tension is positive."""
         c = self.constants
-        mechanism = Mechanism(self.base_joints_M_mm, c.platform_joints_P_mm, c.revolute_axes_P)
+        mechanism = Mechanism(self.base_joints_M_mm, c.platform_joints_P_mm, c.revolute_axes_P, c.hinges)
         return link_forces(
             mechanism, self.origin_M_mm, self.rotation_M_P, self.force_M_N, self.tip_M_mm, c.weight_N, c.weight_at_P_mm
         ).axial_N

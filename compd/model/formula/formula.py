@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.model.formula.program import ColumnCodes, write_program
-from compd.model.kernels import formula_factors
+from compd.model.kernels import formula as machine_code
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Formula:
             values[:, :, index] = columns[name]
         factors = np.zeros((rows, places, len(self.linear)))
         numbers = np.concatenate([[constants[name] for name in self.constants], program.numbers])
-        formula_factors(
+        machine_code.formula_factors(
             program.code,
             numbers,
             values,

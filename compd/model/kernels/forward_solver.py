@@ -2,7 +2,7 @@
 
 Newton's method in the six coordinates of the pose, v in mm and w in rad times the platform's radius,
 
-    (v, w) = J^-1 (l - |d_i|, -d_i . R e_i),   p <- p + v,   R <- R(w) R,
+    (v, w) = J^-1 (l - |d_i|, -d_i . e_h),   p <- p + v,   R <- R(w) R,
 
 with the closure and its derivatives J from `kernels.closure`. A step longer than STEP_LIMIT times the platform's radius
 is shortened to that.
@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
+from compd.jit import INTEGER_ROWS, INTEGERS, MATRIX, VECTOR, helper, kernel
 from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
 from compd.model.kernels.loop_closure import evaluate_closure, is_turned_over, platform_radius, pose_is_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NO_CONVERGENCE, NOT_FINITE, OK, OTHER_ASSEMBLY, UNREACHABLE
@@ -53,7 +53,8 @@ def _links_can_close(lengths_mm: FloatArray, base_joints_M: FloatArray, platform
 def _newton(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
-    revolute_axes_P: FloatArray,
+    revolute_axes: FloatArray,
+    hinges: IntArray,
     lengths_mm: FloatArray,
     origin_M: FloatArray,
     R: FloatArray,
@@ -72,7 +73,7 @@ def _newton(
     while step > STEP_TOLERANCE_MM:
         if iterations[0] == ITERATION_LIMIT:
             return NO_CONVERGENCE
-        if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+        if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes, hinges, radius_mm, x, J):
             return NEAR_SINGULAR
         for i in range(6):
             x[i] = lengths_mm[i] - x[i] if i < n else -x[i]
@@ -98,7 +99,8 @@ def _newton(
 def _pose_from(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
-    revolute_axes_P: FloatArray,
+    revolute_axes: FloatArray,
+    hinges: IntArray,
     lengths_mm: FloatArray,
     origin_M: FloatArray,
     R: FloatArray,
@@ -113,14 +115,14 @@ def _pose_from(
     reason = NEAR_SINGULAR
     if radius_mm > 0.0:
         reason = _newton(
-            base_joints_M, platform_joints_P, revolute_axes_P, lengths_mm, origin_M, R, radius_mm, iterations, J
+            base_joints_M, platform_joints_P, revolute_axes, hinges, lengths_mm, origin_M, R, radius_mm, iterations, J
         )
     if reason in (NO_CONVERGENCE, NEAR_SINGULAR):
         return reason if _links_can_close(lengths_mm, base_joints_M, platform_joints_P) else UNREACHABLE
     if inverse_norm(J, X) > AMPLIFICATION_LIMIT:
         return NEAR_SINGULAR
     x = X[0]
-    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes, hinges, radius_mm, x, J):
         return NEAR_SINGULAR
     for i in range(n):
         x[i] -= lengths_mm[i]
@@ -132,7 +134,8 @@ def _pose_from(
 def solve_forward(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
-    revolute_axes_P: FloatArray,
+    revolute_axes: FloatArray,
+    hinges: IntArray,
     lengths_mm: FloatArray,
     guess_origin_M: FloatArray,
     guess_R: FloatArray,
@@ -151,13 +154,13 @@ def solve_forward(
     closed_lengths_mm[:] = lengths_mm
     iterations[0] = 0
     residual_mm[0] = math.nan
-    if not pose_is_finite(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R) or not all_finite(lengths_mm):
+    if not pose_is_finite(base_joints_M, platform_joints_P, revolute_axes, origin_M, R) or not all_finite(lengths_mm):
         reason[0] = NOT_FINITE
     elif np.min(lengths_mm) <= 0.0:
         reason[0] = UNREACHABLE
     else:
         reason[0] = _pose_from(
-            base_joints_M, platform_joints_P, revolute_axes_P, lengths_mm, origin_M, R, iterations, residual_mm
+            base_joints_M, platform_joints_P, revolute_axes, hinges, lengths_mm, origin_M, R, iterations, residual_mm
         )
     if reason[0] == OK and is_turned_over(R, guess_R):
         reason[0] = OTHER_ASSEMBLY
@@ -168,6 +171,6 @@ def solve_forward(
 
 
 forward = kernel(
-    [MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
-    "(n,d),(n,d),(k,d),(n),(d),(d,d)->(d),(d,d),(n),(),(),()",
+    [MATRIX, MATRIX, MATRIX, INTEGER_ROWS, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
+    "(n,d),(n,d),(k,d),(k,c),(n),(d),(d,d)->(d),(d,d),(n),(),(),()",
 )(solve_forward)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
+from compd.jit import INTEGER_ROWS, INTEGERS, MATRIX, VECTOR, helper, kernel
 from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
 from compd.model.kernels.loop_closure import evaluate_closure, is_turned_over, platform_radius, pose_is_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NO_CONVERGENCE, NOT_FINITE, OK, OTHER_ASSEMBLY, UNREACHABLE
@@ -84,6 +84,7 @@ def _lengths_at(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
     revolute_axes_P: FloatArray,
+    hinges: IntArray,
     origin_M: FloatArray,
     R: FloatArray,
     lengths_mm: FloatArray,
@@ -97,7 +98,7 @@ def _lengths_at(
     pivot = np.empty(6, np.int64)
     if not radius_mm > 0.0:
         return NEAR_SINGULAR
-    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, hinges, radius_mm, x, J):
         return UNREACHABLE
     for i in range(n):
         lengths_mm[i] = x[i]
@@ -116,6 +117,7 @@ def solve_inverse(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
     revolute_axes_P: FloatArray,
+    hinges: IntArray,
     tip_M: FloatArray,
     tip_P: FloatArray,
     attitude_R: FloatArray,
@@ -142,7 +144,9 @@ def solve_inverse(
     if reason[0] == OK:
         for i in range(3):
             origin_M[i] = tip_M[i] - (R[i, 0] * tip_P[0] + R[i, 1] * tip_P[1] + R[i, 2] * tip_P[2])
-        reason[0] = _lengths_at(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R, lengths_mm, residual_mm)
+        reason[0] = _lengths_at(
+            base_joints_M, platform_joints_P, revolute_axes_P, hinges, origin_M, R, lengths_mm, residual_mm
+        )
     if reason[0] != OK:
         origin_M[:] = math.nan
         R[:, :] = math.nan
@@ -150,6 +154,6 @@ def solve_inverse(
 
 
 inverse = kernel(
-    [MATRIX, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
-    "(n,d),(n,d),(k,d),(d),(d),(d,d)->(d),(d,d),(n),(),(),()",
+    [MATRIX, MATRIX, MATRIX, INTEGER_ROWS, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
+    "(n,d),(n,d),(k,d),(k,c),(d),(d),(d,d)->(d),(d,d),(n),(),(),()",
 )(solve_inverse)

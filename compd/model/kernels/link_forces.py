@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
+from compd.jit import INTEGER_ROWS, INTEGERS, MATRIX, VECTOR, helper, kernel
 from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve
 from compd.model.kernels.loop_closure import evaluate_closure, platform_radius, pose_is_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NOT_FINITE, OK
@@ -19,7 +19,8 @@ from compd.model.structures import EffectMachine, EffectRow
 def solve_forces(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
-    revolute_axes_P: FloatArray,
+    revolute_axes: FloatArray,
+    hinges: IntArray,
     origin_M: FloatArray,
     R: FloatArray,
     force_M: FloatArray,
@@ -39,7 +40,7 @@ def solve_forces(
     lateral_N[:] = math.nan
     radius_mm = platform_radius(platform_joints_P)
     load = all_finite(force_M) and all_finite(at_M) and all_finite(weight_N) and all_finite(weight_at_P)
-    if not (load and pose_is_finite(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R)):
+    if not (load and pose_is_finite(base_joints_M, platform_joints_P, revolute_axes, origin_M, R)):
         reason[0] = NOT_FINITE
         return
     J = np.empty((6, 6))
@@ -48,7 +49,7 @@ def solve_forces(
     reason[0] = NEAR_SINGULAR
     if not radius_mm > 0.0:
         return
-    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, radius_mm, x, J):
+    if not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes, hinges, radius_mm, x, J):
         return
     for i in range(6):  # J^T
         for j in range(i):
@@ -72,8 +73,8 @@ def solve_forces(
 
 
 forces = kernel(
-    [MATRIX, MATRIX, MATRIX, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, INTEGERS],
-    "(n,d),(n,d),(k,d),(d),(d,d),(d),(d),(),(d)->(n),(k),()",
+    [MATRIX, MATRIX, MATRIX, INTEGER_ROWS, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, INTEGERS],
+    "(n,d),(n,d),(k,d),(k,c),(d),(d,d),(d),(d),(),(d)->(n),(k),()",
 )(solve_forces)
 
 
@@ -95,6 +96,7 @@ def set_axial_forces(row: EffectRow, machine: EffectMachine, force_M_N: FloatArr
         row.base_joints_M_mm[: machine.links],
         machine.platform_joints_P_mm[: machine.links],
         machine.revolute_axes_P[: machine.axes],
+        machine.hinges[: machine.axes],
         row.origin_M_mm,
         row.rotation_M_P,
         force_M_N,

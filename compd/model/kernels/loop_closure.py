@@ -1,12 +1,14 @@
 """The closure of the links: what a pose makes of link lengths and revolute axes, and the derivatives.
 
-One mechanism in two sizes, n + k = 6: the tripod (3-SPR) has n = 3 links and k = 3 revolute axes, the hexapod
-(6-UPS) n = 6 links and k = 0. With d_i = p + R c_i - a_i the link vector and u_i = d_i / |d_i|, the rows are
+A parallel machine is six equations for the six coordinates of its platform: n links and k hinges, n + k = 6. With
+d_i = p + R c_i - a_i the link vector and u_i = d_i / |d_i|, the rows are
 
-    |d_i|            for every link,            d|d_i| = u_i . v + (R c_i x u_i) . w
-    d_i . R e_i      for every revolute axis,   d(d_i . R e_i) = R e_i . v + (R e_i x (p - a_i)) . w
+    |d_i|         for every link,                          d|d_i| = u_i . v + (R c_i x u_i) . w
+    d_i . R e_h   for every hinge fixed to the platform,   d(d_i . R e_h) = R e_h . v + (R e_h x (p - a_i)) . w
+    d_i . e_h     for every hinge fixed to the base,       d(d_i . e_h) = e_h . v + (R c_i x e_h) . w
 
-for a displacement v and a rotation w of the platform about {M}'s axes through its origin; axis i belongs to link i.
+for a displacement v and a rotation w of the platform about {M}'s axes through its origin. Hinge h belongs to link
+i = hinges[h, 0]; hinges[h, 1] is 1 where its axis is fixed to the base (in {M}), 0 on the platform (in {P}).
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import math
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
+from compd.jit import INTEGER_ROWS, INTEGERS, MATRIX, VECTOR, helper, kernel
 from compd.linear import all_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NOT_FINITE, OK
 
@@ -30,7 +32,8 @@ def evaluate_closure(
     R: FloatArray,
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
-    revolute_axes_P: FloatArray,
+    revolute_axes: FloatArray,
+    hinges: IntArray,
     radius_mm: float,
     value_mm: FloatArray,
     J: FloatArray,
@@ -41,7 +44,7 @@ def evaluate_closure(
     every entry of J is a pure number and one norm serves both. False where a link has no length.
     """
     n = base_joints_M.shape[0]
-    k = revolute_axes_P.shape[0]
+    k = revolute_axes.shape[0]
     for i in range(n):
         cx, cy, cz = platform_joints_P[i, 0], platform_joints_P[i, 1], platform_joints_P[i, 2]
         rx = R[0, 0] * cx + R[0, 1] * cy + R[0, 2] * cz
@@ -59,21 +62,33 @@ def evaluate_closure(
         J[i, 3] = (ry * nz - rz * ny) / radius_mm
         J[i, 4] = (rz * nx - rx * nz) / radius_mm
         J[i, 5] = (rx * ny - ry * nx) / radius_mm
-    for i in range(k):
-        ex, ey, ez = revolute_axes_P[i, 0], revolute_axes_P[i, 1], revolute_axes_P[i, 2]
-        ax = R[0, 0] * ex + R[0, 1] * ey + R[0, 2] * ez
-        ay = R[1, 0] * ex + R[1, 1] * ey + R[1, 2] * ez
-        az = R[2, 0] * ex + R[2, 1] * ey + R[2, 2] * ez
+    for h in range(k):
+        i = hinges[h, 0]
+        ex, ey, ez = revolute_axes[h, 0], revolute_axes[h, 1], revolute_axes[h, 2]
+        cx, cy, cz = platform_joints_P[i, 0], platform_joints_P[i, 1], platform_joints_P[i, 2]
         qx = origin_M[0] - base_joints_M[i, 0]
         qy = origin_M[1] - base_joints_M[i, 1]
         qz = origin_M[2] - base_joints_M[i, 2]
+        if hinges[h, 1] == 1:
+            rx = R[0, 0] * cx + R[0, 1] * cy + R[0, 2] * cz
+            ry = R[1, 0] * cx + R[1, 1] * cy + R[1, 2] * cz
+            rz = R[2, 0] * cx + R[2, 1] * cy + R[2, 2] * cz
+            value_mm[n + h] = (qx + rx) * ex + (qy + ry) * ey + (qz + rz) * ez
+            J[n + h, 0], J[n + h, 1], J[n + h, 2] = ex, ey, ez
+            J[n + h, 3] = (ry * ez - rz * ey) / radius_mm
+            J[n + h, 4] = (rz * ex - rx * ez) / radius_mm
+            J[n + h, 5] = (rx * ey - ry * ex) / radius_mm
+            continue
+        ax = R[0, 0] * ex + R[0, 1] * ey + R[0, 2] * ez
+        ay = R[1, 0] * ex + R[1, 1] * ey + R[1, 2] * ez
+        az = R[2, 0] * ex + R[2, 1] * ey + R[2, 2] * ez
         # d . Re = (p - a) . Re + c . e: turning the platform leaves c . e as it is
-        turning = platform_joints_P[i, 0] * ex + platform_joints_P[i, 1] * ey + platform_joints_P[i, 2] * ez
-        value_mm[n + i] = qx * ax + qy * ay + qz * az + turning
-        J[n + i, 0], J[n + i, 1], J[n + i, 2] = ax, ay, az
-        J[n + i, 3] = (ay * qz - az * qy) / radius_mm
-        J[n + i, 4] = (az * qx - ax * qz) / radius_mm
-        J[n + i, 5] = (ax * qy - ay * qx) / radius_mm
+        turning = cx * ex + cy * ey + cz * ez
+        value_mm[n + h] = qx * ax + qy * ay + qz * az + turning
+        J[n + h, 0], J[n + h, 1], J[n + h, 2] = ax, ay, az
+        J[n + h, 3] = (ay * qz - az * qy) / radius_mm
+        J[n + h, 4] = (az * qx - ax * qz) / radius_mm
+        J[n + h, 5] = (ax * qy - ay * qx) / radius_mm
     return True
 
 
@@ -95,7 +110,7 @@ def platform_radius(platform_joints_P: FloatArray) -> float:
 def pose_is_finite(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
-    revolute_axes_P: FloatArray,
+    revolute_axes: FloatArray,
     origin_M: FloatArray,
     R: FloatArray,
 ) -> bool:
@@ -106,8 +121,8 @@ def pose_is_finite(
     for i in range(base_joints_M.shape[0]):
         if not (all_finite(base_joints_M[i]) and all_finite(platform_joints_P[i])):
             return False
-    for i in range(revolute_axes_P.shape[0]):
-        if not all_finite(revolute_axes_P[i]):
+    for i in range(revolute_axes.shape[0]):
+        if not all_finite(revolute_axes[i]):
             return False
     return all_finite(origin_M)
 
@@ -123,13 +138,14 @@ def is_turned_over(R: FloatArray, guess_R: FloatArray) -> bool:
 
 
 @kernel(
-    [MATRIX, MATRIX, MATRIX, VECTOR, MATRIX, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, MATRIX, INTEGERS],
-    "(n,d),(n,d),(k,d),(d),(d,d)->(n),(n,d),(n,d),(k),(k,d),(k,d),()",
+    [MATRIX, MATRIX, MATRIX, INTEGER_ROWS, VECTOR, MATRIX, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, MATRIX, INTEGERS],
+    "(n,d),(n,d),(k,d),(k,c),(d),(d,d)->(n),(n,d),(n,d),(k),(k,d),(k,d),()",
 )
 def closure(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
-    revolute_axes_P: FloatArray,
+    revolute_axes: FloatArray,
+    hinges: IntArray,
     origin_M: FloatArray,
     R: FloatArray,
     length_mm: FloatArray,
@@ -146,9 +162,9 @@ def closure(
     value_mm = np.empty(6)
     J = np.empty((6, 6))
     reason[0] = OK
-    if not pose_is_finite(base_joints_M, platform_joints_P, revolute_axes_P, origin_M, R):
+    if not pose_is_finite(base_joints_M, platform_joints_P, revolute_axes, origin_M, R):
         reason[0] = NOT_FINITE
-    elif not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes_P, 1.0, value_mm, J):
+    elif not evaluate_closure(origin_M, R, base_joints_M, platform_joints_P, revolute_axes, hinges, 1.0, value_mm, J):
         reason[0] = NEAR_SINGULAR
     if reason[0] != OK:
         value_mm[:] = math.nan

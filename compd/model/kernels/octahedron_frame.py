@@ -243,10 +243,18 @@ def solve_octahedron(
             supports_M[i, j] = guess_supports_M[i, j]
     iterations[0] = 0
     residual_mm[0] = math.nan
-    reason[0] = _supports_from(lengths_mm, plate_points_M, supports_M, iterations, residual_mm)
-    if reason[0] == OK and not place_base(supports_M, R, origin_M):
-        reason[0] = NEAR_SINGULAR
-    if reason[0] == OK:
+    if math.isnan(plate_points_M[0, 0]):  # without reference points the frame stands where it stood at machine zero
+        reason[0] = OK
+        residual_mm[0] = 0.0
+        origin_M[:] = zero_origin_M
+        R[:, :] = zero_R
+        displacement_M[:] = 0.0
+        rotation_M[:] = 0.0
+    else:
+        reason[0] = _supports_from(lengths_mm, plate_points_M, supports_M, iterations, residual_mm)
+        if reason[0] == OK and not place_base(supports_M, R, origin_M):
+            reason[0] = NEAR_SINGULAR
+    if reason[0] == OK and not math.isnan(plate_points_M[0, 0]):
         _compare(origin_M, R, zero_origin_M, zero_R, displacement_M, rotation_M)
         if max(max_abs(displacement_M) / np.min(lengths_mm), max_abs(rotation_M)) > FURTHEST:
             reason[0] = OTHER_ASSEMBLY

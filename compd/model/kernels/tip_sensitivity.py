@@ -29,7 +29,7 @@ def set_tip_by_closure(
     R = pose.rotation_M_P
     value_mm, J, pivot = np.empty(6), np.empty((6, 6)), np.empty(6, dtype=np.int64)
     base, platform, axes = base_joints_M_mm[:n], model.platform_joints_P_mm[:n], model.revolute_axes_P[:a]
-    if not evaluate_closure(pose.origin_M_mm, R, base, platform, axes, 1.0, value_mm, J):
+    if not evaluate_closure(pose.origin_M_mm, R, base, platform, axes, model.hinges[:a], 1.0, value_mm, J):
         return False
     if lu_factor(J, pivot) == 0.0:
         return False

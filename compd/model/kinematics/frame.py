@@ -16,7 +16,7 @@ from compd.model.kernels import edge_lengths, octahedron, place_base
 class FrameGeometry(NamedTuple):
     """What the frame is made of; every array may have leading axes.
 
-    plate_points_M_mm : (..., 3, 3), m1..m3.
+    plate_points_M_mm : (..., 3, 3), m1..m3; nan where the frame has no reference points: it stands still then.
     joint_offsets_B_mm : (..., n, 3), base joint minus its support, in {B} axes: these it keeps.
     support_of_joint : (n,), the support that carries joint i, counted from 0.
     zero_supports_M_mm : (..., 3, 3), b1..b3 at machine zero.

@@ -1,4 +1,6 @@
-"""Link lengths by equation (1), and forward and inverse kinematics of the tripod (3-SPR) and the hexapod (6-UPS).
+"""Link lengths by equation (1), and forward and inverse kinematics of links that end in known base joints.
+
+`compd.model.kinematics.actuators` has the inverse of machines whose actuators move the base joints.
 
 Everything is in {M}, with the base joints where the frame measurement finds them now: the same as working in {B} and
 transforming by equations (8) and (9), one transformation shorter.
@@ -11,6 +13,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
@@ -22,12 +25,15 @@ class Mechanism(NamedTuple):
 
     base_joints_M_mm : (..., n, 3), now, in {M}.
     platform_joints_P_mm : (..., n, 3).
-    revolute_axes_P : (..., k, 3), along the revolute axis of link i; k = 3 for the tripod, 0 for the hexapod.
+    revolute_axes : (..., k, 3), k = 6 - n, unit vectors of the hinges: in {P}, or in {M} where the base carries one.
+    hinges : (k, 2), the link of each hinge, from 0, and 1 where its axis is fixed to the base, 0 on the platform; None
+        where hinge i belongs to link i on the platform, as in a 3-SPR.
     """
 
     base_joints_M_mm: FloatArray
     platform_joints_P_mm: FloatArray
-    revolute_axes_P: FloatArray
+    revolute_axes: FloatArray
+    hinges: IntArray | None = None
 
 
 class Pose(NamedTuple):
@@ -86,14 +92,24 @@ def scale_for_length_mm(
 
 
 def check_mechanism(mechanism: Mechanism) -> Mechanism:
-    """The mechanism, if its arrays have the shapes of a tripod or a hexapod; else ValueError."""
-    base, axes = mechanism.base_joints_M_mm, mechanism.revolute_axes_P
-    if (base.shape[-2:], axes.shape[-2:]) not in (((3, 3), (3, 3)), ((6, 3), (0, 3))):
+    """The mechanism with its hinges, if its arrays have the shapes of n links and k = 6 - n hinges; else ValueError."""
+    base, axes, hinges = mechanism.base_joints_M_mm, mechanism.revolute_axes, mechanism.hinges
+    links, count = base.shape[-2], axes.shape[-2]
+    if links + count != 6 or links < 3 or base.shape[-1] != 3 or axes.shape[-1] != 3:
         raise ValueError(
-            f"a tripod has base joints (3, 3) and revolute axes (3, 3), a hexapod (6, 3) and (0, 3); "
+            f"n links have base joints (n, 3) and 6 - n hinges revolute axes (6 - n, 3), n from 3 to 6; "
             f"these are {base.shape[-2:]} and {axes.shape[-2:]}"
         )
-    return mechanism
+    if hinges is None:
+        hinges = hinges_on_platform(count)
+    if hinges.shape != (count, 2) or (count and not 0 <= hinges[:, 0].min() <= hinges[:, 0].max() < links):
+        raise ValueError(f"hinges are (k, 2), each on a link from 0 to {links - 1}; these are {hinges.tolist()}")
+    return mechanism._replace(hinges=hinges)
+
+
+def hinges_on_platform(count: int) -> IntArray:
+    """(count, 2) hinges whose axes are fixed to the platform, hinge i on link i."""
+    return np.stack([np.arange(count), np.zeros(count, dtype=np.int64)], axis=1)
 
 
 def forward_kinematics(
@@ -101,7 +117,7 @@ def forward_kinematics(
 ) -> Pose:
     """Pose from link lengths: the first step of equation (9).
 
-    Solves |p + R c_i - a_i| = l_i, and for the tripod (p + R c_i - a_i) . (R e_i) = 0, by Newton's method.
+    Solves |p + R c_i - a_i| = l_i, and (p + R c_i - a_i) . e_h = 0 of each hinge, by Newton's method.
 
     link_length_mm : (..., n).  guess_origin_M_mm : (..., 3), guess_rotation_M_P : (..., 3, 3), a pose in the same
     assembly: the last cycle's, or machine zero's.

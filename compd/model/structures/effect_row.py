@@ -44,6 +44,7 @@ MACHINE = np.dtype(
         ("axes", np.int64),
         ("platform_joints_P_mm", np.float64, (MAX_LINKS, 3)),
         ("revolute_axes_P", np.float64, (3, 3)),
+        ("hinges", np.int64, (3, 2)),
         ("tool_mm", np.float64, 3),
         ("tool_on_plate", np.int64),
         ("zero_directions_M", np.float64, (MAX_LINKS, 3)),

@@ -35,6 +35,7 @@ MODEL = np.dtype(
         ("zero_rotation_M_B", *_MATRIX),
         ("platform_joints_P_mm", *_POINTS),
         ("revolute_axes_P", *_MATRIX),
+        ("hinges", np.int64, (3, 2)),
         ("tool_mm", *_VECTOR),
         ("joint_weights", np.float64, (MAX_LINKS, MAX_JOINTS)),
         ("zero_base_joints_M_mm", *_POINTS),

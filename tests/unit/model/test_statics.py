@@ -44,8 +44,8 @@ def test_forces_and_moments_add_up_to_nothing(model: MachineModel) -> None:
     joints = pose.origin_M_mm + mechanism.platform_joints_P_mm @ pose.rotation_M_P.T
     along = (joints - mechanism.base_joints_M_mm) / pose.link_length_mm[:, None]
     on_platform = -forces.axial_N[:, None] * along  # tension pulls the platform towards the base joint
-    if len(mechanism.revolute_axes_P):
-        on_platform = on_platform + forces.lateral_N[:, None] * (mechanism.revolute_axes_P @ pose.rotation_M_P.T)
+    if len(mechanism.revolute_axes):
+        on_platform = on_platform + forces.lateral_N[:, None] * (mechanism.revolute_axes @ pose.rotation_M_P.T)
     weight = np.array([0.0, 0.0, -80.0])
     np.testing.assert_allclose(on_platform.sum(0) + force + weight, 0, atol=1e-9)
     moments = np.cross(mechanism.base_joints_M_mm, on_platform).sum(0)  # every link's force passes its base joint

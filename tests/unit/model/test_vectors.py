@@ -13,7 +13,7 @@ from compd.model.kinematics.link_kinematics import forward_kinematics, inverse_k
 from compd.model.kinematics.statics import link_forces
 from compd.model.kinematics.tool import Contact, ToolOnPlatform
 from compd.model.machine import MachineModel, MachineParts, machine_model
-from tests.support.model_machines import TRIPOD_WEIGHTS, Floats, column, worked_cases
+from tests.support.model_machines import TRIPOD_WEIGHTS, Floats, column, extending, worked_cases
 
 LENGTH_MM = 1e-9
 ANGLE_RAD = 1e-12
@@ -42,6 +42,7 @@ def tripod(tripod_cases: dict[str, Any]) -> MachineModel:
             supports_M_mm=supports,
             base_joints_M_mm=supports,
             support_of_joint=[0, 1, 2],
+            rotation_M_B=np.eye(3),
             plate_points_M_mm=geometry["plate_points_M"],
             platform_joints_P_mm=geometry["platform_joints_P"],
             revolute_axes_P=geometry["revolute_axes_P"],
@@ -49,6 +50,7 @@ def tripod(tripod_cases: dict[str, Any]) -> MachineModel:
             zero_contact=Contact(geometry["zero_tip_M"], geometry["tool_P"]),
             zero_rotation_M_P=None,
             joint_weights=TRIPOD_WEIGHTS,
+            **extending(3),
             weight_N=80.0,
             weight_at_P_mm=np.zeros(3),
         )
@@ -64,6 +66,7 @@ def hexapod(hexapod_cases: dict[str, Any]) -> MachineModel:
             supports_M_mm=geometry["support_points_B"] + origin,
             base_joints_M_mm=geometry["base_joints_B"] + origin,
             support_of_joint=geometry["support_of_leg"].astype(int) - 1,
+            rotation_M_B=np.eye(3),
             plate_points_M_mm=geometry["plate_points_M"],
             platform_joints_P_mm=geometry["platform_joints_P"],
             revolute_axes_P=np.empty((0, 3)),
@@ -71,6 +74,7 @@ def hexapod(hexapod_cases: dict[str, Any]) -> MachineModel:
             zero_contact=Contact(geometry["zero_platform_origin_M"] + geometry["tool_P"], geometry["tool_P"]),
             zero_rotation_M_P=np.eye(3),
             joint_weights=np.zeros((6, 0)),
+            **extending(6),
             weight_N=120.0,
             weight_at_P_mm=np.zeros(3),
         )

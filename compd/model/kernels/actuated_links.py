@@ -1,0 +1,345 @@
+"""Actuators that extend links or move base joints, and the inverse kinematics of a machine with them.
+
+With q the place of an actuator in mm and u, v unit vectors in {M}, the base joint and the length of its links are
+
+    EXTENDS    a = a0,                                            l = l0 + q
+    SLIDES     a = a0 + q u,                                      l = l0
+    TURNS      a = a0 + radius (cos(q/radius) u + sin(q/radius) v),   l = l0
+
+(q of a turning actuator is the arc, radius times the angle). The inverse solves the closure for the m actuators and the
+6 - m coordinates of the platform that the target leaves free, by Newton's method: six equations for six unknowns.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+from compd.jit import INTEGER_ROWS, INTEGERS, MATRIX, VECTOR, helper, kernel
+from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.model.kernels.loop_closure import evaluate_closure, is_turned_over, platform_radius, pose_is_finite
+from compd.model.kernels.reason_codes import NEAR_SINGULAR, NO_CONVERGENCE, NOT_FINITE, OK, OTHER_ASSEMBLY, UNREACHABLE
+from compd.model.kernels.solve_status import (
+    AMPLIFICATION_LIMIT,
+    ITERATION_LIMIT,
+    RESIDUAL_TOLERANCE_MM,
+    STEP_LIMIT,
+    STEP_TOLERANCE_MM,
+)
+from compd.rotation import orthonormalise, rotate_in_place
+
+EXTENDS, SLIDES, TURNS = range(3)
+
+
+@helper
+def place_links(
+    kinds: IntArray,
+    cosine_M: FloatArray,
+    sine_M: FloatArray,
+    radius_mm: FloatArray,
+    actuator_of_link: IntArray,
+    base_joints_M: FloatArray,
+    rod_length_mm: FloatArray,
+    actuator_mm: FloatArray,
+    joints_M: FloatArray,
+    lengths_mm: FloatArray,
+) -> None:
+    """Base joints (n, 3) and link lengths (n,) with the actuators at actuator_mm (m,); base_joints_M : at q = 0."""
+    for i in range(actuator_of_link.shape[0]):
+        a = actuator_of_link[i]
+        q = actuator_mm[a]
+        lengths_mm[i] = rod_length_mm[i] + (q if kinds[a] == EXTENDS else 0.0)
+        for j in range(3):
+            joints_M[i, j] = base_joints_M[i, j]
+            if kinds[a] == SLIDES:
+                joints_M[i, j] += q * cosine_M[a, j]
+            elif kinds[a] == TURNS:
+                angle = q / radius_mm[a]
+                joints_M[i, j] += radius_mm[a] * (math.cos(angle) * cosine_M[a, j] + math.sin(angle) * sine_M[a, j])
+
+
+@helper
+def closure_by_actuators(
+    kinds: IntArray,
+    cosine_M: FloatArray,
+    sine_M: FloatArray,
+    radius_mm: FloatArray,
+    actuator_of_link: IntArray,
+    hinges: IntArray,
+    actuator_mm: FloatArray,
+    J: FloatArray,
+    by_actuator: FloatArray,
+) -> None:
+    """Derivatives (6, m) of the closure's rows, |d_i| - l_i and the offsets of the hinges, by the actuators.
+
+    J : (6, 6) of `evaluate_closure`; its first three columns are the rows' directions.
+    """
+    n = actuator_of_link.shape[0]
+    by_actuator[:, :] = 0.0
+    for row in range(6):
+        a = actuator_of_link[row] if row < n else actuator_of_link[hinges[row - n, 0]]
+        if kinds[a] == EXTENDS:
+            by_actuator[row, a] = -1.0 if row < n else 0.0
+            continue
+        angle = actuator_mm[a] / radius_mm[a] if kinds[a] == TURNS else 0.0
+        for j in range(3):
+            along = cosine_M[a, j]
+            if kinds[a] == TURNS:
+                along = math.cos(angle) * sine_M[a, j] - math.sin(angle) * cosine_M[a, j]
+            by_actuator[row, a] -= J[row, j] * along
+
+
+@helper
+def _rows_by_tip(J: FloatArray, R: FloatArray, tip_P: FloatArray, radius_mm: float) -> None:
+    """J (6, 6) by the displacement of the tip and the rotation about it, in place of those of the origin of {P}."""
+    rx = (R[0, 0] * tip_P[0] + R[0, 1] * tip_P[1] + R[0, 2] * tip_P[2]) / radius_mm
+    ry = (R[1, 0] * tip_P[0] + R[1, 1] * tip_P[1] + R[1, 2] * tip_P[2]) / radius_mm
+    rz = (R[2, 0] * tip_P[0] + R[2, 1] * tip_P[1] + R[2, 2] * tip_P[2]) / radius_mm
+    for i in range(6):
+        J[i, 3] -= ry * J[i, 2] - rz * J[i, 1]
+        J[i, 4] -= rz * J[i, 0] - rx * J[i, 2]
+        J[i, 5] -= rx * J[i, 1] - ry * J[i, 0]
+
+
+@helper
+def _origin_at(tip_M: FloatArray, R: FloatArray, tip_P: FloatArray, origin_M: FloatArray) -> None:
+    for i in range(3):
+        origin_M[i] = tip_M[i] - (R[i, 0] * tip_P[0] + R[i, 1] * tip_P[1] + R[i, 2] * tip_P[2])
+
+
+@helper
+def _free_step(
+    J: FloatArray, by_actuator: FloatArray, fixed: IntArray, M: FloatArray, pivot: IntArray, x: FloatArray
+) -> float:
+    """Solve for the free coordinates and the actuators, x (6,) in place; returns the determinant's sign."""
+    column = 0
+    for c in range(6):
+        if fixed[c] == 0:
+            for i in range(6):
+                M[i, column] = J[i, c]
+            column += 1
+    for i in range(6):
+        for a in range(by_actuator.shape[1]):
+            M[i, column + a] = by_actuator[i, a]
+    sign = lu_factor(M, pivot)
+    if sign != 0.0:
+        lu_solve(M, pivot, x)
+    return sign
+
+
+@helper
+def _move_freely(
+    fixed: IntArray,
+    x: FloatArray,
+    share: float,
+    size_mm: float,
+    place: FloatArray,
+    R: FloatArray,
+    actuator_mm: FloatArray,
+) -> None:
+    """Take a share of the step x of `_free_step`, in the free coordinates and the actuators."""
+    turn = np.zeros(3)
+    column = 0
+    for c in range(6):
+        if fixed[c] == 0:
+            if c < 3:
+                place[c] += share * x[column]
+            else:
+                turn[c - 3] = share * x[column] / size_mm
+            column += 1
+    rotate_in_place(R, turn[0], turn[1], turn[2])
+    for a in range(actuator_mm.shape[0]):
+        actuator_mm[a] += share * x[column + a]
+
+
+@helper
+def _check_solution(
+    J: FloatArray, pivot: IntArray, residual_mm: float, same_sign: bool, R: FloatArray, attitude_R: FloatArray
+) -> int:
+    """The reason of a pose that Newton's method ended at; J is overwritten."""
+    if residual_mm > RESIDUAL_TOLERANCE_MM:
+        return NO_CONVERGENCE
+    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
+        return NEAR_SINGULAR
+    return OK if same_sign and not is_turned_over(R, attitude_R) else OTHER_ASSEMBLY
+
+
+@helper
+def _set_lone_extended(
+    kinds: IntArray,
+    actuator_of_link: IntArray,
+    rod_length_mm: FloatArray,
+    value_mm: FloatArray,
+    actuator_mm: FloatArray,
+    lengths_mm: FloatArray,
+) -> None:
+    """Where each actuator has one link, an extended one is as long as its joints are apart, to the last bit."""
+    for i in range(actuator_of_link.shape[0]):
+        a = actuator_of_link[i]
+        if kinds[a] == EXTENDS and actuator_of_link.shape[0] == kinds.shape[0]:
+            lengths_mm[i] += value_mm[i]
+            actuator_mm[a] = lengths_mm[i] - rod_length_mm[i]
+
+
+@helper
+def solve_actuated_inverse(
+    base_joints_M: FloatArray,
+    platform_joints_P: FloatArray,
+    revolute_axes: FloatArray,
+    hinges: IntArray,
+    kinds: IntArray,
+    cosine_M: FloatArray,
+    sine_M: FloatArray,
+    radius_mm: FloatArray,
+    actuator_of_link: IntArray,
+    rod_length_mm: FloatArray,
+    fixed: IntArray,
+    tip_M: FloatArray,
+    tip_P: FloatArray,
+    attitude_R: FloatArray,
+    guess_mm: FloatArray,
+    origin_M: FloatArray,
+    R: FloatArray,
+    actuator_mm: FloatArray,
+    lengths_mm: FloatArray,
+    joints_M: FloatArray,
+    iterations: IntArray,
+    residual_mm: FloatArray,
+    reason: IntArray,
+) -> None:
+    """See `compd.model.kinematics.actuators.inverse_by_actuators`."""
+    n, m = actuator_of_link.shape[0], kinds.shape[0]
+    actuator_mm[:] = guess_mm
+    R[:, :] = attitude_R
+    iterations[0], residual_mm[0] = 0, math.nan
+    size_mm = platform_radius(platform_joints_P)
+    place = tip_M.copy()
+    value, x = np.empty(6), np.empty(6)
+    J, M, by_actuator = np.empty((6, 6)), np.empty((6, 6)), np.empty((6, m))
+    pivot = np.empty(6, np.int64)
+    finite = pose_is_finite(base_joints_M, platform_joints_P, revolute_axes, tip_M, R)
+    finite &= all_finite(tip_P) and all_finite(guess_mm)
+    reason[0] = (OK if size_mm > 0.0 else NEAR_SINGULAR) if finite else NOT_FINITE
+    step, sign, first_sign = math.inf, 0.0, 0.0
+    while reason[0] == OK:
+        _origin_at(place, R, tip_P, origin_M)
+        place_links(
+            kinds, cosine_M, sine_M, radius_mm, actuator_of_link, base_joints_M, rod_length_mm, actuator_mm,
+            joints_M, lengths_mm,
+        )  # fmt: skip
+        if not evaluate_closure(origin_M, R, joints_M, platform_joints_P, revolute_axes, hinges, size_mm, value, J):
+            reason[0] = UNREACHABLE
+            break
+        value[:n] -= lengths_mm
+        if step <= STEP_TOLERANCE_MM:
+            break
+        if iterations[0] == ITERATION_LIMIT:
+            reason[0] = NO_CONVERGENCE
+            break
+        closure_by_actuators(kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, by_actuator)
+        _rows_by_tip(J, R, tip_P, size_mm)
+        x[:] = -value
+        sign = _free_step(J, by_actuator, fixed, M, pivot, x)
+        if sign == 0.0:
+            reason[0] = NEAR_SINGULAR
+            break
+        if iterations[0] == 0:
+            first_sign = sign
+        step = max_abs(x)
+        shortened = STEP_LIMIT * size_mm / max(step, STEP_LIMIT * size_mm)
+        _move_freely(fixed, x, shortened, size_mm, place, R, actuator_mm)
+        iterations[0] += 1
+    if reason[0] == OK:
+        orthonormalise(R)
+        residual_mm[0] = max_abs(value)
+        _set_lone_extended(kinds, actuator_of_link, rod_length_mm, value, actuator_mm, lengths_mm)
+        reason[0] = _check_solution(J, pivot, residual_mm[0], sign == first_sign, R, attitude_R)
+    if reason[0] != OK:
+        origin_M[:] = math.nan
+        R[:, :] = math.nan
+        actuator_mm[:] = math.nan
+        lengths_mm[:] = math.nan
+        joints_M[:, :] = math.nan
+
+
+actuated_inverse = kernel(
+    [
+        *[MATRIX, MATRIX, MATRIX, INTEGER_ROWS, INTEGERS, MATRIX, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
+        *[VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, INTEGERS, VECTOR, INTEGERS],
+    ],
+    "(n,d),(n,d),(k,d),(k,c),(m),(m,d),(m,d),(m),(n),(n),(s),(d),(d),(d,d),(m)->(d),(d,d),(m),(n),(n,d),(),(),()",
+)(solve_actuated_inverse)
+
+
+@kernel(
+    [INTEGERS, MATRIX, MATRIX, VECTOR, INTEGERS, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR],
+    "(m),(m,d),(m,d),(m),(n),(n,d),(n),(m)->(n,d),(n)",
+)
+def placed_links(
+    kinds: IntArray,
+    cosine_M: FloatArray,
+    sine_M: FloatArray,
+    radius_mm: FloatArray,
+    actuator_of_link: IntArray,
+    base_joints_M: FloatArray,
+    rod_length_mm: FloatArray,
+    actuator_mm: FloatArray,
+    joints_M: FloatArray,
+    lengths_mm: FloatArray,
+) -> None:
+    """See `compd.model.kinematics.actuators.links_at`."""
+    place_links(
+        kinds, cosine_M, sine_M, radius_mm, actuator_of_link, base_joints_M, rod_length_mm, actuator_mm, joints_M,
+        lengths_mm,
+    )  # fmt: skip
+
+
+@kernel(
+    [
+        *[MATRIX, MATRIX, MATRIX, INTEGER_ROWS, INTEGERS, MATRIX, MATRIX, VECTOR, INTEGERS],
+        *[VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, INTEGERS],
+    ],
+    "(n,d),(n,d),(k,d),(k,c),(m),(m,d),(m,d),(m),(n),(m),(d),(d,d),(s)->(s,m),()",
+)
+def pose_by_actuators(
+    joints_M: FloatArray,
+    platform_joints_P: FloatArray,
+    revolute_axes: FloatArray,
+    hinges: IntArray,
+    kinds: IntArray,
+    cosine_M: FloatArray,
+    sine_M: FloatArray,
+    radius_mm: FloatArray,
+    actuator_of_link: IntArray,
+    actuator_mm: FloatArray,
+    origin_M: FloatArray,
+    R: FloatArray,
+    six: FloatArray,
+    by_actuator: FloatArray,
+    reason: IntArray,
+) -> None:
+    """See `compd.model.kinematics.actuators.pose_derivatives`. `six` is not read: it gives the size of the result."""
+    m = kinds.shape[0]
+    value, x = np.empty(6), np.empty(6)
+    J, pivot = np.empty((6, 6)), np.empty(6, np.int64)
+    reason[0] = OK
+    if not (pose_is_finite(joints_M, platform_joints_P, revolute_axes, origin_M, R) and all_finite(actuator_mm)):
+        reason[0] = NOT_FINITE
+    elif not evaluate_closure(origin_M, R, joints_M, platform_joints_P, revolute_axes, hinges, 1.0, value, J):
+        reason[0] = NEAR_SINGULAR
+    if reason[0] == OK:
+        demand = np.empty((6, m))
+        closure_by_actuators(kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, demand)
+        if lu_factor(J, pivot) == 0.0:
+            reason[0] = NEAR_SINGULAR
+        else:
+            for a in range(m):
+                for i in range(6):
+                    x[i] = -demand[i, a]
+                lu_solve(J, pivot, x)
+                for i in range(6):
+                    by_actuator[i, a] = x[i]
+    if reason[0] != OK:
+        by_actuator[:, :] = math.nan
