@@ -39,9 +39,10 @@ _TILTED_RAD = 0.8
 def slips(document: Document, geometry: Geometry, model: MachineModel) -> Iterator[Problem]:
     """A warning for each."""
     yield from _crossed_links(document, model)
-    yield from _crossed_rods(document, geometry)
-    yield from _far_joints(document, geometry)
-    yield from _base_beside_plate(document, geometry)
+    if geometry.has_frame:
+        yield from _crossed_rods(document, geometry)
+        yield from _far_joints(document, geometry)
+        yield from _base_beside_plate(document, geometry)
     yield from axes_along_links(document, geometry)
     upright = Rotation.from_rotvec(geometry.base.rotation_B0_in_M_rad).inv() * Rotation.from_matrix(
         model.zero.rotation_M_P
@@ -88,7 +89,7 @@ def _crossed_rods(document: Document, geometry: Geometry) -> Iterator[Problem]:
 
 def _far_joints(document: Document, geometry: Geometry) -> Iterator[Problem]:
     supports_mm = np.array(geometry.base.supports_B_mm)
-    squares = _squares(np.array(geometry.base.joints_B_mm), supports_mm)
+    squares = _squares(np.array([rod.base_B_mm for rod in geometry.mechanism.rods]), supports_mm)
     own_mm = np.sqrt([squares[joint, support - 1] for joint, support in enumerate(geometry.base.support_of_joint)])
     allowed_mm = float(
         np.median(own_mm) + _FAR * np.sqrt(_squares(supports_mm, supports_mm)[np.triu_indices(3, 1)].min())

@@ -87,8 +87,16 @@ class Wiring(Section):
     """Assignment of gauges to the quantities of the machine."""
 
     scale: tuple[ScaleWire, ...] = Field(description="one entry for the linear scale of every link")
-    joint: tuple[JointWire, ...] = Field(description="one entry for every joint comparator")
-    frame: tuple[FrameWire, ...] = Field(description="one entry for each of the nine frame comparators")
+    joint: tuple[JointWire, ...] = Field(default=(), description="one entry for every joint comparator")
+    frame: tuple[FrameWire, ...] = Field(
+        default=(),
+        description="one entry for each of the nine frame comparators; none: the frame is taken to stand still",
+    )
+    frame_drift_um: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = Field(
+        default=None,
+        description="without frame comparators: standard uncertainty of the tip along each axis, um, from what the "
+        "frame moves between two machine zeros; left out: unknown, and with it the tip's",
+    )
     quantities: tuple[QuantityWire, ...] = Field(
         default=(), description="whatever else is measured: temperatures, forces, air pressure"
     )

@@ -40,7 +40,7 @@ def drift_costs(configuration: Configuration) -> list[DriftCost]:
     gauge_of = {length: gauge for gauge, lengths in measured_lengths(configuration).items() for length in lengths}
     lengths = [f"scale {link}" for link in range(1, model.links + 1)]
     lengths += [f"joint {k}" for k in range(1, len(configuration.wiring.joint) + 1)]
-    lengths += [f"frame {distance}" for distance in FRAME_DISTANCES]
+    lengths += [f"frame {distance}" for distance in FRAME_DISTANCES[: len(configuration.wiring.frame)]]
     drift_mm = DRIFT_UM / UM_PER_MM
     costs = []
     for number, length in enumerate(lengths):
@@ -56,7 +56,7 @@ def exchange_mm(configuration: Configuration) -> float:
     drift_mm = DRIFT_UM / UM_PER_MM
     errors_um = []
     for one, other in combinations(range(model.links), 2):
-        change_mm = np.zeros(model.links + len(configuration.wiring.joint) + len(FRAME_DISTANCES))
+        change_mm = np.zeros(model.links + len(configuration.wiring.joint) + len(configuration.wiring.frame))
         change_mm[one], change_mm[other] = drift_mm, -drift_mm
         errors_um.append(_tip_errors_um(model, change_mm)[0])
     return max(errors_um) / DRIFT_UM
@@ -95,5 +95,5 @@ def _in_B0(model: MachineModel, tip_M_mm: FloatArray) -> FloatArray:
 
 
 def _values(model: MachineModel, change_mm: FloatArray) -> GaugeValues:
-    n = model.links
-    return GaugeValues(change_mm[:n], change_mm[n:-9], change_mm[-9:], {})
+    n, k = model.links, model.joint_weights.shape[1]
+    return GaugeValues(change_mm[:n], change_mm[n : n + k], change_mm[n + k :], {})

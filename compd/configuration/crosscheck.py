@@ -209,13 +209,15 @@ def _is_whole(wiring: Any, kind: str, key: str) -> bool:
 
 def _frame_problems(sections: Sections) -> Iterator[Problem]:
     counts = Counter(wire.distance for _, wire in _entries(sections.wiring, "frame"))
+    if not counts:  # the frame is taken to stand still
+        return
     least = 1 if _is_whole(sections.wiring, "frame", "distance") else 0
     for distance in FRAME_DISTANCES:
         if not least <= counts[distance] <= 1:
             yield Problem(
                 where=sections.document.where(("wiring", "frame")),
                 what=f"frame distance {distance} is wired {counts[distance]} times",
-                allowed="t1..t3 and u1..u6, each exactly once",
+                allowed="t1..t3 and u1..u6, each exactly once; or none of them",
             )
 
 

@@ -110,9 +110,14 @@ def _half_frame(geometry: Any) -> Iterator[GeometryProblem]:
     supports = getattr(base, "supports_B_mm", None)
     plate = getattr(geometry, "plate_points_M_mm", None)
     # an unreadable key has a problem of its own
-    if base is None or not isinstance(geometry, Geometry) or (supports is None) == (plate is None):
+    if base is None or not isinstance(geometry, Geometry):
         return
-    missing = ("base", "supports_B_mm") if supports is None else ("plate_points_M_mm",)
+    if geometry.kinematics is None and supports is not None and len(base.support_of_joint) != geometry.links:
+        what = f"has {len(base.support_of_joint)} entries for {geometry.links} rods"
+        yield GeometryProblem(("base", "support_of_joint"), what, next_step="write one for each rod")
+    if (supports is None) == (plate is None):
+        return
+    missing: Location = ("base", "supports_B_mm") if supports is None else ("plate_points_M_mm",)
     yield GeometryProblem(missing, "is missing: frame comparators stand between supports and plate points")
 
 

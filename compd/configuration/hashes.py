@@ -57,6 +57,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "apart": None,
     "standing_temperature_K": VoteSettings().standing_temperature_K,
     "tip_error_um": None,
+    "frame_drift_um": None,
     "actuators": [],
     "rods": [],
     "hinges": [],

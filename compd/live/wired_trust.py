@@ -64,7 +64,7 @@ def wired_channels(configuration: Configuration, wires: MachineWires, model: Mac
     parts: list[tuple[Literal["scale", "joint", "frame"], int, str, float]] = [
         *(("scale", link, "", unknown) for link in range(1, len(wiring.scale) + 1)),
         *(("joint", joint.link, joint.role, unknown) for joint in wiring.joint),
-        *(("frame", 0, "", distance_mm[distance]) for distance in FRAME_DISTANCES),
+        *(("frame", 0, "", distance_mm[distance]) for distance in FRAME_DISTANCES[: len(wiring.frame)]),
     ]
     lengths = [
         WiredLength(kind, wire.meaning, wire.sign, link, role, length_mm, wire.noise.um / UM_PER_MM)

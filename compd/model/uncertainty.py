@@ -23,7 +23,8 @@ GAUGE_PORTS: tuple[Port, ...] = ("scale", "joint", "frame")
 class GaugeNoise(NamedTuple):
     """Standard deviation of one reading of each gauge.
 
-    scale_mm (n,), joint_mm (k,), frame_mm (9,).
+    scale_mm (n,), joint_mm (k,), frame_mm (9,), or (0,) of a frame that is not measured.
+    frame_drift_mm : of the tip along each axis, by what a frame moves that is not measured; 0 of one that is.
     quantities : of other gauges by name, in their own unit; one that is not named has an unknown noise.
     how : how the noise was found, for people.
     """
@@ -33,6 +34,7 @@ class GaugeNoise(NamedTuple):
     frame_mm: FloatArray
     quantities: Mapping[str, float] = MappingProxyType({})
     how: str = ""
+    frame_drift_mm: float = 0.0
 
     def at_port(self, port: Port) -> FloatArray:
         """Of the gauges of one of GAUGE_PORTS, mm."""

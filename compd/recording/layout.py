@@ -94,8 +94,8 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
                 allowed="approach_<i> for every scale, or none",
                 next_step="add or delete columns",
             )
-        # A link's change by interferometer needs no frame: the paper's figures 17 and 18.
-        if len(frame) < 9 and (frame or quantity != "link_length"):
+        # whether the machine has frame comparators at all, its configuration says: `machine_problems`
+        if 0 < len(frame) < 9:
             _add_missing([name for name in FRAME_COLUMNS if name not in frame], names, problems)
     links = tuple(_numbers(names, "reference_link", ending))
     axes = tuple(axis for axis in AXES if f"reference_{axis}_{ending}" in names)
@@ -112,10 +112,13 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
     return replace(layout, covariates=tuple(_covariates(names, layout)))
 
 
-def machine_problems(machine: str, counts: tuple[int, int], configuration: Configuration, where: str) -> list[Problem]:
-    """Contradictions to `configuration`: the machine's name, the numbers of scales and of joint comparators.
+def machine_problems(
+    machine: str, counts: tuple[int, int, int], quantity: str | None, configuration: Configuration, where: str
+) -> list[Problem]:
+    """Contradictions to `configuration`: the machine's name, and how many gauges of each kind were recorded.
 
-    counts : (scales, joint comparators). where : the sidecar, for messages.
+    counts : scales, joint comparators, frame comparators. quantity : of the reference; a link's change by
+        interferometer needs no frame (the paper's figures 17 and 18). where : the sidecar, for messages.
     """
     problems: list[Problem] = []
     if machine != configuration.machine:
@@ -130,10 +133,12 @@ def machine_problems(machine: str, counts: tuple[int, int], configuration: Confi
         )
     if machine == EXTERNAL:
         return problems
-    scales, joints = counts
+    scales, joints, frame = counts
+    wired_frame = frame if quantity == "link_length" and not frame else len(configuration.wiring.frame)
     comparisons = (
         ("scale", scales, len(configuration.wiring.scale), "scale_<i>_mm"),
         ("joint comparator", joints, len(configuration.wiring.joint), "joint_<k>_um"),
+        ("frame comparator", frame, wired_frame, "frame_t1_um ... frame_u6_um"),
     )
     for what, count, expected, column in comparisons:
         if count != expected:

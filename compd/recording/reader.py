@@ -31,5 +31,8 @@ def check_against(recording: Recording, configuration: Configuration) -> None:
     """Raise RecordingError if the recording is of another machine, by its name or its number of gauges."""
     scales = 0 if recording.scale_mm is None else recording.scale_mm.shape[1]
     joints = 0 if recording.joint_mm is None else recording.joint_mm.shape[1]
-    if problems := machine_problems(recording.machine, (scales, joints), configuration, str(recording.sidecar.path)):
+    frame = 0 if recording.frame_mm is None else recording.frame_mm.shape[1]
+    quantity = recording.reference.quantity if recording.reference else None
+    where = str(recording.sidecar.path)
+    if problems := machine_problems(recording.machine, (scales, joints, frame), quantity, configuration, where):
         raise RecordingError(problems)

@@ -108,8 +108,9 @@ class RecordingBuilder:
         if self._plate is not None and "ball" in table.columns:
             check_balls(table, self._plate, table_problems)
         if self._configuration is not None and sidecar is not None and sidecar.machine:
-            counts = (layout.scales, layout.joints)
-            problems += machine_problems(sidecar.machine, counts, self._configuration, str(sidecar.path))
+            counts = (layout.scales, layout.joints, len(FRAME_COLUMNS) if layout.frame else 0)
+            quantity = sidecar.reference.quantity if sidecar.reference else None
+            problems += machine_problems(sidecar.machine, counts, quantity, self._configuration, str(sidecar.path))
         problems += table_problems.problems
         if problems or sidecar is None:
             raise RecordingError(problems)

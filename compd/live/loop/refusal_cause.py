@@ -26,6 +26,8 @@ def refusal_cause(
     without = replace(machine, effects=())
     if int(compensate(without, values, target, _for(warm_start, machine, without))[0].reason):
         change_mm = np.concatenate([values.joint_mm, values.frame_mm])
+        if not len(change_mm):
+            return ""
         worst = int(np.argmax(np.abs(change_mm)))
         wire = wires.comparators.wires[worst]
         if abs(change_mm[worst]) > _IMPLAUSIBLE_MM:

@@ -26,15 +26,18 @@ def stated_noise(configuration: Configuration, wires: MachineWires, readings: in
     """Of the lengths, which are each the difference of two readings: now and at machine zero.
 
     At zero many readings are averaged, which makes them no better than one where the last digit stands still. None
-    where a length gauge states none: then the tip's uncertainty is not known.
+    where a length gauge states none, or where nothing is known of a frame that is not measured: then the tip's
+    uncertainty is not known.
 
     readings : as of which a length counts; of releases up to 0.2.0, 1.
     """
     lengths_mm = np.array([wire.noise.um * math.sqrt(readings) for wire in wires.length_wires]) / UM_PER_MM
-    if not np.isfinite(lengths_mm).all():
+    wiring = configuration.wiring
+    drift_um = 0.0 if wiring.frame else wiring.frame_drift_um
+    if drift_um is None or not np.isfinite(lengths_mm).all():
         return None
-    quantities = {quantity.name: quantity.noise for quantity in configuration.wiring.quantities if quantity.noise}
-    return _noise(lengths_mm, wires, quantities, "stated")
+    quantities = {quantity.name: quantity.noise for quantity in wiring.quantities if quantity.noise}
+    return _noise(lengths_mm, wires, quantities, "stated", drift_um / UM_PER_MM)
 
 
 def noise_now(
@@ -50,7 +53,7 @@ def noise_now(
     quantities = noise.quantities
     if beyond is not None:
         quantities = {name: math.hypot(sigma, beyond.by.get(name, 0.0)) for name, sigma in quantities.items()}
-    return _noise(np.fmax(stated_mm, scatter_mm), wires, quantities, "stated, or measured")
+    return _noise(np.fmax(stated_mm, scatter_mm), wires, quantities, "stated, or measured", noise.frame_drift_mm)
 
 
 def scatter_limits_mm(noise: GaugeNoise) -> FloatArray:
@@ -68,10 +71,17 @@ def _scatter_mm(noise: GaugeNoise, wires: MachineWires, snapshot: Snapshot) -> F
     return np.where(scatter_mm > scatter_limits_mm(noise), scatter_mm * math.sqrt(_READINGS), math.nan)
 
 
-def _noise(lengths_mm: FloatArray, wires: MachineWires, quantities: Mapping[str, float], how: str) -> GaugeNoise:
+def _noise(
+    lengths_mm: FloatArray, wires: MachineWires, quantities: Mapping[str, float], how: str, frame_drift_mm: float
+) -> GaugeNoise:
     links, joints = len(wires.scale.wires), wires.joints
     return GaugeNoise(
-        lengths_mm[:links], lengths_mm[links : links + joints], lengths_mm[links + joints :], quantities, how
+        lengths_mm[:links],
+        lengths_mm[links : links + joints],
+        lengths_mm[links + joints :],
+        quantities,
+        how,
+        frame_drift_mm,
     )
 
 
@@ -140,5 +150,8 @@ def tip_uncertainty(
     if machine.live_effects:
         variance += parameter_variance(derivatives.by_theta[None], machine.live_covariance)[0]
         covariance += derivatives.by_theta @ machine.live_covariance @ derivatives.by_theta.T
+    if noise.frame_drift_mm:
+        variance += noise.frame_drift_mm**2
+        covariance += noise.frame_drift_mm**2 * np.eye(3)
     by_noise_um = np.append(np.sqrt(np.maximum(variance, 0.0)), radius_95(covariance)) * UM_PER_MM
     return TipUncertainty(by_noise_um, np.ascontiguousarray(derivatives.by_gauge))

@@ -188,7 +188,7 @@ class MachineWires:
         self.comparators = Wires(
             [
                 *(wire(w.gauge, f"joint {k}", w.sign) for k, w in enumerate(wiring.joint, start=1)),
-                *(wire(frame[d].gauge, f"frame {d}", frame[d].sign) for d in FRAME_DISTANCES),
+                *(wire(frame[d].gauge, f"frame {d}", frame[d].sign) for d in FRAME_DISTANCES if d in frame),
             ]
         )
         self.joints = len(wiring.joint)

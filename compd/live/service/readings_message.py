@@ -80,7 +80,8 @@ def columns(wires: MachineWires) -> list[dict[str, Any]]:
     A length's column is sign * (reading - machine zero), in the unit at the end of its name. Any other quantity has no
     sign here and is recorded as it is read.
     """
-    names = [*scale_columns(len(wires.scale.wires)), *joint_columns(wires.joints), *FRAME_COLUMNS]
+    names = [*scale_columns(len(wires.scale.wires)), *joint_columns(wires.joints)]
+    names += FRAME_COLUMNS[: len(wires.frame.wires)]
     lengths: list[dict[str, Any]] = [
         {"column": name, "channel": wire.channel, "sign": wire.sign, "stale_after_s": wire.stale_after_s}
         for name, wire in zip(names, wires.length_wires, strict=True)

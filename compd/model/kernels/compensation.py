@@ -18,6 +18,7 @@ from compd.model.kernels.machine_solver import (
     forward_pose,
     inverse_pose,
     set_contact,
+    set_distances,
     solve_frame,
 )
 from compd.model.kernels.motion import advance_motion
@@ -62,8 +63,7 @@ def _solve_bare(
     w = min(r, warm.supports_M_mm.shape[0] - 1)
     n, k = model.links, joint_mm.shape[0]
     distances_mm = np.empty(9)
-    for i in range(9):
-        distances_mm[i] = model.zero_distances_mm[i] + frame_mm[i]
+    set_distances(model, frame_mm, distances_mm)
     frame, pose = result.bare_frame, result.bare_pose
     solve_frame(model, model.plate_points_M_mm, distances_mm, warm.supports_M_mm[w], frame)
     shorten_by_joints(model.joint_weights[:n, :k], joint_mm, contributions_mm[0], work.altered.joint_reason)

@@ -51,7 +51,7 @@ def set_row(
     for i in range(k):
         row.joint_mm[i] = joint_mm[i]
     for i in range(9):
-        row.frame_mm[i] = frame_mm[i]
+        row.frame_mm[i] = frame_mm[i] if i < frame_mm.shape[0] else 0.0
     for i in range(3):
         row.origin_M_mm[i] = pose.origin_M_mm[i]
         row.tip_M_mm[i] = tip_M_mm[i]
@@ -126,7 +126,8 @@ def _add_to_machine(
         distances_mm = np.empty(9)
         for i in range(9):
             plate_points_M_mm[i // 3, i % 3] = model.plate_points_M_mm[i // 3, i % 3] + added[plate + i]
-            distances_mm[i] = model.zero_distances_mm[i] + (frame_mm[i] + added[n + k + i])
+            shown_mm = frame_mm[i] if i < frame_mm.shape[0] else 0.0
+            distances_mm[i] = model.zero_distances_mm[i] + (shown_mm + added[n + k + i])
         solve_frame(model, plate_points_M_mm, distances_mm, nominal_frame.supports_M_mm, frame)
     for j in range(3):
         for i in range(n):

@@ -43,6 +43,15 @@ def solve_frame(
 
 
 @helper
+def set_distances(model: Any, frame_mm: FloatArray, distances_mm: FloatArray) -> None:
+    """The frame's nine distances, equations (6) and (7); frame_mm (9,), or (0,) where no comparator measures them."""
+    for i in range(9):
+        distances_mm[i] = model.zero_distances_mm[i]
+        if i < frame_mm.shape[0]:
+            distances_mm[i] += frame_mm[i]
+
+
+@helper
 def forward_pose(
     model: Any,
     base_joints_M_mm: FloatArray,

@@ -41,7 +41,9 @@ class EffectArrays(NamedTuple):
 
 
 class GaugeRows(NamedTuple):
-    """Changes since machine zero: scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9); time_s (N,), monotonic."""
+    """Changes since machine zero: scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9), or (N, 0) where no
+    comparator measures the frame; time_s (N,), monotonic.
+    """
 
     scale_mm: FloatArray
     joint_mm: FloatArray

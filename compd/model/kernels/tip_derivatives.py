@@ -15,7 +15,7 @@ from compd.jit import NUMBERS, helper, loop
 from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.effects_on_machine import set_row
 from compd.model.kernels.joints import shorten_by_joints
-from compd.model.kernels.machine_solver import forward_pose, set_contact, solve_frame
+from compd.model.kernels.machine_solver import forward_pose, set_contact, set_distances, solve_frame
 from compd.model.kernels.reason_codes import OK
 from compd.model.kernels.row_arguments import (
     EFFECT_ARRAYS,
@@ -109,8 +109,7 @@ def set_tip_derivatives(
     by_port[:, :] = by_theta[:, :] = by_quantity[:, :] = math.nan
     frame, pose = result.bare_frame, result.bare_pose
     distances_mm, length_mm = np.empty(9), np.empty(n)
-    for i in range(9):
-        distances_mm[i] = model.zero_distances_mm[i] + frame_mm[i]
+    set_distances(model, frame_mm, distances_mm)
     solve_frame(model, model.plate_points_M_mm, distances_mm, warm.supports_M_mm[0], frame)
     shorten_by_joints(model.joint_weights[:n, : joint_mm.shape[0]], joint_mm, length_mm, work.altered.joint_reason)
     for i in range(n):

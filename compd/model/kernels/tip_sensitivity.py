@@ -11,7 +11,7 @@ from compd.arrays import FloatArray, IntArray
 from compd.jit import helper
 from compd.linear import lu_factor, lu_solve
 from compd.model.kernels.loop_closure import evaluate_closure
-from compd.model.kernels.machine_solver import solve_frame
+from compd.model.kernels.machine_solver import set_distances, solve_frame
 
 # As `compd.model.sensitivity.DIFFERENCE_STEP_MM`.
 _STEP_MM = 1e-3
@@ -106,15 +106,14 @@ def set_tip_by_ports(
         for d in range(3):
             tip[c, tool + d] = R[d, c] if model.tool_on_plate else R[c, d]
     distances_mm, points_M_mm = np.empty(9), model.plate_points_M_mm.copy()
-    for i in range(9):
-        distances_mm[i] = model.zero_distances_mm[i] + frame_mm[i]
+    set_distances(model, frame_mm, distances_mm)
     for q in range(9):
         for sign in (1.0, -1.0):
             weight = sign / (2.0 * _STEP_MM)
             distances_mm[q] += sign * _STEP_MM
             solve_frame(model, model.plate_points_M_mm, distances_mm, frame.supports_M_mm, moved_frame)
             _add_moved_base(n, base, weight, moved_frame.base_joints_M_mm, tip, n + joints + q)
-            distances_mm[q] = model.zero_distances_mm[q] + frame_mm[q]
+            set_distances(model, frame_mm, distances_mm)
             if with_plate:
                 points_M_mm[q // 3, q % 3] += sign * _STEP_MM
                 solve_frame(model, points_M_mm, distances_mm, frame.supports_M_mm, moved_frame)
