@@ -322,7 +322,10 @@ def test_another_configuration_that_makes_no_difference_is_no_warning(tmp_path, 
     replay_command(tmp_path / "run", other, setpoints=False)
     err = capsys.readouterr().err
     assert "warning" not in err
-    assert "every setpoint is the one that was sent, the same to the last bit, though recorded with another configuration" in err
+    assert (
+        "every setpoint is the one that was sent, the same to the last bit, though recorded with another configuration"
+        in err
+    )
 
 
 def test_rows_without_a_cycle_are_told_and_not_everything_is_said_to_be_there(tmp_path, capsys):
