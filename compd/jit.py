@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import wraps
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
@@ -39,12 +39,9 @@ COUNT = int64
 FLAG = boolean
 
 
-def _cache_directory() -> str:
-    """Where compiled code is kept; "" where nothing can be written: then every start compiles anew, in seconds.
-
-    numba knows compiled code as outdated by the kernel's own file alone. The digest makes a change in a helper or a
-    limit count as well: no machine runs last version's kernels.
-    """
+@cache
+def kernel_digest() -> str:
+    """Hash of the sources of all kernels and helpers, hexadecimal."""
     here = Path(__file__).parent  # kernels and helpers are beside this file, and anywhere below model/
     files = [*sorted(here.glob("*.py")), *sorted((here / "model").rglob("*.py"))]
     texts = [file.read_bytes() for file in files]
@@ -53,11 +50,20 @@ def _cache_directory() -> str:
         for text in texts
         if any(mark in text for mark in (b"@helper", b"kernel(", b"@loop", b"structure(", b"_LIMIT = "))
     ]
-    digest = hashlib.sha256(b"".join(compiled)).hexdigest()[:12]
+    return hashlib.sha256(b"".join(compiled)).hexdigest()[:12]
+
+
+def _cache_directory() -> str:
+    """Where compiled code is kept; "" where nothing can be written: then every start compiles anew, in seconds.
+
+    numba knows compiled code as outdated by the kernel's own file alone. The digest makes a change in a helper or a
+    limit count as well: no machine runs last version's kernels.
+    """
+    here = Path(__file__).parent
     user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "compd"
     places = [Path(_config.CACHE_DIR)] if _config.CACHE_DIR else [here / "__pycache__", user]
     for place in filter(Path.is_absolute, places):
-        directory = place / f"kernels-{digest}"
+        directory = place / f"kernels-{kernel_digest()}"
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError:

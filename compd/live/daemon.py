@@ -22,6 +22,7 @@ import structlog
 from compd.clock import Clock, MonotonicClock
 from compd.configuration import Configuration, listed_code
 from compd.errors import DaemonError, StateError
+from compd.kernel_versions import kernel_versions
 from compd.line_settings import PushedLineSettings, powered
 from compd.live.acquisition import Acquisition, Votes
 from compd.live.loop import AdoptedModels, Commands, LoopTiming, Setpoint, build_pipeline
@@ -169,6 +170,7 @@ class Daemon:
             "machine": configuration.machine,
             "config_hash": configuration.config_hash,
             "links": configuration.geometry.links,
+            "computed_by": dict(kernel_versions()),
         }
         report = StatusReport(
             version=version,

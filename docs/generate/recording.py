@@ -40,8 +40,8 @@ without unit ends in `_1`. `compd diagnose` tries every such column as an explan
 CYCLES = f"""\
 `compd record` also writes `NAME{CYCLES_SUFFIX}`: first the daemon's `VERSION` and its answer to `WATCH`, then for every
 row the [`READINGS`](#protocol-readings) message as it came, line for line. Each message has all that its cycle computed
-from, so `compd replay` computes the same setpoint again, bit for bit. Model files that were in use are copied beside
-it.
+from, so `compd replay` computes the same setpoint again: bit for bit with the kernels that `VERSION` names
+(`computed_by`), within 1e-12 mm with others. Model files that were in use are copied beside it.
 
 `compd record --format parquet` writes the open part as `NAME.arrow`, an Arrow stream of the same columns, which can be
 read to its last whole batch whatever ends the process; a part that is closed is `NAME.parquet`.

@@ -12,9 +12,11 @@ import numpy as np
 
 from compd.clock import MonotonicClock
 from compd.gauge import Quality
+from compd.kernel_versions import kernel_versions
 from compd.live.loop import CyclePacker, CycleUnpacker, Directions, Target
 from compd.live.record import Recorder, RecordingLimits
 from compd.live.service import ReadingsMessage
+from compd.release import __version__
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine
 
 ROOMY = RecordingLimits(part_bytes=10**9, part_s=1e9, limit_bytes=10**10, drop_oldest=False)
@@ -33,10 +35,11 @@ class Run:
         self.version = {
             "class": "VERSION",
             "protocol": 1,
-            "release": "1.2",
+            "release": __version__,
             "machine": machine.configuration.machine,
             "config_hash": machine.configuration.config_hash,
             "links": machine.configuration.geometry.links,
+            "computed_by": dict(kernel_versions()),
         }
         self.watch = {"class": "WATCH", "what": "readings", "columns": self.transcript.columns}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,23 +22,29 @@ def replay(
     ] = None,
     setpoints: Annotated[bool, typer.Option(help="Print the resulting setpoints, one per line.")] = False,
 ) -> None:
-    """Compute a recorded run again and compare its setpoints with the sent ones, bit for bit.
+    """Compute a recorded run again and compare its setpoints with the sent ones, which are one of three.
 
-    Orders that clients gave meanwhile are listed. Exit code 1 when one differs, when rows of the CSV have no cycle, or
+    The same to the last bit; within 1e-12 mm by another kernel, whose versions are named; or different. Orders that
+    clients gave meanwhile are listed. Exit code 1 when a setpoint is different, when rows of the CSV have no cycle, or
     when a cell of the CSV is not what its cycle says.
     """
     from compd.configuration import load
-    from compd.live.record import RecordedCycles, ReplayedCycle, differing_cells, replay_cycles
+    from compd.kernel_versions import versions_text_here
+    from compd.live.record import Agreement, RecordedCycles, ReplayedCycle, differing_cells, replay_cycles
 
     configuration = load(machine)
     transcripts = RecordedCycles(name)
-    cycles = differing = 0
+    cycles = differing = rounded = 0
     first: ReplayedCycle | None = None
+    kernels: dict[str, None] = {}  # in the order in which they computed
     for cycle in replay_cycles(configuration, transcripts, model or ()):
         cycles += 1
         if cycle.differs:
             differing += 1
             first = first or cycle
+        rounded += cycle.agreement is Agreement.ANOTHER_KERNEL
+        if cycle.agreement is not Agreement.SAME:
+            kernels[cycle.computed_by] = None
         if setpoints:
             typer.echo(cycle.replayed, nl=False)
     for order in transcripts.orders:
@@ -57,16 +63,29 @@ def replay(
     if first is None:
         same = f", though {another}" if others else ""
         changed = "; the CSV is not what was recorded" if cells else ""
-        typer.echo(f"{cycles} cycles replayed; every setpoint is the one that was sent{same}{changed}", err=True)
+        agrees = Agreement.SAME if not rounded else Agreement.ANOTHER_KERNEL
+        some = f" ({rounded} of them; the others to the last bit)" if 0 < rounded < cycles else ""
+        text = f"every setpoint is the one that was sent, {agrees}{some}"
+        typer.echo(f"{cycles} cycles replayed; {text}{same}{changed}", err=True)
+        _tell_kernels(kernels, versions_text_here())
         if lacking or cells:
             raise typer.Exit(1)
         return
     typer.echo(f"{differing} of {cycles} setpoints differ; the first is tick {first.tick}, {first.where}", err=True)
     typer.echo(f"    sent     {first.sent.decode().rstrip()}", err=True)
     typer.echo(f"    replayed {first.replayed.decode().rstrip()}", err=True)
+    _tell_kernels(kernels, versions_text_here())
     if others:
         typer.echo(another, err=True)
     raise typer.Exit(1)
+
+
+def _tell_kernels(kernels: Iterable[str], here: str) -> None:
+    """Which kernels computed setpoints that are not the same to the last bit, where they are not those of `here`."""
+    if others := [text for text in kernels if text != here]:
+        for text in others:
+            typer.echo(f"    recorded by {text}", err=True)
+        typer.echo(f"    replayed by {here}", err=True)
 
 
 def _order_text(order: Mapping[str, Any]) -> str:

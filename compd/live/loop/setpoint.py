@@ -25,6 +25,7 @@ from compd.live.loop.packet_layout import (
     PACKET_SIZE,
 )
 from compd.setpoint_states import Mode, State
+from compd.units import UM_PER_MM
 
 # 0.1 nm: a hundredth of the resolution of the best comparators.
 _DECIMALS_MM = 7
@@ -129,6 +130,14 @@ class Setpoint(NamedTuple):
 
         Raises ValueError where a value is not finite.
         """
+        return setpoint_line(self.message())
+
+    def message(self, moved_mm: float = 0.0) -> dict[str, Any]:
+        """The keys of its JSON. Raises ValueError where a value is not finite.
+
+        moved_mm : added to every computed number before it is rounded: as much of the last decimal of an angle, and of
+            an uncertainty, as it is of the last decimal of a length.
+        """
         message: dict[str, Any] = {
             "class": "SETPOINT",
             "seq": self.seq,
@@ -148,10 +157,10 @@ class Setpoint(NamedTuple):
         if math.isfinite(self.skew_s):
             message["skew_s"] = round(self.skew_s, _DECIMALS_S)
         if self.values is not None:
-            message |= self._json_values(self.values)
-        return setpoint_line(message)
+            message |= self._json_values(self.values, moved_mm)
+        return message
 
-    def _json_values(self, values: Compensation) -> dict[str, Any]:
+    def _json_values(self, values: Compensation, moved_mm: float) -> dict[str, Any]:
         """The values as rounded lists, under their keys in the message."""
         frame, contributions = values.frame, values.contributions
         vectors = [
@@ -166,7 +175,7 @@ class Setpoint(NamedTuple):
         if self.tool_on_plate:
             vectors.append(values.tip_P_mm)
         # rounding one long array costs as much as rounding one of three elements
-        lengths = _rounded(np.concatenate(vectors), _DECIMALS_MM)
+        lengths = _rounded(np.concatenate(vectors), _DECIMALS_MM, moved_mm)
         n = len(values.correction_mm)
         message: dict[str, Any] = {
             "tip_M_mm": lengths[:3],
@@ -177,22 +186,23 @@ class Setpoint(NamedTuple):
             "frame": {
                 "origin_M_mm": lengths[6:9],
                 "displacement_M_mm": lengths[9:12],
-                "rotation_M_rad": _rounded(frame.rotation_M_rad, _DECIMALS_RAD),
+                "rotation_M_rad": _rounded(frame.rotation_M_rad, _DECIMALS_RAD, moved_mm),
             },
             "sources_mm": dict(
-                zip(contributions.causes, _rounded(contributions.by_cause_mm, _DECIMALS_MM), strict=True)
+                zip(contributions.causes, _rounded(contributions.by_cause_mm, _DECIMALS_MM, moved_mm), strict=True)
             ),
         }
         if self.tool_on_plate:
             message["tip_P_mm"] = lengths[12 + 3 * n :]
         u_tip_um = self.u_tip_um
         if isinstance(u_tip_um, float):
-            message["u_tip_um"] = round(u_tip_um, _DECIMALS_UM) if math.isfinite(u_tip_um) else None
+            moved_um = u_tip_um + moved_mm * UM_PER_MM
+            message["u_tip_um"] = round(moved_um, _DECIMALS_UM) if math.isfinite(moved_um) else None
         elif u_tip_um is not None and math.isfinite(u_tip_um.sum()):
-            message["u_tip_um"] = _rounded(u_tip_um, _DECIMALS_UM)
+            message["u_tip_um"] = _rounded(u_tip_um, _DECIMALS_UM, moved_mm)
         if self.shadow is not None:
             message["shadow"] = {
-                name: field if isinstance(field, str) else _rounded(field, _DECIMALS_MM)
+                name: field if isinstance(field, str) else _rounded(field, _DECIMALS_MM, moved_mm)
                 for name, field in self.shadow._asdict().items()
                 if field is not None
             }
@@ -253,8 +263,10 @@ def _target_named(target: Target) -> dict[str, Any]:
     return named if target.id is None else named | {"target_id": target.id}
 
 
-def _rounded(values: FloatArray, decimals: int) -> list[Any]:
+def _rounded(values: FloatArray, decimals: int, moved_mm: float) -> list[Any]:
     """The values (k,) or (l, k) as rounded lists. Raises ValueError where one is not finite, which JSON lacks."""
+    if moved_mm:
+        values = values + moved_mm * 10.0 ** (_DECIMALS_MM - decimals)
     lists: list[Any] = values.round(decimals).tolist()
     if not math.isfinite(sum(lists) if values.ndim == 1 else sum(map(sum, lists))):
         raise ValueError("a value of the setpoint is not finite")

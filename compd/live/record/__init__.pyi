@@ -1,3 +1,4 @@
+from .agreement import Agreement as Agreement
 from .compared_table import differing_cells as differing_cells
 from .readings_feed import ReadingsFeed as ReadingsFeed
 from .recorder import Recorder as Recorder

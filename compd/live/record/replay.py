@@ -12,6 +12,7 @@ from typing import NamedTuple
 from compd.columns import SKEW_COLUMN
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
+from compd.kernel_versions import versions_text, versions_text_here
 from compd.live.loop import (
     CycleInputs,
     CycleSettings,
@@ -23,6 +24,7 @@ from compd.live.loop import (
     step,
 )
 from compd.live.machine import LiveModel, Models
+from compd.live.record.agreement import Agreement, agreement
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER
 from compd.live.record.table_rows import Message
 from compd.live.service import FORMER_TIP_NOISE, RecordedCycle, parse_readings
@@ -30,7 +32,8 @@ from compd.recording import ARROW, OpenPart
 from compd.table_file import CSV, SUFFIXES, row_count
 
 # Of a part's messages the first two say who spoke, and what the columns are.
-_FIRST_CLASSES = ("VERSION", "WATCH")
+_VERSION = "VERSION"
+_FIRST_CLASSES = (_VERSION, "WATCH")
 # The daemon writes the class first.
 _ORDER_BEGINS = f'{{"class":"{ORDER}",'.encode()
 
@@ -40,16 +43,20 @@ class ReplayedCycle(NamedTuple):
 
     where : file and line of its READINGS message. tick : number of the cycle.
     sent, replayed : the SETPOINT line that was sent, and the one that is computed now.
+    agreement : how far the two agree.
+    computed_by : the release and the kernels that computed the first, as a text.
     """
 
     where: str
     tick: int
     sent: bytes
     replayed: bytes
+    agreement: Agreement
+    computed_by: str
 
     @property
     def differs(self) -> bool:
-        return self.sent != self.replayed
+        return self.agreement is Agreement.DIFFERENT
 
 
 class RecordedCycles:
@@ -58,6 +65,7 @@ class RecordedCycles:
     Attributes
     ----------
     torn_lines : how many lines were cut off by a kill.
+    version : the VERSION message of the part that is being read; {} before the first.
     orders : the ORDER messages among the cycles that have been read: who ordered what meanwhile; none of daemons up to
         0.3.0.
     """
@@ -73,6 +81,7 @@ class RecordedCycles:
         path = name.with_name(stem + CYCLES_SUFFIX)
         self.paths = [path] if path.is_file() else sorted(name.parent.glob(f"{stem}-[0-9]*{CYCLES_SUFFIX}"))
         self.torn_lines = 0
+        self.version: Message = {}
         self.orders: list[Message] = []
         if not self.paths:
             raise RecordingError(
@@ -104,6 +113,8 @@ class RecordedCycles:
             for where, message in self.messages(path):
                 if message.get("class") == "READINGS":
                     yield where, message
+                elif message.get("class") == _VERSION:
+                    self.version = message
                 elif message.get("class") == ORDER:
                     self.orders.append(message)
 
@@ -161,6 +172,7 @@ def replay_cycles(
     read = [pipeline.loader.read(file, plausible=False) for file in files]
     models = {"": pipeline.loader.without_effects} | {model.hash: model for model in read}
     former = _former_settings(pipeline, configuration)
+    here = versions_text_here()
     for where, message in recording.cycles():
         recorded = _recorded_cycle(where, message, pipeline.latest.channels, configuration.geometry.links)
         applied = _model(where, message.get("model", ""), models)
@@ -174,7 +186,10 @@ def replay_cycles(
             setpoint, _ = step(state, inputs, pipeline.settings)
         if SKEW_COLUMN not in message["setpoint"]:  # nor had the setpoints of releases up to 0.2.0
             setpoint = setpoint._replace(skew_s=math.nan)
-        yield ReplayedCycle(where, inputs.tick, recorded.setpoint_line, setpoint.to_json())
+        sent, line = recorded.setpoint_line, setpoint.to_json()
+        computed_by = versions_text(recording.version.get("release"), recording.version.get("computed_by"))
+        agrees = agreement(sent, setpoint, another_kernel=computed_by != here)
+        yield ReplayedCycle(where, inputs.tick, sent, line, agrees, computed_by)
 
 
 def _former_settings(pipeline: Pipeline, configuration: Configuration) -> CycleSettings:

@@ -16,6 +16,8 @@ from compd.cli.live.replay import replay as replay_command
 from compd.errors import Problem, RecordingError, StateError
 from compd.live.loop.cycle import step
 from compd.live.machine.model_loader import Models
+from compd.kernel_versions import versions_text_here
+from compd.live.record.agreement import Agreement
 from compd.live.record.compared_table import differing_cells
 from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.live.service.readings_message import parse_readings
@@ -277,7 +279,7 @@ def test_the_command_says_that_nothing_differs_and_prints_setpoints(tmp_path, ca
     shipped_run(tmp_path)
     replay_command(tmp_path / "run", CONFIG / "tripod-cmm.yaml", setpoints=True)
     out, err = capsys.readouterr()
-    assert err == "30 cycles replayed; every setpoint is the one that was sent\n"
+    assert err == "30 cycles replayed; every setpoint is the one that was sent, the same to the last bit\n"
     assert [json.loads(line)["class"] for line in out.splitlines()] == ["SETPOINT"] * 30
 
 
@@ -320,7 +322,10 @@ def test_another_configuration_that_makes_no_difference_is_no_warning(tmp_path, 
     replay_command(tmp_path / "run", other, setpoints=False)
     err = capsys.readouterr().err
     assert "warning" not in err
-    assert "every setpoint is the one that was sent, though recorded with another configuration" in err
+    assert (
+        "every setpoint is the one that was sent, the same to the last bit, though recorded with another configuration"
+        in err
+    )
 
 
 def test_rows_without_a_cycle_are_told_and_not_everything_is_said_to_be_there(tmp_path, capsys):
@@ -417,3 +422,55 @@ def test_a_path_that_some_client_has_told_is_neither_waited_for_nor_copied(tmp_p
     assert f"{files[0]} cannot be read: it is not a regular file" in "\n".join(reports)
     assert f"{files[1]} has changed since the daemon read it" in "\n".join(reports)
     assert not list(tmp_path.glob("run*.model-*"))
+
+
+def by_another_kernel(message):
+    message["computed_by"]["llvm"] = "1.2.3"
+
+
+@pytest.mark.parametrize(
+    ("off_mm", "another", "agrees"),
+    [
+        (5e-13, True, Agreement.ANOTHER_KERNEL),
+        (5e-13, False, Agreement.DIFFERENT),
+        (5e-12, True, Agreement.DIFFERENT),
+        (-5e-13, False, Agreement.SAME),
+    ],
+)
+def test_another_kernel_may_differ_by_what_rounding_makes_of_1e_12_mm(
+    tmp_path, capsys, monkeypatch, off_mm, another, agrees
+):
+    """Every tip lies `off_mm` beyond the place at which it is rounded to another digit than the one that was sent."""
+
+    def beside(state, inputs, settings):
+        setpoint, after = step(state, inputs, settings)
+        if setpoint.seq % 2 == 0:
+            tip_mm = setpoint.values.tip_M_mm.round(7) + 0.5e-7 + off_mm
+            setpoint = setpoint._replace(values=setpoint.values._replace(tip_M_mm=tip_mm))
+        return setpoint, after
+
+    shipped_run(tmp_path)
+    if another:
+        altered(tmp_path / "run-0001.cycles.jsonl", 0, by_another_kernel)
+    monkeypatch.setattr("compd.live.record.replay.step", beside)
+    if agrees is Agreement.DIFFERENT:
+        with pytest.raises(typer.Exit):
+            replay_command(tmp_path / "run", CONFIG / "tripod-cmm.yaml")
+    else:
+        replay_command(tmp_path / "run", CONFIG / "tripod-cmm.yaml")
+    said = capsys.readouterr().err
+    assert ("15 of 30 setpoints differ" in said) == (agrees is Agreement.DIFFERENT)
+    assert (f"sent, {agrees}" in said) == (agrees is not Agreement.DIFFERENT)
+    assert ("15 of them" in said) == (agrees is Agreement.ANOTHER_KERNEL)
+    assert ("llvm 1.2.3" in said) == another
+    assert (f"replayed by {versions_text_here()}" in said) == another
+
+
+@pytest.mark.parametrize("change", [change_reading, change_setpoint, change_time])
+def test_another_kernel_excuses_no_other_number(tmp_path, change):
+    run = shipped_run(tmp_path)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    altered(path, 0, lambda message: message.pop("computed_by"))
+    altered(path, 21, change)
+    different = [cycle for cycle in replay_cycles(run.machine.configuration, RecordedCycles(path)) if cycle.differs]
+    assert [(cycle.tick, cycle.where) for cycle in different] == [(20, f"{path}:22")]

@@ -33,6 +33,11 @@ class VersionKeys(SentMessage):
     machine: str = Field(description="the machine's name in the configuration")
     config_hash: str = Field(description="hash of the whole configuration, hexadecimal")
     links: int = Field(description="number of links: 3 or 6")
+    computed_by: dict[str, str] | None = Field(
+        default=None,
+        description="what the last bits of a setpoint follow from, by name: `kernels` (hash of their source), `numba`, "
+        "`llvm`, `numpy`, `processor`; none of daemons up to 0.2.0",
+    )
 
 
 class ErrorKeys(SentMessage):
