@@ -1,5 +1,6 @@
 from .compensation import compensate_cmm as compensate_cmm
 from .compensation import compensate_machine_tool as compensate_machine_tool
+from .external import external_as_applied as external_as_applied
 from .values import Compensation as Compensation
 from .values import GaugeValues as GaugeValues
 from .values import WarmStart as WarmStart

@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compd.arrays import FloatArray
+from compd.compensation.external import compensate_external
 from compd.compensation.rows import Rows, kernel_rows
 from compd.compensation.values import Compensation, Contributions, GaugeValues, Wanted, WarmStart
 from compd.errors import KinematicsError, Problem
 from compd.model import EffectInputs, EffectMemory, MachineModel, PackedMemory, python_effects
 from compd.model.effects import Memory
+from compd.model.external import ExternalModel, given_pose
 from compd.model.kernels import GivenRows, RowOptions, SolvedRows, compensate_rows
 from compd.model.kinematics import Frame, Pose
 from compd.model.structures import RESULT, WORKSPACE
@@ -47,6 +49,11 @@ def compensate_machine_tool(
     A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
     Raises KinematicsError for an attitude asked of a tripod.
     """
+    if isinstance(model, ExternalModel):
+        at_pose = model
+        if model.given is None:
+            at_pose = model.with_pose(given_pose(target_mm, target_rotation_B0_rad, None, model.links))
+        return compensate_external(at_pose, values, warm, commanded=True)
     attitude_M_P = _attitude(model, target_rotation_B0_rad, warm)
     contact = model.arrangement.target_contact(model.frame, target_mm)
     return _compensate(model, values, warm, Wanted(*contact, attitude_M_P))
@@ -59,6 +66,8 @@ def compensate_cmm(model: MachineModel, values: GaugeValues, warm: WarmStart) ->
     takes the tip to be.
     A row's reason says why it failed (NOT_FINITE, UNREACHABLE, NO_CONVERGENCE, NEAR_SINGULAR, OTHER_ASSEMBLY).
     """
+    if isinstance(model, ExternalModel):
+        return compensate_external(model, values, warm)
     return _compensate(model, values, warm, None)
 
 

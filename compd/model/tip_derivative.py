@@ -11,6 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.model.effect_memory import EffectMemory
 from compd.model.effects import Observations, evaluate_basis
+from compd.model.external import ExternalModel, external_tip_derivatives
 from compd.model.kernels import GaugeRows, SolvedRows, TipDerivativeArrays, WarmRows, set_tip_derivatives
 from compd.model.kinematics import Movement
 from compd.model.machine import MachineModel
@@ -53,6 +54,10 @@ def tip_derivatives(
     The noise of the scales also changes what an effect at the port `scale` adds; that is left out: at most a few per
     cent of the noise itself.
     """
+    if isinstance(model, ExternalModel):
+        return TipDerivatives(
+            *external_tip_derivatives(model, scale_mm, quantities, quantities_at_zero, sigmas, time_s, effects)
+        )
     program = model.program
     packed = effects.pack(model, len(joint_mm))
     values = np.array([quantities[name] for name in program.quantities], dtype=np.float64)
