@@ -66,6 +66,7 @@ def examine_whole(path: Path) -> Examined:
                 warnings += [
                     *_stroke_warnings(document, examined.geometry, model),
                     *slips(document, examined.geometry, model),
+                    *_not_served(document, model),
                 ]
     sockets, state = _section(SocketSettings, document, "sockets"), _section(StateSettings, document, "state")
     effects = readable(SECTIONS["effects"], document.value(("effects",))) or ()
@@ -77,6 +78,14 @@ def examine_whole(path: Path) -> Examined:
     if configuration is not None:
         configuration = None if problems else replace(configuration, warnings=tuple(warnings))
     return examined._replace(configuration=configuration, problems=problems, warnings=warnings)
+
+
+def _not_served(document: Document, model: MachineModel) -> Iterator[Problem]:
+    """A warning where compensation and predictions do not take the machine."""
+    try:
+        model.structure  # noqa: B018
+    except KinematicsError as error:
+        yield from (replace(problem, where=document.where(("geometry",))) for problem in error.problems)
 
 
 def _section(kind: type[SectionT], document: Document, name: str) -> SectionT | None:

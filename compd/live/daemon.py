@@ -189,7 +189,7 @@ class Daemon:
         )
         keys = TargetKeys(
             tip="tip_B0_mm" if configuration.geometry.tool.on == "platform" else "tip_P_mm",
-            rotation=configuration.geometry.kinematics == "hexapod_6ups",
+            rotation=not set(configuration.geometry.mechanism.target_fixes).isdisjoint("abc"),
         )
         requests = Requests(
             RequestContext(

@@ -45,5 +45,5 @@ def _is_between(sent: Any, low: Any, high: Any) -> bool:
     if isinstance(sent, list) and isinstance(low, list):
         return len(sent) == len(low) and all(map(_is_between, sent, low, high))
     if isinstance(sent, float) and isinstance(low, float):
-        return low <= sent <= high
-    return isinstance(sent, bool) is isinstance(low, bool) and bool(sent == low)
+        return bool(low <= sent <= high)
+    return bool(isinstance(sent, bool) is isinstance(low, bool) and sent == low)

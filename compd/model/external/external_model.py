@@ -23,7 +23,7 @@ from compd.model.effects import (
     needed_quantities,
 )
 from compd.model.external.own_kinematics import Kinematics, OwnKinematicsError, OwnPose, own_columns, own_pose
-from compd.model.kinematics import Contact, FrameGeometry, Motion, Movement, ToolOnPlatform, track_motion
+from compd.model.kinematics import Actuators, Contact, FrameGeometry, Motion, Movement, ToolOnPlatform, track_motion
 from compd.rotation import compose, rotation_matrix, rotation_vector
 
 # The least number of links that can move a tip along three axes and turn it.
@@ -99,12 +99,15 @@ def external_model(own: Kinematics | None, links: int, scale_signal_period_mm: f
     frame = FrameGeometry(
         np.full((3, 3), np.nan), no_points, np.zeros(0, dtype=np.int64), np.zeros((3, 3)), nowhere, np.eye(3)
     )
-    zero = AtZero(no_points, nowhere, np.eye(3), Contact(nowhere, nowhere), np.full(links, np.nan), np.full(9, np.nan))
+    none, lengths = np.zeros(0, dtype=np.int64), np.full(links, np.nan)
+    zero = AtZero(no_points, nowhere, np.eye(3), Contact(nowhere, nowhere), lengths, lengths, np.full(9, np.nan))
     constants = _no_rows().constants._replace(scale_signal_period_mm=scale_signal_period_mm)
     return ExternalModel(
         frame=frame,
         platform_joints_P_mm=no_points,
         revolute_axes_P=no_points,
+        hinges=np.zeros((0, 2), dtype=np.int64),
+        actuators=Actuators(none, no_points, no_points, np.zeros(0), none, np.zeros(0), np.zeros(6, dtype=np.int64)),
         arrangement=ToolOnPlatform(unknown),
         joint_weights=np.zeros((links, 0)),
         weight_N=np.nan,

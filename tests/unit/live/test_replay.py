@@ -14,9 +14,9 @@ import typer
 
 from compd.cli.live.replay import replay as replay_command
 from compd.errors import Problem, RecordingError, StateError
+from compd.kernel_versions import versions_text_here
 from compd.live.loop.cycle import step
 from compd.live.machine.model_loader import Models
-from compd.kernel_versions import versions_text_here
 from compd.live.record.agreement import Agreement
 from compd.live.record.compared_table import differing_cells
 from compd.live.record.replay import RecordedCycles, replay_cycles
