@@ -62,6 +62,8 @@ def check(
     print_problems(warnings, "warning: ", sys.stdout)
     print_zero(configuration)
     wiring = configuration.wiring
+    if not wiring.frame:
+        typer.echo(f"Not measured: the frame, which is taken to stand still; {_frame_drift(wiring.frame_drift_um)}.")
     own_process = configuration.acquisition.own_process
     processes = f" (polled in processes of their own: {', '.join(own_process)})" if own_process else ""
     typer.echo(
@@ -72,6 +74,13 @@ def check(
     )
 
 
+def _frame_drift(drift_um: float | None) -> str:
+    """What a frame that is not measured does to the tip's uncertainty."""
+    if drift_um is None:
+        return "the tip's uncertainty is unknown until `wiring: frame_drift_um` states how far that moves the tip"
+    return f"by that the tip is uncertain by {drift_um:g} um along each axis"
+
+
 def print_zero(configuration: Configuration) -> None:
     """Print the lengths at machine zero for a tape measure."""
     from compd.machine_builder import build_model
@@ -80,7 +89,8 @@ def print_zero(configuration: Configuration) -> None:
     zero = build_model(configuration.geometry, configuration.wiring).zero
     links = ", ".join(f"{number} {mm:.1f}" for number, mm in enumerate(zero.link_length_mm, start=1))
     rods = ", ".join(f"{name} {mm:.1f}" for name, mm in zip(FRAME_DISTANCES, zero.distances_mm, strict=True))
-    typer.echo(f"Machine zero, for a tape measure, mm between centres of joints: links {links}; rods {rods}.")
+    rods = f"; rods {rods}" if configuration.geometry.has_frame else ""
+    typer.echo(f"Machine zero, for a tape measure, mm between centres of joints: links {links}{rods}.")
 
 
 def print_blind_spots(configuration: Configuration) -> None:

@@ -7,6 +7,7 @@ import pty
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -26,18 +27,31 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+def _directory_at_start() -> str:
+    """Where a process keeps its kernels that starts now: the hash of the sources is taken once."""
+    jit.kernel_digest.cache_clear()
+    return jit._cache_directory()
+
+
+@pytest.fixture(autouse=True)
+def _digest_of_these_sources() -> Iterator[None]:
+    """The hash of a changed copy does not outlive its test."""
+    yield
+    jit.kernel_digest.cache_clear()
+
+
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [("model/kernels/solve_status.py", "= 100.0", "= 200.0"), ("linear.py", "1e12", "1e11")],
 )
 def test_a_changed_limit_or_helper_does_not_run_old_kernels(sources: Path, name: str, old: str, new: str) -> None:
-    before = jit._cache_directory()
+    before = _directory_at_start()
     assert Path(before).parent == sources / "__pycache__"
-    assert jit._cache_directory() == before
+    assert _directory_at_start() == before
     text = (sources / name).read_text()
     assert old in text
     (sources / name).write_text(text.replace(old, new))
-    assert jit._cache_directory() != before
+    assert _directory_at_start() != before
 
 
 def test_a_read_only_installation_keeps_them_with_the_user(sources: Path, tmp_path: Path) -> None:
