@@ -63,10 +63,10 @@ def examine_whole(path: Path) -> Examined:
                 along = list(axes_along_links(document, examined.geometry))
                 problems += _at_machine_zero(error, document, warnings, along)
             else:
+                problems += _not_served(document, model)
                 warnings += [
                     *_stroke_warnings(document, examined.geometry, model),
                     *slips(document, examined.geometry, model),
-                    *_not_served(document, model),
                 ]
     sockets, state = _section(SocketSettings, document, "sockets"), _section(StateSettings, document, "state")
     effects = readable(SECTIONS["effects"], document.value(("effects",))) or ()
@@ -81,7 +81,7 @@ def examine_whole(path: Path) -> Examined:
 
 
 def _not_served(document: Document, model: MachineModel) -> Iterator[Problem]:
-    """A warning where compensation and predictions do not take the machine."""
+    """A problem where compensation and predictions do not take the machine."""
     try:
         model.structure  # noqa: B018
     except KinematicsError as error:

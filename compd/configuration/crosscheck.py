@@ -196,8 +196,9 @@ def _completeness_problems(sections: Sections) -> Iterator[Problem]:
     """Frame distances, quantities, scales and joint comparators that are wired too rarely or too often."""
     yield from _frame_problems(sections)
     yield from _quantity_problems(sections)
+    if sections.scales is not None:
+        yield from _scale_problems(sections, sections.scales)
     if sections.links is not None:
-        yield from _scale_problems(sections, sections.links)
         yield from _joint_problems(sections, sections.links)
 
 
@@ -211,6 +212,12 @@ def _frame_problems(sections: Sections) -> Iterator[Problem]:
     counts = Counter(wire.distance for _, wire in _entries(sections.wiring, "frame"))
     if not counts:  # the frame is taken to stand still
         return
+    if sections.framed is False:
+        yield Problem(
+            where=sections.document.where(("wiring", "frame")),
+            what="has frame comparators, but the geometry does not say where they stand",
+            next_step="write `geometry: base: supports_B_mm` and `plate_points_M_mm`, or leave `frame` out",
+        )
     least = 1 if _is_whole(sections.wiring, "frame", "distance") else 0
     for distance in FRAME_DISTANCES:
         if not least <= counts[distance] <= 1:
@@ -243,16 +250,17 @@ def _no_such_link(sections: Sections, kind: str, links: int) -> Iterator[Problem
             )
 
 
-def _scale_problems(sections: Sections, links: int) -> Iterator[Problem]:
-    yield from _no_such_link(sections, "scale", links)
+def _scale_problems(sections: Sections, count: int) -> Iterator[Problem]:
+    """Each actuator has one scale; where it extends one rod, its number is that of the link."""
+    yield from _no_such_link(sections, "scale", count)
     scales = Counter(wire.link for _, wire in _entries(sections.wiring, "scale"))
     least = 1 if _is_whole(sections.wiring, "scale", "link") else 0
-    for link in range(1, links + 1):
+    for link in range(1, count + 1):
         if not least <= scales[link] <= 1:
             yield Problem(
                 where=sections.document.where(("wiring", "scale")),
                 what=f"link {link} has {scales[link]} scales",
-                allowed=f"links 1..{links}, each exactly one",
+                allowed=f"links 1..{count}, each exactly one",
             )
 
 

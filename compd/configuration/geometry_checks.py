@@ -5,24 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import Any
 
 from compd.configuration.geometry import LINKS, Geometry
+from compd.configuration.geometry_problem import GeometryProblem
 from compd.configuration.mechanism_checks import mechanism_contradictions
 from compd.documents import Location
 
 # Largest deviation (mm) of a frame from its convention: a drawing gives coordinates to 1 nm at best.
 CONVENTION_TOLERANCE_MM = 1e-6
-
-
-class GeometryProblem(NamedTuple):
-    """A contradiction in a geometry. location : below `geometry`."""
-
-    location: Location
-    what: str
-    value: str = ""
-    allowed: str = ""
-    next_step: str = ""
 
 
 def contradictions(geometry: Any) -> list[GeometryProblem]:
@@ -35,7 +26,7 @@ def contradictions(geometry: Any) -> list[GeometryProblem]:
         *_frame_contradictions(base),
         *_point_contradictions(geometry),
         *_count_contradictions(geometry),
-        *(GeometryProblem(*found) for found in mechanism_contradictions(geometry)),
+        *mechanism_contradictions(geometry),
         *_half_frame(geometry),
         *_length_contradictions(geometry),
     ]

@@ -178,8 +178,8 @@ class Configuration:
 
     def __str__(self) -> str:
         return (
-            f"{self.machine}: {self.geometry.kinematics}, {self.geometry.links} links, {len(self.gauges)} gauges "
-            f"on {len(self.lines)} lines"
+            f"{self.machine}: {self.geometry.kinematics or 'parallel'}, {self.geometry.links} links, "
+            f"{len(self.gauges)} gauges on {len(self.lines)} lines"
         )
 
     def __repr__(self) -> str:
@@ -286,7 +286,9 @@ def examine(path: Path) -> Examined:
     ]
     checked = Sections(
         document,
-        _links(part["geometry"]),
+        _count(part["geometry"], "rods"),
+        _count(part["geometry"], "actuators"),
+        _framed(document, part["geometry"]),
         part["lines"] or {},
         gauges,
         drivers,
@@ -373,10 +375,15 @@ def _why_not_made(driver: type[Gauge[Any]], options: GaugeOptions) -> str | None
     return None
 
 
-def _links(geometry: Any) -> int | None:
-    """Number of links of a geometry, or of its readable part; None where it cannot be read."""
-    kinematics, rods = getattr(geometry, "kinematics", None), getattr(geometry, "rods", None)
-    return LINKS[kinematics] if kinematics is not None else len(rods) if rods else None
+def _count(geometry: Any, key: str) -> int | None:
+    """Number of rods or actuators of a geometry, or of its readable part; None where it cannot be read."""
+    kinematics, parts = getattr(geometry, "kinematics", None), getattr(geometry, key, None)
+    return LINKS[kinematics] if kinematics is not None else len(parts) if parts else None
+
+
+def _framed(document: Document, geometry: Any) -> bool | None:
+    """Whether the file states the frame's reference points; None where it has no geometry."""
+    return None if geometry is None else document.value(("geometry", "plate_points_M_mm")) is not None
 
 
 def _line_number(where: str) -> int:

@@ -14,12 +14,15 @@ from compd.gauge import Gauge, GaugeOptions
 class Sections:
     """The readable parts of a document, from `section.readable`: None for a faulty section.
 
-    links : of the machine, 3 or 6. gauges : options by name, without the faulty ones. drivers : the gauges' driver
-        classes by name.
+    links, scales : numbers of rods and of actuators. framed : whether the frame's reference points are stated. Each is
+        None where it cannot be read.
+    gauges : options by name, without the faulty ones. drivers : the gauges' driver classes by name.
     """
 
     document: Document
     links: int | None
+    scales: int | None
+    framed: bool | None
     lines: Mapping[str, Any]
     gauges: Mapping[str, GaugeOptions]
     drivers: Mapping[str, type[Gauge[Any]]]

@@ -46,7 +46,10 @@ def place_links(
     joints_M: FloatArray,
     lengths_mm: FloatArray,
 ) -> None:
-    """Base joints (n, 3) and link lengths (n,) with the actuators at actuator_mm (m,); base_joints_M : at q = 0."""
+    """Base joints (n, 3) and link lengths (n,) with the actuators at actuator_mm (m,); base_joints_M : at q = 0.
+
+    See `compd.model.kinematics.actuators.links_at`.
+    """
     for i in range(actuator_of_link.shape[0]):
         a = actuator_of_link[i]
         q = actuator_mm[a]
@@ -273,27 +276,10 @@ actuated_inverse = kernel(
 )(solve_actuated_inverse)
 
 
-@kernel(
+placed_links = kernel(
     [INTEGERS, MATRIX, MATRIX, VECTOR, INTEGERS, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR],
     "(m),(m,d),(m,d),(m),(n),(n,d),(n),(m)->(n,d),(n)",
-)
-def placed_links(
-    kinds: IntArray,
-    cosine_M: FloatArray,
-    sine_M: FloatArray,
-    radius_mm: FloatArray,
-    actuator_of_link: IntArray,
-    base_joints_M: FloatArray,
-    rod_length_mm: FloatArray,
-    actuator_mm: FloatArray,
-    joints_M: FloatArray,
-    lengths_mm: FloatArray,
-) -> None:
-    """See `compd.model.kinematics.actuators.links_at`."""
-    place_links(
-        kinds, cosine_M, sine_M, radius_mm, actuator_of_link, base_joints_M, rod_length_mm, actuator_mm, joints_M,
-        lengths_mm,
-    )  # fmt: skip
+)(place_links)
 
 
 @kernel(

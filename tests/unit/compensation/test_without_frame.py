@@ -105,3 +105,23 @@ def test_some_comparators_of_nine_are_refused(tmp_path: Path) -> None:
     path = hexapod_without_frame(tmp_path, frame=[{"distance": "u1", "gauge": gauge}])
     with pytest.raises(ConfigurationError, match="or none of them"):
         load(path)
+
+
+def test_comparators_of_a_frame_without_places_are_refused(tmp_path: Path) -> None:
+    wires = yaml.safe_load((CONFIG / "hexapod.yaml").read_text())["wiring"]["frame"]
+    with pytest.raises(ConfigurationError, match="does not say where they stand"):
+        load(hexapod_without_frame(tmp_path, frame=wires))
+
+
+def test_actuators_that_slide_have_one_scale_each_and_are_not_served(tmp_path: Path) -> None:
+    path = hexapod_without_frame(tmp_path)
+    data = yaml.safe_load(path.read_text())
+    tip_M = np.array(data["geometry"]["tool"]["zero_tip_M_mm"]) - data["geometry"]["tool"]["at_P_mm"]
+    origin_M = np.array(data["geometry"]["base"]["origin_B0_in_M_mm"])
+    for rod in data["geometry"]["rods"]:
+        rod["length_mm"] = float(np.linalg.norm(np.array(rod["platform_P_mm"]) + tip_M - origin_M - rod["base_B_mm"]))
+    data["geometry"]["actuators"] = [{"kind": "slides", "along_B": [0.0, 0.0, 1.0]}] * 6
+    path.write_text(yaml.safe_dump(data, sort_keys=False))
+    assert load(path).geometry.scales == 6
+    with pytest.raises(ConfigurationError, match="actuators that move base joints"):
+        load_whole(path)
