@@ -224,7 +224,7 @@ def test_what_the_base_carries_moves_with_the_frame(kind: str) -> None:
         effects=warm.effects,
     ).by_gauge
     expected = np.concatenate([by_port["scale"].tip[0], by_port["frame"].tip[0]], axis=1)
-    np.testing.assert_allclose(by_gauge, expected, atol=1e-4)
+    np.testing.assert_allclose(by_gauge, expected, atol=3e-4)
 
 
 @pytest.mark.parametrize("kind", KINDS)
