@@ -11,6 +11,8 @@ Example::
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from compd.comparison.alignment.align_recording import align_recording
@@ -18,11 +20,16 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
 from compd.configuration import Configuration, Machine, load_machine, shipped_names
 from compd.errors import Problem, RecordingError
+from compd.parameter_ranges import read_range
 from compd.recording import EXTERNAL, Recording, read_recording, read_sidecar
 
 
 def open_recording(
-    path: str | Path, machine: Machine | None = None, *, criteria: ComparisonCriteria = ComparisonCriteria()
+    path: str | Path,
+    machine: Machine | None = None,
+    *,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    ranges: Sequence[str] = (),
 ) -> AlignedRecording:
     """Open a recording with its machine, and compute what the machine's kinematics predicts in each of its rows.
 
@@ -37,6 +44,9 @@ def open_recording(
         read from the columns ``model_x_mm`` ...
     criteria : ComparisonCriteria
         The numbers by which the recording is aligned, compared and fitted; every one has its default.
+    ranges : sequence of str
+        Plausible ranges of single parameters, such as ``"link_zero.z=-3..3mm"``. Left out, geometric effects have the
+        ranges that follow from the machine's ``geometry.tolerance_mm``, and all others those of the library.
 
     Returns
     -------
@@ -50,6 +60,8 @@ def open_recording(
         what is allowed and what to do.
     ConfigurationError
         Where the configuration `machine` cannot be used.
+    CompdError
+        Where a text of `ranges` states no range.
 
     Examples
     --------
@@ -58,8 +70,9 @@ def open_recording(
     >>> recording.labels, recording.measured_mm.shape
     (('x', 'y', 'z'), (608, 3))
     """
+    stated = tuple(map(read_range, ranges))
     recording, configuration = read_with_machine(Path(path), machine)
-    return align_recording(recording, configuration, criteria)
+    return replace(align_recording(recording, configuration, criteria), ranges=stated)
 
 
 def read_with_machine(

@@ -14,7 +14,7 @@ from compd.operation_settings import TargetSettings, VoteSettings
 # Keys about the trust in a gauge, not its value.
 NOT_IN_ZERO = (
     *("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss"),
-    *("plausible", "fastest_change", "apart"),
+    *("plausible", "fastest_change", "apart", "tolerance_mm"),
 )
 # Options of later releases, with their neutral values.
 _LATER_OPTIONS: Mapping[str, Any] = {
@@ -58,6 +58,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "standing_temperature_K": VoteSettings().standing_temperature_K,
     "tip_error_um": None,
     "frame_drift_um": None,
+    "tolerance_mm": None,
     "actuators": [],
     "rods": [],
     "hinges": [],

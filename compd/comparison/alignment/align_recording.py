@@ -201,9 +201,13 @@ def _observations(
     frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
     approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
     at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
-    velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm, criteria)
+    if recording.has_time:
+        velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm, criteria)
+    else:
+        velocity = np.full((count, scale_mm.shape[1] + comparators), np.nan)
+        approach = approach if recording.approach_measured else np.zeros_like(scale_mm)
     movement = Movement(approach, *np.split(velocity, [scale_mm.shape[1]], axis=1))
-    return observe(
+    rows = observe(
         model,
         model.constants,
         scale_mm=scale_mm,
@@ -215,6 +219,10 @@ def _observations(
         movement=movement,
         quantities_at_zero=recording.sidecar.quantities_at_zero,
     )
+    if recording.has_time:
+        return rows
+    direction = () if recording.approach_measured else ("direction",)
+    return replace(rows, lacking=frozenset({"time", "order", "motion", *direction}))
 
 
 def session_starts(recording: Recording) -> BoolArray:

@@ -39,6 +39,7 @@ from compd.model import (
 )
 from compd.model.effects import ConstantValues, Effect, FittedEffect, Observations, Port, evaluate_basis, unmet_needs
 from compd.model.kernels import Reason
+from compd.parameter_ranges import StatedRange, on_machine
 from compd.recording import Recording, UsableRows
 from compd.result_tables import Columns, data_frame, html_table
 from compd.statistics import filled
@@ -82,6 +83,8 @@ class AlignedRecording:
         None for a whole recording.
     criteria : ComparisonCriteria
         The numbers by which it was aligned, and by which it is compared and fitted.
+    ranges : tuple of StatedRange
+        Plausible ranges that were stated for single parameters; others are the machine's or the library's.
     """
 
     recording: Recording
@@ -95,7 +98,12 @@ class AlignedRecording:
     ends: FixedEnds | None = None
     part_of: AlignedRecording | None = None
     criteria: ComparisonCriteria = ComparisonCriteria()
+    ranges: tuple[StatedRange, ...] = ()
     _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
+
+    def on_machine(self, effect: Effect) -> Effect:
+        """The effect with its plausible ranges on this recording's machine; see `compd.parameter_ranges`."""
+        return on_machine(effect, self.rows, self.ranges)
 
     @property
     def unit(self) -> str:
