@@ -121,7 +121,7 @@ def _ranged(parameter: Parameter, rows: Observations, stated: StatedRange | None
     if not np.isfinite(largest):
         return parameter
     source = f"geometry.tolerance_mm {tolerance_mm:g}{what}"
-    return replace(parameter, low=-float(largest), high=float(largest), source=source)
+    return replace(parameter, low=-float(largest), high=float(largest), source=source, rough=True)
 
 
 def _stroke_mm(rows: Observations) -> float:

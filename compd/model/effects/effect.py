@@ -110,6 +110,8 @@ class Parameter:
     tolerance : str
         How the tolerance to which a machine was made limits it: ``"place"`` by itself, ``"gain"`` over the stroke,
         ``"tilt"`` over the radius of the platform joints; ``""`` for what no workshop's tolerance limits.
+    rough : bool
+        The range follows from such a tolerance, which is stated to an order of magnitude.
     """
 
     name: str
@@ -120,6 +122,7 @@ class Parameter:
     per: Per = "machine"
     reciprocal: bool = False
     tolerance: Literal["", "place", "gain", "tilt"] = ""
+    rough: bool = False
 
     def suffixes(self, links: int) -> list[str]:
         """What follows the name of each of its values on a machine of so many links: `_1`, `_2`, `_3`."""
