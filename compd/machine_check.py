@@ -25,10 +25,11 @@ from compd.configuration import (
 )
 from compd.documents import Document, Location, Section, readable
 from compd.errors import ConfigurationError, KinematicsError, Problem
-from compd.machine_builder import build_model
+from compd.machine_builder import build_model, machine_parts
+from compd.machine_reach import dependences_as_drawn
 from compd.machine_slips import axes_along_links, slips
 from compd.model import MachineModel
-from compd.operation_settings import SocketSettings, StateSettings
+from compd.operation_settings import SocketSettings, StateSettings, Wiring
 
 SectionT = TypeVar("SectionT", bound=Section)
 
@@ -62,6 +63,7 @@ def examine_whole(path: Path) -> Examined:
             except (KinematicsError, ValueError) as error:
                 along = list(axes_along_links(document, examined.geometry))
                 problems += _at_machine_zero(error, document, warnings, along)
+                problems += _dependences(document, examined.geometry, examined.wiring)
             else:
                 warnings += [
                     *_stroke_warnings(document, examined.geometry, model),
@@ -77,6 +79,17 @@ def examine_whole(path: Path) -> Examined:
     if configuration is not None:
         configuration = None if problems else replace(configuration, warnings=tuple(warnings))
     return examined._replace(configuration=configuration, problems=problems, warnings=warnings)
+
+
+def _dependences(document: Document, geometry: Geometry, wiring: Wiring) -> Iterator[Problem]:
+    """Rods and hinges that say one thing twice, so that nothing holds the platform in one direction."""
+    for names in dependences_as_drawn(machine_parts(geometry, wiring)):
+        yield Problem(
+            where=document.where(("geometry",)),
+            what=f"{', '.join(names)} repeat or contradict each other at machine zero: something of the platform's six "
+            "coordinates is held twice, and something not at all",
+            next_step="look at `compd machine draw`; mend the joints, axes or actuators of these",
+        )
 
 
 def _section(kind: type[SectionT], document: Document, name: str) -> SectionT | None:
