@@ -20,16 +20,25 @@ from compd.model.kinematics import (
     Contact,
     FrameGeometry,
     Mechanism,
+    Pose,
     base_pose,
     distances_mm,
     forward_kinematics,
     inverse_by_actuators,
+    inverse_kinematics,
     link_forces,
     links_at,
     solve_frame,
 )
 from compd.model.structures import MODEL
 from compd.rotation import compose, to_inner, to_outer
+
+
+class Reach(NamedTuple):
+    """A pose, and the scales (..., m) that show it, mm since machine zero."""
+
+    pose: Pose
+    scale_mm: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +164,21 @@ class MachineModel:
     def mechanism(self, base_joints_M_mm: FloatArray) -> Mechanism:
         """The links with the base joints (..., n, 3) where they are now; axes that the base carries as at zero."""
         return Mechanism(base_joints_M_mm, self.platform_joints_P_mm, self.revolute_axes_P, self.hinges)
+
+    def reach(self, tip_M_mm: FloatArray) -> Reach:
+        """The machine as drawn with its tip at places (..., 3) in {M}, its frame and its attitude as at machine zero.
+
+        Coordinates that a target does not fix follow. A row fails as `inverse_kinematics` does.
+        """
+        zero, tip_P_mm = self.zero, self.zero.contact.tip_P_mm
+        if not self.by_actuators:
+            pose = inverse_kinematics(self.mechanism(zero.base_joints_M_mm), tip_M_mm, tip_P_mm, zero.rotation_M_P)
+            return Reach(pose, pose.link_length_mm - zero.link_length_mm)
+        mechanism = self.mechanism(self.base_joints_at_0_M_mm)
+        reached = inverse_by_actuators(
+            mechanism, self.actuators, tip_M_mm, tip_P_mm, zero.rotation_M_P, zero.actuator_mm
+        )
+        return Reach(reached.pose, reached.actuator_mm - zero.actuator_mm)
 
     @cached_property
     def extended(self) -> BoolArray:

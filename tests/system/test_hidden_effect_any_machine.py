@@ -23,22 +23,25 @@ SPEEDUP = "200"
 
 
 class Machine(NamedTuple):
-    """kind : as of `compd machine new`.  thermometers : the places that have one.  hidden : strengths by cause."""
+    """kind, own : as of `compd machine new`, and dimensions that are not the usual ones.  thermometers : the places that have one.  hidden : strengths by cause."""
 
     kind: str
+    own: dict[str, float]
     thermometers: tuple[str, ...]
     hidden: tuple[str, ...]
 
 
 MACHINES = {
-    "linear delta": Machine("linear-delta", ("link_1", "base", "platform", "room"), ("scale_gain=40",)),
-    "3-PRS": Machine("3-prs", ("link_1", "link_2", "link_3", "room"), ("link_expansion=11",)),
+    "linear delta": Machine("linear-delta", {}, ("link_1", "base", "platform", "room"), ("scale_gain=40",)),
+    "3-PRS": Machine(
+        "3-prs", {"platform_radius_mm": 200.0}, ("link_1", "link_2", "link_3", "room"), ("link_expansion=11",)
+    ),
 }
 
 
 def written(directory: Path, machine: Machine) -> Path:
     """The machine's configuration with thermometers, polled and served as many machines side by side are."""
-    text = machine_text("mine", machine.kind, KINDS[machine.kind].usual)
+    text = machine_text("mine", machine.kind, KINDS[machine.kind].usual._replace(**machine.own))
     data = yaml.safe_load(text.replace("{on: platform", '{"on": platform'))
     data["gauges"]["thermometers"] = {
         "driver": "modbus",
