@@ -156,6 +156,16 @@ class LimitSettings(Section):
     on_limit: Literal["clamp", "refuse"] = Field(
         description="clamp: apply the limit and say so; refuse: the setpoint becomes invalid and says so"
     )
+    tip_correction_mm: Positive | None = Field(
+        default=None,
+        description="machines without scales: largest correction of the tip along each axis, to either side; left out: "
+        "`correction_mm`",
+    )
+    rotation_correction_rad: Positive | None = Field(
+        default=None,
+        description="machines without scales: largest correction of the attitude about each axis, to either side; left "
+        "out: as much as moves a point at a distance of 100 mm by the largest correction of the tip",
+    )
     tip_error_um: Positive | None = Field(
         default=None,
         description="largest bound of the tip's error (`u_tip_um`, 95 %) with which a setpoint is valid, um; beyond it "

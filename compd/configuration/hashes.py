@@ -57,6 +57,8 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "apart": None,
     "standing_temperature_K": VoteSettings().standing_temperature_K,
     "tip_error_um": None,
+    "tip_correction_mm": None,
+    "rotation_correction_rad": None,
     "frame_drift_um": None,
     "actuators": [],
     "rods": [],

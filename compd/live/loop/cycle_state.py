@@ -43,7 +43,8 @@ class CycleState(NamedTuple):
     zero : the machine zero that was used last; None before the first. With another one, the cycle forgets what was
         measured from it.
     warm_start : where Newton's iterations start, with the memory of the applied model's effects.
-    correction_mm : (n), the correction that is applied; the next one slews from it. An invalid cycle keeps it.
+    correction_mm : (n), the correction that is applied; the next one slews from it. An invalid cycle keeps it. Of a
+        machine without scales the correction of its pose (6), mm and rad, after the first valid cycle.
     last_good : the newest complete set of comparators; None before the first.
     scales_seen : whether the scales have ever been good. Scales that are lost afterwards are `stop`, not `starting`.
     shadow_memory : memory of the shadow model's effects.
@@ -116,6 +117,11 @@ class CycleSettings:
     def model(self) -> MachineModel:
         """The machine without effects."""
         return self.without_effects.applied.machine
+
+    @cached_property
+    def corrects_pose(self) -> bool:
+        """Whether the pose is corrected that a controller commands, since there are no scales."""
+        return not self.wires.scale.wires
 
     @cached_property
     def period_s(self) -> float:

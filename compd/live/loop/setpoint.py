@@ -194,6 +194,8 @@ class Setpoint(NamedTuple):
         }
         if self.tool_on_plate:
             message["tip_P_mm"] = lengths[12 + 3 * n :]
+        if values.rotation_M_rad is not None or values.pose_correction is not None:
+            message |= _json_pose(values, moved_mm)
         u_tip_um = self.u_tip_um
         if isinstance(u_tip_um, float):
             moved_um = u_tip_um + moved_mm * UM_PER_MM
@@ -253,6 +255,20 @@ class Setpoint(NamedTuple):
 def setpoint_line(message: Mapping[str, Any]) -> bytes:
     """A SETPOINT message as it is sent; orjson takes a tenth of the time of the standard library."""
     return orjson.dumps(message) + b"\n"
+
+
+def _json_pose(values: Compensation, moved_mm: float) -> dict[str, Any]:
+    """Attitude and correction of the pose, as far as they are known."""
+    correction = values.pose_correction
+    rotation_correction_rad = None if correction is None or np.isnan(correction[3:]).any() else correction[3:]
+    known = {
+        "rotation_M_rad": (values.rotation_M_rad, _DECIMALS_RAD),
+        "tip_correction_mm": (None if correction is None else correction[:3], _DECIMALS_MM),
+        "rotation_correction_rad": (rotation_correction_rad, _DECIMALS_RAD),
+    }
+    return {
+        name: _rounded(numbers, decimals, moved_mm) for name, (numbers, decimals) in known.items() if numbers is not None
+    }
 
 
 def _target_named(target: Target) -> dict[str, Any]:

@@ -67,14 +67,15 @@ def tip_bound(
     by_noise_um, tip_by_gauge = u
     if by_noise_um is None or tip_by_gauge is None:
         return None
-    links = len(reached_mm)
+    links = len(settings.wires.scale.wires)
     lengths_mm = length_bounds_mm(snapshot, usable, wanted.nominal_scale_mm, settings)
     if target is not None:
         lengths_mm[:links] = 0.0  # the tip is where the target is
     um = tip_bound_um(float(by_noise_um[-1]), tip_by_gauge, lengths_mm, links)
     absent_um = 0.0
-    if (absent_mm := _absent_link_mm(wanted, reached_mm, usable.weight)) is not None:
-        absent_um += UM_PER_MM * _norm(tip_by_gauge[:, :links] @ absent_mm)
+    if (absent_mm := _absent_mm(wanted, reached_mm, usable.weight, settings)) is not None:
+        # of a machine without scales it is the tip's
+        absent_um += UM_PER_MM * _norm(tip_by_gauge[:, :links] @ absent_mm if links else absent_mm)
     if usable.absent_mm is not None:
         absent_um += UM_PER_MM * _norm(tip_by_gauge[:, links:] @ usable.absent_mm)
     um += absent_um
@@ -86,19 +87,26 @@ def with_place(live: ComparatorSet, nominal_scale_mm: FloatArray, settings: Cycl
     return live if settings.noise is None or live.scale_mm else live._replace(scale_mm=tuple(nominal_scale_mm.tolist()))
 
 
-def _absent_link_mm(wanted: Compensation, reached_mm: FloatArray, weight: float) -> FloatArray | None:
-    """Correction (n) that is wanted and not reached, by limits and by effects that count less; None for none, nan where
-    it is not known.
+def _absent_mm(
+    wanted: Compensation, reached_mm: FloatArray, weight: float, settings: CycleSettings
+) -> FloatArray | None:
+    """Correction (n), or of the tip (3) without scales, that is wanted and not reached, by limits and by effects that
+    count less; None for none, nan where it is not known.
 
     weight : by which the corrections of the effects have been multiplied.
     """
-    effects_mm = wanted.contributions.by_cause_mm[_GAUGED:]
+    effects_mm, wanted_mm = wanted.contributions.by_cause_mm[_GAUGED:], wanted.correction_mm
+    is_reached = reached_mm is wanted_mm
+    if settings.corrects_pose:
+        assert wanted.pose_correction is not None, "without scales the pose is corrected"
+        is_reached = reached_mm is wanted.pose_correction
+        wanted_mm, reached_mm = wanted.pose_correction[:3], reached_mm[:3]
     if weight == 1.0 or not len(effects_mm):
-        return None if reached_mm is wanted.correction_mm else wanted.correction_mm - reached_mm
+        return None if is_reached else wanted_mm - reached_mm
     if weight == 0.0:
         return np.full(len(reached_mm), math.nan)
     by_effects: FloatArray = effects_mm.sum(axis=0) * ((1.0 - weight) / weight)
-    return wanted.correction_mm - reached_mm + by_effects
+    return wanted_mm - reached_mm + by_effects
 
 
 def length_bounds_mm(
