@@ -24,10 +24,11 @@ from compd.configuration import (
     place_warnings,
 )
 from compd.documents import Document, Location, Section, readable
-from compd.errors import ConfigurationError, KinematicsError, Problem
+from compd.errors import ConfigurationError, KinematicsError, PluginError, Problem
 from compd.machine_builder import build_model
 from compd.machine_slips import axes_along_links, slips
 from compd.model import MachineModel
+from compd.model.external import ExternalModel, OwnKinematicsError, own_pose
 from compd.operation_settings import SocketSettings, StateSettings
 
 SectionT = TypeVar("SectionT", bound=Section)
@@ -59,15 +60,20 @@ def examine_whole(path: Path) -> Examined:
         with np.errstate(all="ignore"):
             try:
                 model = build_model(examined.geometry, examined.wiring)
+            except PluginError as error:
+                problems += [replace(p, where=document.where(tuple(p.where.split(".")))) for p in error.problems]
             except (KinematicsError, ValueError) as error:
                 along = list(axes_along_links(document, examined.geometry))
                 problems += _at_machine_zero(error, document, warnings, along)
             else:
-                problems += _not_served(document, model)
-                warnings += [
-                    *_stroke_warnings(document, examined.geometry, model),
-                    *slips(document, examined.geometry, model),
-                ]
+                if isinstance(model, ExternalModel):
+                    problems += _faults_at_zero(document, model)
+                else:
+                    problems += _not_served(document, model)
+                    warnings += [
+                        *_stroke_warnings(document, examined.geometry, model),
+                        *slips(document, examined.geometry, model),
+                    ]
     sockets, state = _section(SocketSettings, document, "sockets"), _section(StateSettings, document, "state")
     effects = readable(SECTIONS["effects"], document.value(("effects",))) or ()
     problems = in_order(
@@ -86,6 +92,17 @@ def _not_served(document: Document, model: MachineModel) -> Iterator[Problem]:
         model.structure  # noqa: B018
     except KinematicsError as error:
         yield from (replace(problem, where=document.where(("geometry",))) for problem in error.problems)
+
+
+def _faults_at_zero(document: Document, model: ExternalModel) -> Iterator[Problem]:
+    """What own kinematics does wrong at machine zero, where it needs no settings, whose values only gauges know."""
+    if model.own is None or model.settings:
+        return
+    try:
+        own_pose(model.own, np.zeros(model.links), {})
+    except OwnKinematicsError as error:
+        where = document.where(("geometry", "kinematics"))
+        yield from (replace(problem, where=where, what=f"{problem.where} {problem.what}") for problem in error.problems)
 
 
 def _section(kind: type[SectionT], document: Document, name: str) -> SectionT | None:

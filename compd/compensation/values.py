@@ -88,7 +88,8 @@ class Compensation(NamedTuple):
     nominal_scale_mm : (..., n), the command without compensation.
     scale_setpoint_mm : (..., n), what the scales must show for the tip to be on the target.
     correction_mm : (..., n) = scale_setpoint_mm - nominal_scale_mm.
-    contributions : the correction by cause, (..., n) each; of a machine without scales that of the tip, (3) each.
+    contributions : the correction by cause, (..., n) each; of a machine without scales, and of an
+        external one, that of the tip, (3) each.
     reason : (...), a Reason, of the step that failed first.
     rotation_M_rad : (3,), attitude of what carries the tip, as a rotation vector in {M}; None where it is not told.
     pose_correction : (6,), what is added to the commanded tip, mm, and to the commanded attitude, rad, in {B0}: the

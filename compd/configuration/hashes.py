@@ -15,6 +15,7 @@ from compd.operation_settings import TargetSettings, VoteSettings
 NOT_IN_ZERO = (
     *("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss"),
     *("plausible", "fastest_change", "apart"),
+    "sha256",
 )
 # Options of later releases, with their neutral values.
 _LATER_OPTIONS: Mapping[str, Any] = {

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm
+from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, external_as_applied
 from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_readings import judge_scales, read_comparators, read_scales
@@ -26,7 +26,7 @@ from compd.live.loop.limits import (
     slewed,
     stroke_problem,
 )
-from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
+from compd.live.loop.models import adopt_models, at_target, compensate, evaluate_shadow
 from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
@@ -36,7 +36,7 @@ from compd.live.loop.tip_uncertainty import TipUncertainty, has_grown, noise_now
 from compd.live.machine import MachineWires, MachineZero, Models, shortened
 from compd.live.memory import Snapshot
 from compd.model import MachineModel
-from compd.model.external import OwnKinematicsError
+from compd.model.external import ExternalModel, OwnKinematicsError
 from compd.model.kernels import Reason
 from compd.setpoint_states import Mode, State
 
@@ -143,7 +143,8 @@ def _compute(
         return _Outcome(usable.state, usable.reason), state
 
     scales = read_scales(snapshot, zero_vectors.scale_mm, target, settings)
-    scales_state, scales_reason = judge_scales(scales.lost, target, state.scales_seen)
+    compares = target is not None and not settings.has_own_pose
+    scales_state, scales_reason = judge_scales(scales.lost, compares, state.scales_seen)
     if not scales_state.valid:
         reason = "; ".join(filter(None, (scales_reason, usable.reason)))
         return _Outcome(scales_state, reason), state if live is None else state._replace(last_good=live)
@@ -177,7 +178,7 @@ def _compute(
 
     u_tip = _uncertainty(tick, state, settings, snapshot) or _not_below_held(
         tip_uncertainty(
-            machine,
+            at_target(machine, target),
             noise_now(settings.noise, wires, snapshot, usable.beyond),
             values,
             compensation.scale_setpoint_mm,
@@ -194,7 +195,9 @@ def _compute(
 
     adopting = state.adopting and limited.state is not State.OK
     tip_correction_mm = (
-        None if target is not None else _tip_correction(compensation.correction_mm, limited, state, settings)
+        None
+        if target is not None or settings.corrects_pose
+        else _tip_correction(compensation.correction_mm, limited, state, settings)
     )
     reached_mm = limited.applied_mm if tip_correction_mm is None else tip_correction_mm
     bound = tip_bound(u_tip, snapshot, usable, compensation, reached_mm, target, settings)
@@ -216,7 +219,11 @@ def _compute(
         # what is not published changes no correction
         kept = next_state._replace(correction_mm=state.correction_mm, adopting=state.adopting)
         return _Outcome(State.REFUSED, "; ".join(filter(None, (refusal, usable.reason, limited.reason)))), kept
-    if tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
+    if isinstance(machine, ExternalModel):
+        compensation = _external_as_applied(
+            machine, compensation, values, started, target, limited.applied_mm, tip_correction_mm
+        )
+    elif tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
         compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
         if code := int(compensation.reason):
             return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {Reason(code).meaning}"), next_state
@@ -343,6 +350,25 @@ def _tip_correction(
     if state.tip_correction_mm is None:
         return wanted_mm
     return slewed(wanted_mm, state.tip_correction_mm, settings.period_s, settings.limits)
+
+
+def _external_as_applied(
+    machine: ExternalModel,
+    compensation: Compensation,
+    values: GaugeValues,
+    warm_start: WarmStart,
+    target: Target | None,
+    applied_mm: FloatArray,
+    tip_correction_mm: FloatArray | None,
+) -> Compensation:
+    """The same for a machine with a pose of its own, in both modes: by its scales in CMM mode, by the derivatives of the
+    pose that the target has."""
+    if not machine.links:
+        return compensation
+    reached_mm = applied_mm if tip_correction_mm is None else tip_correction_mm
+    if reached_mm is compensation.correction_mm:
+        return compensation
+    return external_as_applied(at_target(machine, target), compensation, values, warm_start, reached_mm)
 
 
 def _with_tip_as_applied(

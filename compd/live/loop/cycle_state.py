@@ -18,6 +18,7 @@ from compd.live.loop.tip_uncertainty import scatter_limits_mm
 from compd.live.machine import MachineWires, MachineZero, Models
 from compd.live.memory import Snapshot
 from compd.model import EffectMemory, GaugeNoise, MachineModel
+from compd.model.external import ExternalModel
 from compd.operation_settings import LimitSettings, LoopSettings
 
 # The uncertainty of the tip changes over seconds, as the machine warms up or crosses its workspace.
@@ -122,6 +123,11 @@ class CycleSettings:
     def corrects_pose(self) -> bool:
         """Whether the pose is corrected that a controller commands, since there are no scales."""
         return not self.wires.scale.wires
+
+    @cached_property
+    def has_own_pose(self) -> bool:
+        """Whether own kinematics or a client gives the pose."""
+        return isinstance(self.model, ExternalModel)
 
     @cached_property
     def period_s(self) -> float:

@@ -73,9 +73,8 @@ def tip_bound(
         lengths_mm[:links] = 0.0  # the tip is where the target is
     um = tip_bound_um(float(by_noise_um[-1]), tip_by_gauge, lengths_mm, links)
     absent_um = 0.0
-    if (absent_mm := _absent_mm(wanted, reached_mm, usable.weight, settings)) is not None:
-        # of a machine without scales it is the tip's
-        absent_um += UM_PER_MM * _norm(tip_by_gauge[:, :links] @ absent_mm if links else absent_mm)
+    if (absent_mm := _absent_tip_mm(wanted, reached_mm, usable.weight, tip_by_gauge[:, :links], settings)) is not None:
+        absent_um += UM_PER_MM * _norm(absent_mm)
     if usable.absent_mm is not None:
         absent_um += UM_PER_MM * _norm(tip_by_gauge[:, links:] @ usable.absent_mm)
     um += absent_um
@@ -87,26 +86,28 @@ def with_place(live: ComparatorSet, nominal_scale_mm: FloatArray, settings: Cycl
     return live if settings.noise is None or live.scale_mm else live._replace(scale_mm=tuple(nominal_scale_mm.tolist()))
 
 
-def _absent_mm(
-    wanted: Compensation, reached_mm: FloatArray, weight: float, settings: CycleSettings
+def _absent_tip_mm(
+    wanted: Compensation, reached_mm: FloatArray, weight: float, tip_by_scale: FloatArray, settings: CycleSettings
 ) -> FloatArray | None:
-    """Correction (n), or of the tip (3) without scales, that is wanted and not reached, by limits and by effects that
-    count less; None for none, nan where it is not known.
+    """By how much the tip (3) is off since a correction is not reached, by limits and by effects that count less; None
+    for none, nan where it is not known.
 
-    weight : by which the corrections of the effects have been multiplied.
+    weight : by which the corrections of the effects have been multiplied. tip_by_scale : (3, n).
     """
-    effects_mm, wanted_mm = wanted.contributions.by_cause_mm[_GAUGED:], wanted.correction_mm
-    is_reached = reached_mm is wanted_mm
-    if settings.corrects_pose:
-        assert wanted.pose_correction is not None, "without scales the pose is corrected"
-        is_reached = reached_mm is wanted.pose_correction
-        wanted_mm, reached_mm = wanted.pose_correction[:3], reached_mm[:3]
-    if weight == 1.0 or not len(effects_mm):
-        return None if is_reached else wanted_mm - reached_mm
-    if weight == 0.0:
-        return np.full(len(reached_mm), math.nan)
-    by_effects: FloatArray = effects_mm.sum(axis=0) * ((1.0 - weight) / weight)
-    return wanted_mm - reached_mm + by_effects
+    asked = wanted.pose_correction if settings.corrects_pose else wanted.correction_mm
+    assert asked is not None, "without scales the pose is corrected"
+    effects_mm = wanted.contributions.by_cause_mm[_GAUGED:]
+    less = weight != 1.0 and len(effects_mm) > 0
+    if not less and reached_mm is asked:
+        return None
+    if less and weight == 0.0:
+        return np.full(3, math.nan)
+    missing_mm = asked - reached_mm
+    tip_mm: FloatArray = missing_mm[:3] if settings.corrects_pose else tip_by_scale @ missing_mm
+    if not less:
+        return tip_mm
+    by_effects = effects_mm.sum(axis=0) * ((1.0 - weight) / weight)
+    return tip_mm + (by_effects if settings.corrects_pose or settings.has_own_pose else tip_by_scale @ by_effects)
 
 
 def length_bounds_mm(
@@ -121,7 +122,7 @@ def length_bounds_mm(
     held_s, held = usable.held_s, usable.comparators
     travel_mm = math.inf
     if held.scale_mm and len(held.scale_mm) == links:
-        travel_mm = float(np.abs(scale_mm - held.scale_mm).max()) + machine_mm_per_s * float(held_s.max())
+        travel_mm = float(np.abs(scale_mm - held.scale_mm).max()) + machine_mm_per_s * float(held_s.max(initial=0.0))
     drift = np.array(held.drift_mm_per_s) if held.drift_mm_per_s else np.full(len(held_s), math.nan)
     since_mm = np.minimum(0.5 * wires.comparators.acceleration_mm_per_s2 * held_s**2, travel_mm)
     bounds_mm[links:] = np.where(held_s > 0.0, np.minimum(drift * held_s + since_mm, largest_mm), bounds_mm[links:])

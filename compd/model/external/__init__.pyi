@@ -10,4 +10,6 @@ from .own_kinematics import Kinematics as Kinematics
 from .own_kinematics import OwnKinematicsError as OwnKinematicsError
 from .own_kinematics import OwnPose as OwnPose
 from .own_kinematics import given_pose as given_pose
+from .own_kinematics import own_columns as own_columns
+from .own_kinematics import own_pose as own_pose
 from .tip_derivative import external_tip_derivatives as external_tip_derivatives

@@ -56,6 +56,14 @@ class ExternalModel(MachineModel):
         return tuple(fitted for fitted in self.effects if acts_on_machine(fitted.effect))
 
     @cached_property
+    def live_covariance(self) -> FloatArray:
+        """(P, P) of the fitted numbers of `live_effects`; nan where the model does not give it."""
+        live = [acts_on_machine(fitted.effect) for fitted in self.effects for _ in fitted.theta]
+        if not len(self.covariance):
+            return np.full((sum(live),) * 2, np.nan)
+        return self.covariance[np.ix_(live, live)]
+
+    @cached_property
     def program(self) -> EffectProgram:
         """No effect is computed by the kernel: names of the quantities that are needed, at machine zero too."""
         nothing = build_program((), None, self.links, 0, 0)

@@ -41,6 +41,11 @@ class Kinematics(ABC):
     settings: ClassVar[tuple[str, ...]] = ()
     gives: ClassVar[tuple[str, ...]] = ()
 
+    @property
+    def name(self) -> str:
+        """What messages call it: the name of the class."""
+        return type(self).__name__
+
     @abstractmethod
     def pose(self, scale_mm: FloatArray, settings: Mapping[str, float]) -> ArrayLike:
         """Where the tip is.
@@ -170,7 +175,7 @@ def _wrong(kinematics: Kinematics, what: str, found: FloatArray, allowed: str) -
 
 
 def _name(kinematics: Kinematics, what: str) -> str:
-    return f"kinematics {type(kinematics).__name__}.{what}"
+    return f"kinematics {kinematics.name}.{what}"
 
 
 def _completed(numbers: FloatArray) -> FloatArray:

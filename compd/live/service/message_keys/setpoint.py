@@ -101,8 +101,8 @@ class SetpointKeys(SentMessage):
     sources_mm: dict[str, Links] | None = Field(
         default=None,
         description="how much each cause asks for, for each link, mm: `joints`, `frame`, then by its id what each "
-        "effect adds to those before it; their sum is the correction before its limits. Machines without scales: how much "
-        "of `tip_correction_mm`, along each axis, before limits",
+        "effect adds to those before it; their sum is the correction before its limits. Machines without scales, "
+        "and `machine: external`: how much of `tip_correction_mm`, along each axis, before limits",
     )
     u_tip_um: float | None = Field(
         default=None,
