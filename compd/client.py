@@ -211,8 +211,8 @@ class Client:
         id : int, optional
             Any number from 0 to 2**53: setpoints that answer the target have it as `target_id`.
         tip_by_scale : 3 or 6 rows of one number for each scale, optional
-            With ``machine: external`` and scales: how much each scale moves the tip along x, y, z of {M}, mm per mm, and
-            turns what carries it about them, rad per mm.
+            With ``machine: external`` and scales: how much each scale moves the tip along x, y, z of {M}, mm per mm,
+            and turns what carries it about them, rad per mm.
 
         Raises
         ------

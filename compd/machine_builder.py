@@ -24,7 +24,7 @@ from compd.configuration import (
 from compd.errors import PluginError, Problem
 from compd.model import MachineModel, MachineParts, machine_constants, machine_model
 from compd.model.effects import MachineDetails
-from compd.model.external import ExternalModel, Kinematics, external_model
+from compd.model.external import ExternalModel, Kinematics, new_external_model
 from compd.model.kinematics import ACTUATOR_KINDS, Actuators, Arrangement, Contact, ToolOnPlate, ToolOnPlatform
 from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix, to_outer
@@ -74,7 +74,7 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
 def build_external(geometry: ExternalGeometry, wiring: Wiring) -> ExternalModel:
     """The model of `machine: external`. Raises PluginError where its class cannot be used."""
     own = own_kinematics(geometry)
-    model = external_model(own, geometry.links, geometry.scale_signal_period_mm or math.nan)
+    model = new_external_model(own, geometry.links, geometry.scale_signal_period_mm or math.nan)
     wired = [quantity.name for quantity in wiring.quantities]
     if missing := [name for name in model.settings if name not in wired]:
         raise PluginError(
@@ -105,10 +105,12 @@ def own_kinematics(geometry: ExternalGeometry) -> Kinematics | None:
     else:
         try:
             own = kind()
-        except (Exception, SystemExit) as error:  # a person's own code may raise anything
+        except (Exception, SystemExit) as error:  # noqa: BLE001  a person's own code may raise anything
             what = f"the class cannot be made without arguments: {type(error).__name__}: {error}"
     if what:
-        raise PluginError(Problem(where=where, what=what, value=f"{file}:{name}", next_step="mend the file or the name"))
+        raise PluginError(
+            Problem(where=where, what=what, value=f"{file}:{name}", next_step="mend the file or the name")
+        )
     return own
 
 

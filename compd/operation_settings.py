@@ -86,9 +86,7 @@ class QuantityWire(Section):
 class Wiring(Section):
     """Assignment of gauges to the quantities of the machine."""
 
-    scale: tuple[ScaleWire, ...] = Field(
-        default=(), description="one entry for the linear scale of every link"
-    )
+    scale: tuple[ScaleWire, ...] = Field(default=(), description="one entry for the linear scale of every link")
     joint: tuple[JointWire, ...] = Field(default=(), description="one entry for every joint comparator")
     frame: tuple[FrameWire, ...] = Field(
         default=(),

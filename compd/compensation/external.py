@@ -82,7 +82,7 @@ def external_as_applied(
 
 
 def _undone(change: FloatArray, pose: OwnPose) -> FloatArray:
-    """(6,) the correction that undoes a change of the pose, to first order; the rotation is nan where the pose has none."""
+    """(6,) what undoes a change of the pose, to first order; the rotation is nan where the pose has none."""
     correction = 0.0 - change
     if not np.isfinite(pose.rotation_M_rad).all():
         correction[3:] = np.nan

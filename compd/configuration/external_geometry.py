@@ -24,7 +24,7 @@ class UnknownGeometryError(ConfigurationError, AttributeError):
 
 
 class ExternalGeometry(Section):
-    """With `machine: external`: a class of your own, or a client, gives the pose, and compd adds the model's effects."""
+    """With `machine: external`: a class of your own or a client gives the pose; compd adds the model's effects."""
 
     kinematics: Annotated[str, Field(pattern=rf"^({CLIENT}|/.+\.py:[A-Za-z_]\w*)$")] = Field(
         description="FILE:CLASS, the absolute path of a Python file and a subclass of `compd.Kinematics` in it; or "

@@ -303,9 +303,7 @@ def examine(path: Path) -> Examined:
     checked = Sections(
         document,
         0 if is_external(document) else _count(part["geometry"], "rods"),
-        getattr(part["geometry"], "links", None)
-        if is_external(document)
-        else _count(part["geometry"], "actuators"),
+        getattr(part["geometry"], "links", None) if is_external(document) else _count(part["geometry"], "actuators"),
         _framed(document, part["geometry"]),
         part["lines"] or {},
         gauges,

@@ -93,7 +93,10 @@ class Daemon:
         gauges = configuration.gauge_objects()
         own_time = Histogram()
         pipeline = build_pipeline(
-            configuration, gauges, listed_code(configuration.effects), partial(TimedKinematics, cost=own_time, clock=clock)
+            configuration,
+            gauges,
+            listed_code(configuration.effects),
+            partial(TimedKinematics, cost=own_time, clock=clock),
         )
         self.period_s = pipeline.settings.period_s
         self.latest, self._wires = pipeline.latest, pipeline.wires

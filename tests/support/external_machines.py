@@ -51,7 +51,8 @@ def external_yaml(folder: Path, geometry: dict[str, Any], **changed: Any) -> Pat
     """A configuration with as many scales as the geometry has links, and a thermometer."""
     scales = SCALES[: geometry.get("links", 0)]
     channels = [
-        {"name": name, "function": 4, "address": 2 * k, "type": "float32", "unit": "mm"} for k, name in enumerate(scales)
+        {"name": name, "function": 4, "address": 2 * k, "type": "float32", "unit": "mm"}
+        for k, name in enumerate(scales)
     ]
     channels.append({"name": "spindle", "function": 4, "address": 10, "type": "float32", "unit": "degC"})
     data: dict[str, Any] = {
@@ -64,7 +65,7 @@ def external_yaml(folder: Path, geometry: dict[str, Any], **changed: Any) -> Pat
                 "line": "plc",
                 "unit": 1,
                 "noise_um": 0.05,
-                "acceleration_mm_per_s2": 1000000,
+                "acceleration_mm_per_s2": 1e15,
                 "channels": channels,
             }
         },
@@ -77,7 +78,7 @@ def external_yaml(folder: Path, geometry: dict[str, Any], **changed: Any) -> Pat
         },
         "loop": {"rate_hz": RATE_HZ, "stale_after_s": 5.0, "on_stale": "stop", "hold_s": 1.0, "lock_memory": False},
         "limits": {"correction_mm": 0.5, "slew_mm_per_s": 100.0, "on_limit": "clamp"},
-        "sockets": {"unix": {"path": str(folder / "s")}, "valid_for_s": 1.0},
+        "sockets": {"unix": {"path": str(folder / "s")}, "valid_for_s": 0.1},
         "state": {"directory": str(folder / "state")},
     }
     path = folder / "external.yaml"

@@ -219,14 +219,9 @@ def _compute(
         # what is not published changes no correction
         kept = next_state._replace(correction_mm=state.correction_mm, adopting=state.adopting)
         return _Outcome(State.REFUSED, "; ".join(filter(None, (refusal, usable.reason, limited.reason)))), kept
-    if isinstance(machine, ExternalModel):
-        compensation = _external_as_applied(
-            machine, compensation, values, started, target, limited.applied_mm, tip_correction_mm
-        )
-    elif tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
-        compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
-        if code := int(compensation.reason):
-            return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {Reason(code).meaning}"), next_state
+    compensation = _as_applied(compensation, machine, values, target, started, reached_mm, settings)
+    if code := int(compensation.reason):
+        return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {Reason(code).meaning}"), next_state
     reported, reason = _reported(usable, scales_state, scales_reason, limited)
     compensation = _with_applied(compensation, limited.applied_mm, settings)
     return (
@@ -352,23 +347,24 @@ def _tip_correction(
     return slewed(wanted_mm, state.tip_correction_mm, settings.period_s, settings.limits)
 
 
-def _external_as_applied(
-    machine: ExternalModel,
+def _as_applied(
     compensation: Compensation,
+    machine: MachineModel,
     values: GaugeValues,
-    warm_start: WarmStart,
     target: Target | None,
-    applied_mm: FloatArray,
-    tip_correction_mm: FloatArray | None,
+    warm_start: WarmStart,
+    reached_mm: FloatArray,
+    settings: CycleSettings,
 ) -> Compensation:
-    """The same for a machine with a pose of its own, in both modes: by its scales in CMM mode, by the derivatives of the
-    pose that the target has."""
-    if not machine.links:
+    """The compensation with the tip that belongs to the correction (n) with which it is reached, not to the one asked
+    for: in CMM mode, and where a client gives the pose. `reason` says whether it could be computed."""
+    if settings.corrects_pose or reached_mm is compensation.correction_mm:
         return compensation
-    reached_mm = applied_mm if tip_correction_mm is None else tip_correction_mm
-    if reached_mm is compensation.correction_mm:
+    if isinstance(machine, ExternalModel):
+        return external_as_applied(at_target(machine, target), compensation, values, warm_start, reached_mm)
+    if target is not None:
         return compensation
-    return external_as_applied(at_target(machine, target), compensation, values, warm_start, reached_mm)
+    return _with_tip_as_applied(compensation, values.scale_mm, reached_mm, warm_start, settings)
 
 
 def _with_tip_as_applied(

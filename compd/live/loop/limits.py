@@ -129,9 +129,7 @@ def _beyond(links: list[int], wanted: list[float], largest: float, action: str, 
     )
 
 
-def _slewing(
-    i: int, wanted: list[float], allowed: list[float], slew_mm_per_s: float, names: Sequence[str]
-) -> str:
+def _slewing(i: int, wanted: list[float], allowed: list[float], slew_mm_per_s: float, names: Sequence[str]) -> str:
     return f"{names[i]}: correction {wanted[i]:.4f} mm wanted, {allowed[i]:.4f} mm reached at {slew_mm_per_s:g} mm/s"
 
 

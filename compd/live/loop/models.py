@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 
 from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
@@ -13,6 +15,8 @@ from compd.live.memory import Snapshot
 from compd.model import EffectMemory, MachineModel, carry_over
 from compd.model.external import ExternalModel, OwnKinematicsError, given_pose
 from compd.model.kernels import Reason
+
+ModelT = TypeVar("ModelT", bound=MachineModel)
 
 
 def adopt_models(state: CycleState, models: Models) -> CycleState:
@@ -52,7 +56,7 @@ def compensate(
     return compensate_machine_tool(machine, np.array(target.tip_mm), target.rotation_B0_rad, values, warm_start)
 
 
-def at_target(machine: MachineModel, target: Target | None) -> MachineModel:
+def at_target(machine: ModelT, target: Target | None) -> ModelT:
     """The machine; one whose pose a client gives, at the pose of its target.
 
     Raises OwnKinematicsError where the target lacks the derivatives that the machine needs.

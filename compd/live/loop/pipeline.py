@@ -34,7 +34,12 @@ class Pipeline(NamedTuple):
         return self.settings.wires
 
 
-def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]], code: Code = OWN_CODE, watch: Callable[[Kinematics], Kinematics] | None = None) -> Pipeline:
+def build_pipeline(
+    configuration: Configuration,
+    gauges: Mapping[str, Gauge[Any]],
+    code: Code = OWN_CODE,
+    watch: Callable[[Kinematics], Kinematics] | None = None,
+) -> Pipeline:
     """`gauges`: those of the configuration, by name; `code`: which Python files effects may be in. `watch` makes of
     own kinematics what is called in its place.
 

@@ -257,7 +257,7 @@ def setpoint_line(message: Mapping[str, Any]) -> bytes:
 
 
 def _json_links(numbers: list[float], links: int, scales: int) -> dict[str, list[float]]:
-    """What is known of links and scales, by key.  numbers : begin with the links' lengths, setpoints and corrections."""
+    """What is known of links and scales, by key. numbers : first the links' lengths, setpoints, corrections."""
     parts = {
         "link_length_mm": numbers[:links],
         "scale_setpoint_mm": numbers[links : links + scales],
@@ -276,7 +276,9 @@ def _json_pose(values: Compensation, moved_mm: float) -> dict[str, Any]:
         "rotation_correction_rad": (rotation_correction_rad, _DECIMALS_RAD),
     }
     return {
-        name: _rounded(numbers, decimals, moved_mm) for name, (numbers, decimals) in known.items() if numbers is not None
+        name: _rounded(numbers, decimals, moved_mm)
+        for name, (numbers, decimals) in known.items()
+        if numbers is not None
     }
 
 

@@ -106,8 +106,11 @@ def _absent_tip_mm(
     tip_mm: FloatArray = missing_mm[:3] if settings.corrects_pose else tip_by_scale @ missing_mm
     if not less:
         return tip_mm
-    by_effects = effects_mm.sum(axis=0) * ((1.0 - weight) / weight)
-    return tip_mm + (by_effects if settings.corrects_pose or settings.has_own_pose else tip_by_scale @ by_effects)
+    by_effects: FloatArray = effects_mm.sum(axis=0) * ((1.0 - weight) / weight)
+    if not (settings.corrects_pose or settings.has_own_pose):
+        by_effects = tip_by_scale @ by_effects
+    tip_mm += by_effects
+    return tip_mm
 
 
 def length_bounds_mm(

@@ -243,8 +243,8 @@ class ModelLoader:
         needed = (needed_quantities(fitted.effect, model.links) for fitted in machine.live_effects)
         names = tuple(dict.fromkeys(chain(self.without_effects.quantities, *needed)))
         try_model(machine, names, text.file)
-        if isinstance(model, ExternalModel):  # its own kinematics gives these
-            names = tuple(name for name in names if name not in model.columns)
+        if isinstance(model, ExternalModel):  # its own kinematics gives the others, or an axis that stays still
+            names = tuple(name for name in names if name in self._wires.quantity_names)
         # a setting is commanded, and has no range but its own
         fitted_range = {
             name: range_ for name, range_ in file.fitted_range.items() if name not in self.without_effects.quantities

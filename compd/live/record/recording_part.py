@@ -11,7 +11,7 @@ from compd.files import read_small_file, sync_directory, write_new_file
 from compd.live.record.appended_file import AppendedFile
 from compd.live.record.part_table import part_table
 from compd.live.record.table_rows import Message, TableRows
-from compd.recording import sidecar_contents, sidecar_text
+from compd.recording import EXTERNAL, sidecar_contents, sidecar_text
 from compd.tables import TableFormat
 from compd.text import encode_compact
 
@@ -59,7 +59,7 @@ class RecordingPart:
         self.start_s: float = first_readings["time_s"]
         self.rows = 0
         self._rows_added = 0
-        self._table_rows = TableRows(watch, first_readings, origin_s)
+        self._table_rows = TableRows(watch, first_readings, origin_s, version["machine"] == EXTERNAL)
         sidecar = sidecar_text(self._sidecar(version, watch, started_at)).encode()
         first_lines = b"".join(encode_compact(message).encode() + b"\n" for message in first_messages)
         self._table = part_table(stem, table_format, self._table_rows.names, self._table_rows.in_full)

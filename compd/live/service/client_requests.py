@@ -94,8 +94,8 @@ class TargetRequest(Request):
     )
     tip_by_scale: TipByScale | None = Field(
         default=None,
-        description="`machine: external` with scales: how much each scale moves the tip, in {M}, mm per mm: 3 rows, x y "
-        "z, of one number for each scale; 3 more rows turn what carries the tip about x y z, rad per mm",
+        description="`machine: external` with scales: how much each scale moves the tip, in {M}, mm per mm: 3 rows, x "
+        "y z, of one number for each scale; 3 more rows turn what carries the tip about x y z, rad per mm",
     )
     time_s: Coordinate | None = Field(
         default=None,
@@ -113,7 +113,9 @@ class TargetRequest(Request):
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         keys = context.target_keys
         if not keys.tip:
-            raise ProtocolError(ErrorCode.BAD_MESSAGE, "this machine's own kinematics gives the pose: it takes no target")
+            raise ProtocolError(
+                ErrorCode.BAD_MESSAGE, "this machine's own kinematics gives the pose: it takes no target"
+            )
         if foreign := sorted(self.model_fields_set.difference(keys.names)):
             raise unknown_key(self.wire_name, foreign[0], keys.names)
         made_s = client.arrived_s if self.time_s is None else min(self.time_s, client.arrived_s)

@@ -32,7 +32,7 @@ _LINKS_THAT_TURN = 4
 
 @dataclass(frozen=True, eq=False)
 class ExternalModel(MachineModel):
-    """The model of such a machine. Build it with `external_model`.
+    """The model of such a machine. Build it with `new_external_model`.
 
     Its scales since machine zero are its links; it has no joints and no frame of which anything is known. What effects
     add at `reference` is added to the pose, what they add at `scale` and `link` is carried there by the derivatives.
@@ -101,7 +101,7 @@ def acts_on_machine(effect: Effect) -> bool:
     return effect.live or bool(effect.declared)
 
 
-def external_model(own: Kinematics | None, links: int, scale_signal_period_mm: float = np.nan) -> ExternalModel:
+def new_external_model(own: Kinematics | None, links: int, scale_signal_period_mm: float = np.nan) -> ExternalModel:
     """A machine with so many scales. own : None where clients give the pose."""
     nowhere, no_points, unknown = np.zeros(3), np.zeros((0, 3)), np.full(3, np.nan)
     frame = FrameGeometry(

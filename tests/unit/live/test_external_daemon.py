@@ -94,7 +94,7 @@ def test_a_class_that_fails_is_refused_with_its_words_and_the_loop_goes_on(tmp_p
         before = first(setpoints, is_ok)
         device.values["x"] = 60.0
         refused = first(setpoints, lambda s: s["state"] == "refused")
-        assert f"kinematics Gantry.pose: fails: {error.split('(')[0]}" in refused["reason"]
+        assert f"kinematics Gantry.pose: fails: {error.partition('(')[0]}" in refused["reason"]
         assert "tip_M_mm" not in refused
         device.values["x"] = 40.0
         after = first(setpoints, lambda s: is_ok(s) and s["tip_M_mm"][0] == pytest.approx(40.0, abs=1e-4))

@@ -37,6 +37,12 @@ class MachineLimitKeys(Keys):
     correction_mm: float = Field(description="largest, to either side, mm")
     slew_mm_per_s: float = Field(description="fastest change, mm/s")
     on_limit: Literal["clamp", "refuse"] = Field(description="what happens beyond them")
+    tip_correction_mm: float | None = Field(
+        default=None, description="machines without scales: largest of the tip, mm; absent: `correction_mm`"
+    )
+    rotation_correction_rad: float | None = Field(
+        default=None, description="machines without scales: largest of the attitude, rad; absent: as the tip's at 100 mm"
+    )
     tip_error_um: float | None = Field(
         default=None, description="largest bound of the tip's error that is valid, um; absent: none"
     )

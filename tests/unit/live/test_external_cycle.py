@@ -1,0 +1,160 @@
+"""Cycles of `machine: external` without lines: limits, a class that fails, and a recording that is replayed."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compd.errors import StateError
+from compd.live.loop import Target
+from compd.live.loop.limits import limit_pose_correction
+from compd.live.machine import Models
+from compd.live.record.agreement import Agreement
+from compd.live.record.compared_table import differing_cells
+from compd.live.record.replay import RecordedCycles, replay_cycles
+from compd.machine_check import load_whole
+from compd.operation_settings import LimitSettings
+from compd.setpoint_states import State
+from tests.support.external_machines import GANTRY, class_geometry, external_yaml
+from tests.support.live_machine import Machine
+from tests.support.live_models import file_with
+from tests.support.recorded_run import Run
+
+X, Y, Z = "plc.x", "plc.y", "plc.z"
+BAD_BEYOND_50 = GANTRY.replace("x, y, z = scale_mm", "x, y, z = scale_mm\n        if x > 50:\n            return [x]")
+# The gantry is less square than the class says: along y, so much of x.
+SQUARE = {
+    "id": "square",
+    "physics": "the axes are less square than the class says",
+    "port": "reference",
+    "sensitivity": "square",
+    "parameters": {"square": {"unit": "um/mm", "plausible": [-10, 10], "source": "a guess"}},
+}
+SHIFT = {
+    "id": "scale_shift",
+    "physics": "scales were shifted",
+    "port": "scale",
+    "formula": "k",
+    "parameters": {"k": {"unit": "um", "plausible": [-1000, 1000], "source": "a guess"}},
+}
+LIMITS = {"correction_mm": 0.2, "slew_mm_per_s": 1000.0, "on_limit": "clamp"}
+
+
+def gantry(folder: Path, text: str = GANTRY, **changed) -> Machine:
+    return Machine(load_whole(external_yaml(folder, class_geometry(folder, text), **changed)))
+
+
+def with_effect(live: Machine, folder: Path, effect, **theta) -> Machine:
+    links = live.configuration.geometry.links
+    file = file_with(folder / "model.yaml", effect, name="external", links=links, **theta)
+    live.commands.models = Models(live.loader.read(file))
+    return live
+
+
+def test_what_the_class_gives_is_read_by_an_effect(tmp_path):
+    live = with_effect(gantry(tmp_path, limits=LIMITS), tmp_path, SQUARE, square=0.002)
+    live.change_mm |= {X: 40.0, Y: 7.0}
+    setpoint = live.step()
+    assert setpoint.state is State.OK
+    assert setpoint.values.tip_M_mm == pytest.approx([40.0, 7.04 + 0.08e-3, 300.0], abs=1e-9)
+    assert setpoint.values.pose_correction[:3] == pytest.approx([0, -0.08e-3, 0], abs=1e-9)
+
+
+def test_a_correction_beyond_its_limit_has_the_tip_that_belongs_to_what_is_applied(tmp_path):
+    live = with_effect(gantry(tmp_path, limits=LIMITS), tmp_path, SHIFT, scale_shift=300.0)
+    setpoint = live.step()
+    assert setpoint.state is State.CLAMPED
+    assert setpoint.values.correction_mm == pytest.approx([-0.2] * 3, abs=1e-12)
+    assert setpoint.values.tip_M_mm == pytest.approx([0.2, 0.2 + 0.2e-3, 299.8], abs=1e-6)
+    pose = setpoint.values.tip_M_mm + setpoint.values.pose_correction[:3]
+    assert pose == pytest.approx([0, 0, 300], abs=1e-9)
+
+
+def test_a_clamped_correction_of_a_commanded_pose_is_what_the_scales_may_do(tmp_path):
+    yaml = external_yaml(tmp_path, {"kinematics": "client", "links": 2}, limits=LIMITS)
+    live = with_effect(Machine(load_whole(yaml)), tmp_path, SHIFT, scale_shift=300.0)
+    rows = ((1.0, 0.0), (0.0, 2.0), (0.0, 0.0))
+    live.commands.target = Target((1.0, 2.0, 3.0), tip_by_scale=rows)
+    setpoint = live.step()
+    assert setpoint.state is State.CLAMPED
+    assert setpoint.values.tip_M_mm.tolist() == [1, 2, 3]
+    assert setpoint.values.pose_correction[:3] == pytest.approx([-0.2, -0.4, 0], abs=1e-12)
+
+
+def limited(wanted, previous=(0.0,) * 6, period_s=1.0, **limits):
+    settings = LimitSettings(**{**LIMITS, **limits})
+    return limit_pose_correction(np.array(wanted), np.array(previous), period_s, settings)
+
+
+def test_a_rotation_is_limited_as_the_length_by_which_it_moves_a_point():
+    own = {"tip_correction_mm": 0.1, "rotation_correction_rad": 0.002}
+    within = limited([0.05, 0, 0, 0, 0, 0.0015], **own)
+    assert (within.state, within.applied_mm.tolist()) == (State.OK, [0.05, 0, 0, 0, 0, 0.0015])
+    beyond = limited([0, 0, 0, 0, 0, -0.003], **own)
+    assert beyond.state is State.CLAMPED
+    assert beyond.applied_mm == pytest.approx([0, 0, 0, 0, 0, -0.002], abs=1e-15)
+    assert "rotation c: correction -0.150 mm beyond -0.100 mm, clamped" in beyond.reason
+    assert limited([0, 0, 0, 0, 0, 0.0019]).state is State.OK, "0.2 mm at 100 mm, where the limits do not say"
+    assert limited([0, 0, 0, 0, 0, 0.0021]).state is State.CLAMPED
+
+
+def test_a_correction_of_a_pose_slews_and_keeps_a_rotation_that_is_not_known():
+    slewing = limited([0.1, 0, 0, math.nan, math.nan, math.nan], period_s=0.05, slew_mm_per_s=1.0)
+    assert slewing.state is State.SLEWING
+    assert slewing.applied_mm[:3] == pytest.approx([0.05, 0, 0], abs=1e-15)
+    assert np.isnan(slewing.applied_mm[3:]).all()
+    known_again = limited([0.1, 0, 0, 0, 0, 0], slewing.applied_mm)
+    assert known_again.applied_mm.tolist() == [0.1, 0, 0, 0, 0, 0]
+    refused = limited([0.3, 0, 0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0], on_limit="refuse")
+    assert (refused.state, refused.applied_mm.tolist()) == (State.REFUSED, [0.1, 0, 0, 0, 0, 0])
+
+
+@pytest.mark.parametrize("port", ["frame", "base_joint", "tool"])
+def test_a_model_with_an_effect_inside_the_kinematics_is_refused(tmp_path, port):
+    inside = {**SHIFT, "id": "inside", "port": port, "axis": "z"}
+    if port == "frame":
+        inside.pop("axis")
+    with pytest.raises(StateError, match=f"acts at the port {port}"):
+        with_effect(gantry(tmp_path), tmp_path, inside)
+
+
+def test_a_recording_replays_bit_for_bit_with_refused_and_clamped_cycles(tmp_path):
+    live = with_effect(gantry(tmp_path, BAD_BEYOND_50, limits=LIMITS), tmp_path, SHIFT, scale_shift=300.0)
+    run = Run(live)
+    sent = []
+    with run.recorder(tmp_path / "run") as recorder:
+        for number, (line, message, setpoint) in enumerate(run.quiet(60)):
+            live.change_mm[X] = 60.0 if 20 < number < 30 else float(number) / 3
+            recorder.put(line, message)
+            sent.append(setpoint)
+    assert {State.CLAMPED, State.REFUSED} <= {setpoint.state for setpoint in sent}
+    assert "Gantry.pose: gives no such numbers" in next(s.reason for s in sent if s.state is State.REFUSED)
+    replayed = list(replay_cycles(live.configuration, RecordedCycles(tmp_path / "run"), [tmp_path / "model.yaml"]))
+    assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
+    assert {cycle.agreement for cycle in replayed} == {Agreement.SAME}
+    assert not list(differing_cells(RecordedCycles(tmp_path / "run")))
+    with next(tmp_path.glob("run-*.csv")).open() as file:
+        rows = list(csv.DictReader(file))
+    for row, setpoint in zip(rows, sent, strict=True):
+        given = setpoint.values
+        model_x = float(row["model_x_mm"] or "nan")
+        expected = math.nan if given is None else float(row["scale_1_mm"])
+        assert model_x == pytest.approx(expected, abs=2e-7, nan_ok=True)
+
+
+def test_targets_of_a_client_are_recorded_with_their_derivatives(tmp_path):
+    yaml = external_yaml(tmp_path, {"kinematics": "client", "links": 1}, limits=LIMITS)
+    live = with_effect(Machine(load_whole(yaml)), tmp_path, SHIFT, scale_shift=30.0)
+    run, sent = Run(live), []
+    with run.recorder(tmp_path / "run") as recorder:
+        for number, (line, message, setpoint) in enumerate(run.quiet(20)):
+            live.commands.target = Target((1.0, 2.0, number), tip_by_scale=((0.3, ), (0.1 * number, ), (0.0, )))
+            recorder.put(line, message)
+            sent.append(setpoint.to_json())
+    replayed = list(replay_cycles(live.configuration, RecordedCycles(tmp_path / "run"), [tmp_path / "model.yaml"]))
+    assert [cycle.replayed for cycle in replayed] == sent
+    assert b'"tip_correction_mm":[-0.009,' in sent[-1]
