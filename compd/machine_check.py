@@ -69,7 +69,6 @@ def examine_whole(path: Path) -> Examined:
                 if isinstance(model, ExternalModel):
                     problems += _faults_at_zero(document, model)
                 else:
-                    problems += _not_served(document, model)
                     warnings += [
                         *_stroke_warnings(document, examined.geometry, model),
                         *slips(document, examined.geometry, model),
@@ -84,14 +83,6 @@ def examine_whole(path: Path) -> Examined:
     if configuration is not None:
         configuration = None if problems else replace(configuration, warnings=tuple(warnings))
     return examined._replace(configuration=configuration, problems=problems, warnings=warnings)
-
-
-def _not_served(document: Document, model: MachineModel) -> Iterator[Problem]:
-    """A problem where compensation and predictions do not take the machine."""
-    try:
-        model.structure  # noqa: B018
-    except KinematicsError as error:
-        yield from (replace(problem, where=document.where(("geometry",))) for problem in error.problems)
 
 
 def _faults_at_zero(document: Document, model: ExternalModel) -> Iterator[Problem]:

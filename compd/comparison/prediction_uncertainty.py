@@ -14,7 +14,7 @@ from compd.model import (
     GAUGE_PORTS,
     Deltas,
     GaugeNoise,
-    base_joints_by_distances,
+    carried_by_distances,
     gauge_variance,
     parameter_variance,
     split_by_port,
@@ -65,18 +65,19 @@ def first_order_uncertainty(
 
     covariance : (P, P) of all fitted numbers jointly; nan where a number's error is not known, which makes the
     prediction's nan.  noise : None for an external model, whose gauges are not known: nan.
-    The frame moves by micrometres in a metre: its derivatives are taken once, at the median of its readings.
+    The frame moves by micrometres in a metre: its derivatives are taken once, at the median of the readings.
     """
     shape = aligned.measured_mm.shape
     variance = np.full(shape, np.nan)
     if noise is not None:
         assert aligned.model is not None
         middle_mm = aligned.model.zero.distances_mm + np.nanmedian(aligned.rows.frame_mm, axis=0)
-        by_port = {
-            port: aligned.shown(sensitivity)
-            for port, sensitivity in aligned.sensitivity(["scale", "joint", "base_joint"]).items()
-        }
-        by_port["frame"] = by_port["base_joint"] @ base_joints_by_distances(aligned.model, middle_mm[None])[0]
+        carried = carried_by_distances(
+            aligned.model, middle_mm[None], np.nanmedian(aligned.rows.scale_mm, axis=0)[None]
+        )
+        sensitivities = aligned.sensitivity(["scale", "joint", *carried])
+        by_port = {port: aligned.shown(sensitivity) for port, sensitivity in sensitivities.items()}
+        by_port["frame"] = np.asarray(sum(by_port.pop(port) @ moved[0] for port, moved in carried.items()))
         variance = gauge_variance(by_port, noise)
     parameters = np.zeros(shape)
     if fitted:

@@ -84,17 +84,19 @@ def _compensate(
     # the kernel computes without effects, Python what its effects add there, and the kernel the whole
     without = replace(model, effects=())
     bare = _solve(without, rows, EffectMemory(), machine_tool, 1)
-    effects_at_mm = bare.results["scale_setpoint_mm"][:, : model.links].copy() if machine_tool else rows.gauges.scale_mm
+    effects_at_mm = (
+        bare.results["scale_setpoint_mm"][:, : model.scales].copy() if machine_tool else rows.gauges.scale_mm
+    )
     for _ in range(_EFFECT_PASSES if machine_tool else 1):
         inputs = _effect_inputs(model, rows, bare.results, values, effects_at_mm)
         given_mm, memories = python_effects(model, inputs, memory, machine_tool)
         solved = _solve(model, rows, memory, machine_tool, 1, GivenRows(effects_at_mm, given_mm))
-        effects_at_mm = solved.results["scale_setpoint_mm"][:, : model.links].copy()
+        effects_at_mm = solved.results["scale_setpoint_mm"][:, : model.scales].copy()
     return _result(model, rows, solved, memory, memories, machine_tool)
 
 
 class _Solved(NamedTuple):
-    """What the kernel leaves: results (N,), contributions_mm (N, 2 + K, n), and the memory after the last row."""
+    """What the kernel leaves: results (N,), contributions_mm (N, 2 + K, m), and the memory after the last row."""
 
     results: NDArray[np.void]
     contributions_mm: FloatArray
@@ -110,10 +112,10 @@ def _solve(
     given: GivenRows | None = None,
 ) -> _Solved:
     program = model.program
-    count, links = rows.gauges.scale_mm.shape
+    count, scales = rows.gauges.scale_mm.shape
     solved = _Solved(
         _uninitialised(count, RESULT),
-        np.empty((count, 2 + len(program.arrays.effects), links)),
+        np.empty((count, 2 + len(program.arrays.effects), scales)),
         memory.pack(model, rows.gauges.joint_mm.shape[1]),
     )
     compensate_rows(
@@ -123,7 +125,7 @@ def _solve(
         rows.gauges,
         rows.quantities,
         rows.wanted,
-        given or _nothing_given(count, links, program.size),
+        given or _nothing_given(count, scales, program.size),
         rows.warm,
         solved.memory.arrays,
         SolvedRows(_uninitialised(1, WORKSPACE), solved.results),
@@ -133,8 +135,8 @@ def _solve(
 
 
 @lru_cache(maxsize=8)
-def _nothing_given(count: int, links: int, size: int) -> GivenRows:
-    return GivenRows(np.full((count, links), np.nan), np.empty((0, 0, size)))
+def _nothing_given(count: int, scales: int, size: int) -> GivenRows:
+    return GivenRows(np.full((count, scales), np.nan), np.empty((0, 0, size)))
 
 
 def _uninitialised(count: int, structure: np.dtype[np.void]) -> NDArray[np.void]:
@@ -155,7 +157,7 @@ def _effect_inputs(
             for name, quantity in values.quantities.items()
         },
         values.quantities_at_zero,
-        bare["bare_frame"]["base_joints_M_mm"][:, :n],
+        pose["base_joints_M_mm"][:, :n],
         Pose(
             pose["origin_M_mm"],
             pose["rotation_M_P"],
@@ -177,7 +179,7 @@ def _result(
     machine_tool: bool,
 ) -> tuple[Compensation, WarmStart]:
     """The compensation and the next warm start. memories : of the Python effects."""
-    n, lead = model.links, rows.lead
+    n, m, lead = model.links, model.scales, rows.lead
     results: Any = solved.results.reshape(lead) if lead else solved.results[0]
     contributions_mm = (
         solved.contributions_mm.reshape(*lead, *solved.contributions_mm.shape[1:])
@@ -203,9 +205,9 @@ def _result(
         ),
         pose["link_length_mm"][..., :n],
         results["target_B_mm"],
-        results["nominal_scale_mm"][..., :n],
-        results["scale_setpoint_mm"][..., :n],
-        results["correction_mm"][..., :n],
+        results["nominal_scale_mm"][..., :m],
+        results["scale_setpoint_mm"][..., :m],
+        results["correction_mm"][..., :m],
         Contributions(model.contribution_names, np.moveaxis(contributions_mm, -2, 0) if lead else contributions_mm),
         results["reason"],
     )
@@ -213,7 +215,13 @@ def _result(
         memory = EffectMemory(commanded=machine_tool, packed=solved.memory)
         if memories:
             memory = EffectMemory(memory.motion, {**memory.memories, **memories}, machine_tool)
-    warm = WarmStart(results["warm_supports_M_mm"], results["warm_origin_M_mm"], results["warm_rotation_M_P"], memory)
+    warm = WarmStart(
+        results["warm_supports_M_mm"],
+        results["warm_origin_M_mm"],
+        results["warm_rotation_M_P"],
+        memory,
+        results["warm_actuator_mm"][..., :m] if model.by_actuators else None,
+    )
     return compensation, warm
 
 

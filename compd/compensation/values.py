@@ -15,7 +15,7 @@ from compd.model.kinematics import Frame
 class GaugeValues(NamedTuple):
     """One snapshot, or N rows of them: changes since machine zero, signed as in equations (1), (6) and (7).
 
-    scale_mm : (..., n).  joint_mm : (..., k), in the wiring's order.  frame_mm : (..., 9), t1..t3, u1..u6; (..., 0)
+    scale_mm : (..., m).  joint_mm : (..., k), in the wiring's order.  frame_mm : (..., 9), t1..t3, u1..u6; (..., 0)
         where no comparator measures the frame, which is taken to stand still.
     quantities : anything else by its name with unit (temperatures, forces), each (...): what effects need, or empty.
     time_s : (...), monotonic, for effects with a memory; rows follow each other in time.
@@ -35,27 +35,34 @@ class WarmStart(NamedTuple):
 
     supports_M_mm : (..., 3, 3).  origin_M_mm : (..., 3), rotation_M_P : (..., 3, 3), of the moving platform.
     effects : what the model's effects remember; of N rows, after the last one.
+    actuator_mm : (..., m), where the inverse takes the actuators as its unknowns; else None.
     """
 
     supports_M_mm: FloatArray
     origin_M_mm: FloatArray
     rotation_M_P: FloatArray
     effects: EffectMemory = EffectMemory()
+    actuator_mm: FloatArray | None = None
 
     @classmethod
     def at_zero(cls, model: MachineModel) -> WarmStart:
         """Machine zero: the first start, and the one that depends on no history."""
         zero = model.zero
-        return cls(model.frame.zero_supports_M_mm, zero.platform_origin_M_mm, zero.rotation_M_P)
+        return cls(
+            model.frame.zero_supports_M_mm,
+            zero.platform_origin_M_mm,
+            zero.rotation_M_P,
+            actuator_mm=zero.actuator_mm if model.by_actuators else None,
+        )
 
 
 class Contributions(Mapping[str, FloatArray]):
-    """The contribution (..., n) of each cause, by its name; their sum is the correction but for rounding.
+    """The contribution (..., m) of each cause, by its name; their sum is the correction but for rounding.
 
     Attributes
     ----------
     causes : "joints", "frame", and the id of each effect.
-    by_cause_mm : (K, ..., n), in the order of `causes`.
+    by_cause_mm : (K, ..., m), in the order of `causes`.
     """
 
     def __init__(self, causes: Sequence[str], by_cause_mm: FloatArray) -> None:
@@ -85,11 +92,11 @@ class Compensation(NamedTuple):
     frame : the machine frame now, with its displacement since machine zero.
     link_length_mm : (..., n): in CMM mode those measured, equation (1); in machine-tool mode those needed.
     target_B_mm : (..., 3), the target in today's {B}, equation (8).
-    nominal_scale_mm : (..., n), the command without compensation.
-    scale_setpoint_mm : (..., n), what the scales must show for the tip to be on the target.
-    correction_mm : (..., n) = scale_setpoint_mm - nominal_scale_mm.
-    contributions : the correction by cause, (..., n) each; of a machine without scales, and of an
-        external one, that of the tip, (3) each.
+    nominal_scale_mm : (..., m), the command without compensation.
+    scale_setpoint_mm : (..., m), what the scales must show for the tip to be on the target.
+    correction_mm : (..., m) = scale_setpoint_mm - nominal_scale_mm.
+    contributions : the correction by cause, (..., m) each; of a machine without scales, and of an external one, that
+        of the tip, (3) each.
     reason : (...), a Reason, of the step that failed first.
     rotation_M_rad : (3,), attitude of what carries the tip, as a rotation vector in {M}; None where it is not told.
     pose_correction : (6,), what is added to the commanded tip, mm, and to the commanded attitude, rad, in {B0}: the

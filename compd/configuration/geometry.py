@@ -17,6 +17,7 @@ from compd.configuration.mechanism import (
 )
 from compd.configuration.vectors import Direction, Vector
 from compd.documents import Positive, Section
+from compd.link_count import LinkCount
 
 LINKS: Mapping[str, int] = {"tripod_3spr": 3, "hexapod_6ups": 6}
 
@@ -115,8 +116,8 @@ class Geometry(Section):
 
     @property
     def links(self) -> int:
-        """Number of links (rods), 3 to 6."""
-        return LINKS[self.kinematics] if self.kinematics else len(self.rods)
+        """Number of links (rods), 3 to 6, which knows the number of scales."""
+        return LinkCount(LINKS[self.kinematics] if self.kinematics else len(self.rods), self.scales)
 
     @property
     def scales(self) -> int:

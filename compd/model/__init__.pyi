@@ -18,7 +18,7 @@ from .observer import observe_external as observe_external
 from .prediction import predict as predict
 from .python_effect import python_effects as python_effects
 from .sensitivity import Sensitivity as Sensitivity
-from .sensitivity import base_joints_by_distances as base_joints_by_distances
+from .sensitivity import carried_by_distances as carried_by_distances
 from .sensitivity import link_residuals as link_residuals
 from .sensitivity import sensitivities as sensitivities
 from .sensitivity import tip_by_links as tip_by_links

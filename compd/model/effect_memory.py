@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any, NamedTuple
 
+from compd.link_count import scale_count
 from compd.model.deltas import Memories
 from compd.model.effects import EffectProgram
 from compd.model.kernels import MemoryArrays
@@ -17,11 +18,11 @@ _NO_MEMORIES: Memories = {}
 class PackedMemory(NamedTuple):
     """What the kernel of one program leaves; see `compd.model.kernels.motion` and `compd.model.effects.effect_program`.
 
-    links : n.
+    scales : m.
     """
 
     program: EffectProgram
-    links: int
+    scales: int
     arrays: MemoryArrays
 
 
@@ -54,8 +55,8 @@ class EffectMemory:
     @cached_property
     def motion(self) -> Motion | None:
         assert self._packed is not None
-        _, links, (row, _) = self._packed
-        return unpack_motion(row, links, (len(row) - 1 - 4 * links) // 2)
+        _, scales, (row, _) = self._packed
+        return unpack_motion(row, scales, (len(row) - 1 - 4 * scales) // 2)
 
     @cached_property
     def memories(self) -> Memories:
@@ -69,12 +70,12 @@ class EffectMemory:
 
     def pack(self, model: MachineModel, joints: int) -> PackedMemory:
         """A copy for the kernel of this machine with k joint comparators, which changes it."""
-        program, links = model.program, model.links
+        program, scales = model.program, scale_count(model.links)
         if self._packed is not None and self._packed.program is program:
             kept = self._packed.arrays
-            return PackedMemory(program, links, MemoryArrays(kept.motion.copy(), kept.memories.copy()))
-        motion = pack_motion(self.motion if model.needs_motion else None, links, joints)
-        return PackedMemory(program, links, MemoryArrays(motion, program.pack_memories(self.memories)))
+            return PackedMemory(program, scales, MemoryArrays(kept.motion.copy(), kept.memories.copy()))
+        motion = pack_motion(self.motion if model.needs_motion else None, scales, joints)
+        return PackedMemory(program, scales, MemoryArrays(motion, program.pack_memories(self.memories)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return EffectMemory, (self.motion, self.memories, self.commanded)

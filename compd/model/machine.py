@@ -9,14 +9,16 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import KinematicsError, Problem
+from compd.link_count import LinkCount
 from compd.model.effects import AtZero, EffectProgram, FittedEffect, MachineConstants, MachineDetails, build_program
 from compd.model.kernels import require
 from compd.model.kinematics import (
     Actuators,
     Arrangement,
     Contact,
+    Frame,
     FrameGeometry,
     Mechanism,
     base_pose,
@@ -24,6 +26,7 @@ from compd.model.kinematics import (
     forward_kinematics,
     inverse_by_actuators,
     link_forces,
+    links_at,
     solve_frame,
 )
 from compd.model.structures import MODEL
@@ -59,8 +62,8 @@ class MachineModel:
 
     @property
     def links(self) -> int:
-        """Number of links, 3 to 6."""
-        return int(self.platform_joints_P_mm.shape[0])
+        """Number of links, 3 to 6, which knows the number of scales."""
+        return LinkCount(self.platform_joints_P_mm.shape[0], self.scales)
 
     @property
     def scales(self) -> int:
@@ -105,10 +108,9 @@ class MachineModel:
     @cached_property
     def structure(self) -> NDArray[np.void]:
         """(1,) The machine as the compensation's kernel reads it; see `compd.model.structures.MODEL`."""
-        require_extending(self.actuators, self.hinges)
         structure = np.zeros(1, dtype=MODEL)
         model, n, k = structure[0], self.links, self.joint_weights.shape[1]
-        model["links"], model["joints"], model["axes"] = n, k, len(self.revolute_axes_P)
+        model["links"], model["scales"], model["joints"], model["axes"] = n, self.scales, k, len(self.revolute_axes_P)
         model["tool_on_plate"], model["needs_motion"] = self.arrangement.on_plate, self.needs_motion
         model["tool_mm"] = self.arrangement.tool_mm
         for name in ("plate_points_M_mm", "zero_supports_M_mm", "zero_origin_M_mm", "zero_rotation_M_B"):
@@ -119,18 +121,80 @@ class MachineModel:
         model["revolute_axes_P"][: len(self.revolute_axes_P)] = self.revolute_axes_P
         model["hinges"][: len(self.hinges)] = self.hinges
         model["joint_weights"][:n, :k] = self.joint_weights
-        model["zero_base_joints_M_mm"][:n] = self.zero.base_joints_M_mm
+        model["zero_base_joints_M_mm"][:n] = self.base_joints_at_0_M_mm
         model["zero_link_length_mm"][:n] = self.zero.link_length_mm
         model["zero_distances_mm"] = self.zero.distances_mm
+        model["by_actuators"] = self.by_actuators
+        for name in ("kinds", "cosine_M", "sine_M", "radius_mm", "of_link", "rod_length_mm", "fixed"):
+            values = getattr(self.actuators, name)
+            model[name][: len(values)] = values
+        model["zero_actuator_mm"][: self.scales] = self.zero.actuator_mm
         return structure
+
+    @cached_property
+    def by_actuators(self) -> bool:
+        """Whether the inverse takes the actuators as its unknowns; else `inverse_kinematics` gives the lengths."""
+        extended = not self.actuators.kinds.any() and np.array_equal(self.actuators.of_link, np.arange(self.scales))
+        of_links = np.stack([np.arange(len(self.hinges)), np.zeros(len(self.hinges), dtype=np.int64)], axis=1)
+        free = 3 if len(self.hinges) else 6
+        fixed = self.actuators.fixed[:free].all() and not self.actuators.fixed[free:].any()
+        return not (extended and np.array_equal(self.hinges, of_links) and fixed and len(self.hinges) in (0, 3))
+
+    @cached_property
+    def base_joints_at_0_M_mm(self) -> FloatArray:
+        """(n, 3) at machine zero, with the actuators at 0: of a turning one the centre of its circle."""
+        if not self.actuators.kinds.any():
+            return self.zero.base_joints_M_mm
+        frame = self.frame
+        supports_M_mm = frame.zero_supports_M_mm[frame.support_of_joint]
+        return np.asarray(to_outer(frame.zero_rotation_M_B, np.zeros(3), frame.joint_offsets_B_mm) + supports_M_mm)
 
     def with_effect_weight(self, weight: float) -> Self:
         """The same machine with all fitted numbers of its effects times `weight`, 0 to 1: a model that is faded in."""
         return replace(self, effects=tuple(replace(fitted, theta=fitted.theta * weight) for fitted in self.effects))
 
     def mechanism(self, base_joints_M_mm: FloatArray) -> Mechanism:
-        """The links with the base joints (..., n, 3) where they are now."""
+        """The links with the base joints (..., n, 3) where they are now; axes that the base carries as at zero."""
         return Mechanism(base_joints_M_mm, self.platform_joints_P_mm, self.revolute_axes_P, self.hinges)
+
+    @cached_property
+    def extended(self) -> BoolArray:
+        """(n,) True for a link that its actuator makes longer."""
+        return np.asarray(self.actuators.kinds[self.actuators.of_link] == 0)
+
+    @cached_property
+    def base_turns_parts(self) -> bool:
+        """Whether the base carries rails, circles or hinges, which turn with it."""
+        return bool(self.actuators.kinds.any() or self.hinges[:, 1].any())
+
+    def lengths_mm(self, scale_mm: FloatArray) -> FloatArray:
+        """Lengths (..., n) of the links with the scales (..., m) at these readings: l0 + gL of equation (1)."""
+        return np.asarray(
+            self.zero.link_length_mm + np.where(self.extended, scale_mm[..., self.actuators.of_link], 0.0)
+        )
+
+    def links_on(self, frame: Frame, scale_mm: FloatArray) -> tuple[Mechanism, FloatArray]:
+        """The links on a frame (...) with the scales (..., m) at these readings, and their lengths (..., n) in mm.
+
+        The lengths are those of equation (1) before what the joints take from them.
+        """
+        length_mm = self.lengths_mm(scale_mm)
+        if not self.base_turns_parts:
+            return self.mechanism(frame.base_joints_M_mm), length_mm
+        turned = compose(frame.rotation_M_B, self.frame.zero_rotation_M_B.T)[..., None, :, :]
+        actuators, nowhere = self.actuators, np.zeros(3)
+        joints_M_mm, _ = links_at(
+            actuators._replace(
+                cosine_M=to_outer(turned, nowhere, actuators.cosine_M),
+                sine_M=to_outer(turned, nowhere, actuators.sine_M),
+            ),
+            frame.base_joints_M_mm,
+            self.zero.actuator_mm + scale_mm,
+        )
+        axes = self.revolute_axes_P
+        if self.hinges[:, 1].any():
+            axes = np.where(self.hinges[:, 1:] == 1, to_outer(turned, nowhere, axes), axes)
+        return Mechanism(joints_M_mm, self.platform_joints_P_mm, axes, self.hinges), length_mm
 
 
 class MachineParts(NamedTuple):
@@ -219,23 +283,6 @@ def machine_model(parts: MachineParts) -> MachineModel:
     )
 
 
-def require_extending(actuators: Actuators, hinges: IntArray) -> None:
-    """Raise KinematicsError unless each actuator extends one link and the platform carries every hinge.
-
-    Compensation and predictions take these machines; forward and inverse kinematics take all.
-    """
-    links, scales = len(actuators.of_link), len(actuators.kinds)
-    if actuators.kinds.any() or links != scales or hinges[:, 1].any():
-        raise KinematicsError(
-            Problem(
-                where="machine",
-                what="has actuators that move base joints, or hinges that the base carries",
-                allowed="in compensation and predictions: actuators that extend one link each, hinges on the platform",
-                next_step="use its kinematics alone: compd.model.kinematics",
-            )
-        )
-
-
 def machine_constants(model: MachineModel, details: MachineDetails) -> MachineConstants:
     """What all rows of this machine have in common; computed once per machine, not in a cycle."""
     zero = model.zero
@@ -255,6 +302,7 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         platform_joints_P_mm=model.platform_joints_P_mm,
         revolute_axes_P=model.revolute_axes_P,
         hinges=model.hinges,
+        scale_of_link=model.actuators.of_link,
         arrangement=model.arrangement,
         zero_directions_M=directions_M,
         zero_axes_M=axes_M / np.linalg.norm(axes_M, axis=1, keepdims=True),
@@ -267,6 +315,7 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         plate_thickness_mm=details.plate_thickness_mm,
         scale_signal_period_mm=details.scale_signal_period_mm,
         instrument_M_mm=np.array(details.instrument_M_mm),
+        joints=model.joint_weights.shape[1],
         zero=zero,
     )
 

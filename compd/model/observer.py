@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from compd.arrays import BoolArray, FloatArray
 from compd.model.effects import MachineConstants, Observations
 from compd.model.kernels import GaugeRows, joint_shortening
-from compd.model.kinematics import Movement, Pose, ToolOnPlatform, forward_kinematics, link_length_mm, solve_frame
-from compd.model.machine import MachineModel, require_extending
+from compd.model.kinematics import Movement, Pose, ToolOnPlatform, forward_kinematics, solve_frame
+from compd.model.machine import MachineModel
 from compd.rotation import to_outer
 
 
@@ -47,24 +47,21 @@ def observe(
     """N rows by equations (1), (3) and forward kinematics; Newton starts at machine zero, so that no row needs another.
 
     constants : of this machine, from `machine_constants`.
-    scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9): changes since machine zero.  quantities: (N,) each.
+    scale_mm (N, m), joint_mm (N, k), frame_mm (N, 9): changes since machine zero.  quantities: (N,) each.
     time_s (N,).  session_start (N,): True where a row has no history.  quantities_at_zero: as in `Observations`.
     A row that has no pose is nan in everything that the pose gives.
     Raises CompdError where a quantity is a column of the reference.
     """
-    require_extending(model.actuators, model.hinges)
     zero = model.zero
     frame = solve_frame(model.frame, zero.distances_mm + frame_mm)
     shortening_mm, _ = joint_shortening(model.joint_weights, joint_mm)
-    length_mm = link_length_mm(zero.link_length_mm, scale_mm, shortening_mm)
-    pose = forward_kinematics(
-        model.mechanism(frame.base_joints_M_mm), length_mm, zero.platform_origin_M_mm, zero.rotation_M_P
-    )
+    mechanism, length_mm = model.links_on(frame, scale_mm)
+    pose = forward_kinematics(mechanism, length_mm - shortening_mm, zero.platform_origin_M_mm, zero.rotation_M_P)
     inputs = EffectInputs(
         GaugeRows(scale_mm, joint_mm, frame_mm, np.asarray(time_s, dtype=np.float64)),
         quantities,
         quantities_at_zero,
-        frame.base_joints_M_mm,
+        mechanism.base_joints_M_mm,
         pose,
         # a tool that stands on the plate is at the same place in every row
         np.broadcast_to(model.arrangement.contact_at(pose).tip_M_mm, pose.origin_M_mm.shape),
@@ -121,6 +118,7 @@ def observe_external(
         platform_joints_P_mm=no_vectors,
         revolute_axes_P=no_vectors,
         hinges=np.zeros((0, 2), dtype=np.int64),
+        scale_of_link=np.arange(links),
         arrangement=ToolOnPlatform(unknown),
         zero_directions_M=no_vectors,
         zero_axes_M=no_vectors,
@@ -133,6 +131,7 @@ def observe_external(
         plate_thickness_mm=np.nan,
         scale_signal_period_mm=np.nan,
         instrument_M_mm=np.zeros(3),
+        joints=0,
         zero=None,
     )
     return Observations(

@@ -10,7 +10,7 @@ from compd.arrays import FloatArray, IntArray
 from compd.model.deltas import Deltas
 from compd.model.effects import Observations, Port
 from compd.model.kernels import joint_shortening
-from compd.model.kinematics import Mechanism, forward_kinematics, link_length_mm, solve_frame
+from compd.model.kinematics import Mechanism, forward_kinematics, solve_frame
 from compd.model.machine import MachineModel
 from compd.rotation import compose, rotation_matrix
 
@@ -30,38 +30,43 @@ class Prediction(NamedTuple):
 
 
 class PerturbedMachine(NamedTuple):
-    """The machine with something added at its ports, before any link length is known.
+    """The machine with something added at its ports, and with the joints' errors taken from its links.
 
-    mechanism : with the base joints as they are now, by equation (3).
+    mechanism : with the base joints as they are now, by equation (3), and where the scales have moved them.
     tool_mm : (..., 3), in {P}; of a tool that stands on the plate, in {M}.
-    joint_shortening_mm : (..., n), gB + gS of equation (1).
-    reading_to_length_mm : (..., n), what the ports `scale` and `link` add between a scale's reading and its link.
+    length_mm : (..., n), by equation (1), with what the ports `scale` and `link` add.
     reason : (...), a Reason, of the frame and the joint comparators.
     """
 
     mechanism: Mechanism
     tool_mm: FloatArray
-    joint_shortening_mm: FloatArray
-    reading_to_length_mm: FloatArray | float
+    length_mm: FloatArray
     reason: IntArray
 
 
 def perturb_machine(
     model: MachineModel,
+    scale_mm: FloatArray,
     joint_mm: FloatArray,
     frame_mm: FloatArray,
     deltas: Deltas,
     base_joints_M_mm: FloatArray | None = None,
 ) -> PerturbedMachine:
-    """The machine with gauges and `deltas` accounted for; forward and inverse kinematics both start from it.
+    """The machine with gauges and `deltas` accounted for.
 
-    joint_mm (..., k), frame_mm (..., 9): changes since machine zero.  deltas : (..., size) per port, in mm (rad for
-    directions); a port left out gets nothing.  base_joints_M_mm : (..., n, 3) without deltas, where the frame is solved
-    already.
+    scale_mm (..., m), joint_mm (..., k), frame_mm (..., 9): changes since machine zero.  deltas : (..., size) per port,
+    in mm (rad for directions); a port left out gets nothing.  base_joints_M_mm : (..., n, 3) without deltas, where the
+    frame is solved already.
     """
     frame_reason: IntArray = np.zeros((), dtype=np.int64)
+    reading_mm = _add(scale_mm, "scale", deltas) if model.base_turns_parts else scale_mm
     # a row without a frame is solved again: only that gives the reason
-    if base_joints_M_mm is None or {"frame", "plate"} & set(deltas) or not np.isfinite(base_joints_M_mm).all():
+    solved = base_joints_M_mm is not None and bool(np.isfinite(base_joints_M_mm).all())
+    if solved and not ({"frame", "plate"} & set(deltas) or model.base_turns_parts):
+        assert base_joints_M_mm is not None
+        mechanism = model.mechanism(base_joints_M_mm)
+        length_mm = model.lengths_mm(reading_mm)
+    else:
         geometry = model.frame._replace(
             plate_points_M_mm=_add_to_points(model.frame.plate_points_M_mm, "plate", deltas)
         )
@@ -69,17 +74,24 @@ def perturb_machine(
         if "plate" not in deltas and since_zero_mm.ndim == 2 and (since_zero_mm == since_zero_mm[:1]).all():
             since_zero_mm = since_zero_mm[:1]  # a frame that does not move is solved once
         frame = solve_frame(geometry, model.zero.distances_mm + since_zero_mm)
-        base_joints_M_mm, frame_reason = frame.base_joints_M_mm, frame.reason
+        mechanism, length_mm = model.links_on(frame, reading_mm)
+        frame_reason = frame.reason
     shortening_mm, reason = joint_shortening(model.joint_weights, _add(joint_mm, "joint", deltas))
+    to_length_mm: FloatArray | float = deltas.get("link", 0.0)
+    if "scale" in deltas and not model.base_turns_parts:
+        to_length_mm = deltas["scale"][..., model.actuators.of_link] + to_length_mm
     mechanism = Mechanism(
-        _add_to_points(base_joints_M_mm, "base_joint", deltas),
+        _add_to_points(mechanism.base_joints_M_mm, "base_joint", deltas),
         _add_to_points(model.platform_joints_P_mm, "platform_joint", deltas),
-        _add_to_points(model.revolute_axes_P, "revolute_axis", deltas),
+        _add_to_points(mechanism.revolute_axes, "revolute_axis", deltas),
         model.hinges,
     )
-    tool_mm = _add(model.arrangement.tool_mm, "tool", deltas)
-    to_length_mm = deltas.get("scale", 0.0) + deltas.get("link", 0.0)
-    return PerturbedMachine(mechanism, tool_mm, shortening_mm, to_length_mm, np.maximum(reason, frame_reason))
+    return PerturbedMachine(
+        mechanism,
+        _add(model.arrangement.tool_mm, "tool", deltas),
+        length_mm - shortening_mm + to_length_mm,
+        np.maximum(reason, frame_reason),
+    )
 
 
 def predict(model: MachineModel, rows: Observations, deltas: Deltas) -> Prediction:
@@ -91,14 +103,11 @@ def predict(model: MachineModel, rows: Observations, deltas: Deltas) -> Predicti
     Example: what 1 um more on every scale does to the tip, row by row:
 
         nominal = predict(model, rows, {})
-        longer = predict(model, rows, {"scale": np.full((len(rows), model.links), 1e-3)})
+        longer = predict(model, rows, {"scale": np.full((len(rows), model.scales), 1e-3)})
         change_um = (longer.tip_mm - nominal.tip_mm) * 1e3
     """
-    machine = perturb_machine(model, rows.joint_mm, rows.frame_mm, deltas, rows.base_joints_M_mm)
-    length_mm = link_length_mm(model.zero.link_length_mm, rows.scale_mm, machine.joint_shortening_mm)
-    pose = forward_kinematics(
-        machine.mechanism, length_mm + machine.reading_to_length_mm, rows.origin_M_mm, rows.rotation_M_P
-    )
+    machine = perturb_machine(model, rows.scale_mm, rows.joint_mm, rows.frame_mm, deltas, rows.base_joints_M_mm)
+    pose = forward_kinematics(machine.mechanism, machine.length_mm, rows.origin_M_mm, rows.rotation_M_P)
     tip_mm = model.arrangement.measured_tip_mm(model.arrangement.contact_at(pose, machine.tool_mm))
     rotation = pose.rotation_M_P
     if "reference" in deltas:

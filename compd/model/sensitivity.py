@@ -12,9 +12,13 @@ joints c_i, revolute axes e_i. To first order a change of q or r moves the pose 
 Below, `inverse` is J^-1 and `_closure_demand` the bracket per unit of what is added at a port. With u_i the unit vector
 of link i, its entries for link i and axis i are
 
-    scale, link      1                         joint            minus the joint weights, equation (1)
+    link             1                         joint            minus the joint weights, equation (1)
     base_joint       u_i and R e_i             platform_joint   -R^T u_i and -e_i, in {P}
-    revolute_axis    -R^T d_i, in {P}          frame, plate     those of base_joint times d a / d (distances or points)
+    revolute_axis    -R^T d_i, in {P}          frame, plate     those of what the base carries, base_joint and
+                                                                revolute_axis, times d / d (distances or points)
+    scale            1 of an extended link; those of base_joint times d a / d q where the actuator moves the joint
+
+An axis that the base carries is e_i, in {M}, in place of R e_i.
 """
 
 from __future__ import annotations
@@ -26,7 +30,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.model.effects import Observations, Port, port_size
-from compd.model.kinematics import Mechanism, Pose, closure_at, solve_frame
+from compd.model.kinematics import ACTUATOR_KINDS, Frame, Mechanism, Pose, closure_at, solve_frame
 from compd.model.machine import MachineModel
 
 # Step of the central differences through the octahedron, whose sides are about 1 m: the difference's own error is of
@@ -51,7 +55,7 @@ def sensitivities(model: MachineModel, rows: Observations, ports: Collection[Por
     """Derivatives of `predict` by what is added at each of `ports`, where nothing is added.
 
     From the closure's derivatives (module docstring); for the ports `frame` and `plate` with central differences
-    through the octahedron, chained with the port `base_joint`. Rows without a pose are nan.
+    through the octahedron, chained with what the base carries. Rows without a pose are nan.
 
     Example: how much a micrometre on each scale moves the tip, (N, 3, n) in um:
 
@@ -71,7 +75,9 @@ def sensitivities(model: MachineModel, rows: Observations, ports: Collection[Por
         else:
             pose = inverse @ _closure_demand(model, rows, port)
             tip, rotation = tip_by_pose @ pose, pose[:, 3:]
-        if port in ("scale", "link"):
+        if port == "scale":
+            link_length[:] = _extension(model)
+        elif port == "link":
             link_length[:] = np.eye(size)
         elif port == "joint":
             link_length[:] = -model.joint_weights
@@ -102,18 +108,26 @@ def link_residuals(link: Sensitivity, tip_residual_mm: FloatArray) -> FloatArray
     return errors_mm
 
 
-def base_joints_by_distances(model: MachineModel, distances_mm: FloatArray) -> FloatArray:
-    """Derivatives (N, 3 n, 9) of the base joints in {M} by the frame's distances (N, 9); by central differences."""
-    return _central_difference(
-        solve_frame(model.frame, distances_mm + _steps()[:, None]).base_joints_M_mm, len(distances_mm)
-    )
+def carried_by_distances(model: MachineModel, distances_mm: FloatArray, scale_mm: FloatArray) -> dict[Port, FloatArray]:
+    """Derivatives by the frame's distances (N, 9), with the scales at (N, m), of what the base carries: base joints in
+    {M}, (N, 3 n, 9), and axes of hinges, (N, 3 k, 9), where it has these; by central differences."""
+    frame = solve_frame(model.frame, distances_mm + _steps()[:, None])
+    return _carried(model, frame, scale_mm)
 
 
-def _base_joints_by_plate(model: MachineModel, distances_mm: FloatArray) -> FloatArray:
-    """Derivatives (N, 3 n, 9) of the base joints in {M} by the plate's points; by central differences."""
+def _carried_by_plate(model: MachineModel, distances_mm: FloatArray, scale_mm: FloatArray) -> dict[Port, FloatArray]:
+    """The same by the plate's points."""
     plates = model.frame.plate_points_M_mm + _steps().reshape(18, 1, 3, 3)
     frame = solve_frame(model.frame._replace(plate_points_M_mm=plates), distances_mm)
-    return _central_difference(frame.base_joints_M_mm, len(distances_mm))
+    return _carried(model, frame, scale_mm)
+
+
+def _carried(model: MachineModel, stepped: Frame, scale_mm: FloatArray) -> dict[Port, FloatArray]:
+    mechanism, _ = model.links_on(stepped, scale_mm)
+    carried: dict[Port, FloatArray] = {"base_joint": _central_difference(mechanism.base_joints_M_mm, len(scale_mm))}
+    if model.hinges[:, 1].any():
+        carried["revolute_axis"] = _central_difference(mechanism.revolute_axes, len(scale_mm))
+    return carried
 
 
 def _steps() -> FloatArray:
@@ -122,7 +136,7 @@ def _steps() -> FloatArray:
 
 
 def _central_difference(stepped_mm: FloatArray, count: int) -> FloatArray:
-    """From points (18, count, n, 3) after `_steps` to derivatives (count, 3 n, 9)."""
+    """From vectors (18, count, n, 3) after `_steps` to derivatives (count, 3 n, 9)."""
     ends = stepped_mm.reshape(18, count, -1)
     return np.asarray(np.moveaxis((ends[:9] - ends[9:]) / (2 * DIFFERENCE_STEP_MM), 0, 2))
 
@@ -155,29 +169,54 @@ def _tip_by_pose(model: MachineModel, arm_M_mm: FloatArray, rotation_M_P: FloatA
     return tip_M
 
 
+def _extension(model: MachineModel) -> FloatArray:
+    """(n, m): 1 where a scale reads the length of a link."""
+    own: FloatArray = np.eye(model.scales)[model.actuators.of_link]
+    return own * model.extended[:, None]
+
+
+def _joints_by_scale(model: MachineModel, scale_mm: FloatArray) -> FloatArray:
+    """Derivatives (N, 3 n, m) of the base joints in {M} by the scales (N, m); 0 of an extended link."""
+    actuators = model.actuators
+    angle_rad = ((model.zero.actuator_mm + scale_mm) / actuators.radius_mm)[:, :, None]
+    slides = actuators.kinds[:, None] == ACTUATOR_KINDS.index("slides")
+    circle = np.cos(angle_rad) * actuators.sine_M - np.sin(angle_rad) * actuators.cosine_M
+    along_M = np.where(slides, actuators.cosine_M, circle) * (actuators.kinds[:, None] != 0)
+    by_scale = np.zeros((len(scale_mm), model.links, 3, model.scales))
+    link = np.arange(model.links)
+    by_scale[:, link, :, actuators.of_link] = along_M[:, actuators.of_link].transpose(1, 0, 2)
+    return by_scale.reshape(len(scale_mm), 3 * model.links, model.scales)
+
+
 def _closure_demand(model: MachineModel, rows: Observations, port: Port) -> FloatArray:
     """(N, 6, size): dr - f_q dq of the module docstring per unit of what is added at `port`; link lengths come first,
     then the offsets of the revolute axes."""
     count, n, k = len(rows), rows.links, len(model.revolute_axes_P)
     if port in ("frame", "plate"):
         distances_mm = model.zero.distances_mm + rows.frame_mm
-        by = base_joints_by_distances if port == "frame" else _base_joints_by_plate
-        return np.asarray(_closure_demand(model, rows, "base_joint") @ by(model, distances_mm))
+        by = carried_by_distances if port == "frame" else _carried_by_plate
+        carried = by(model, distances_mm, rows.scale_mm)
+        return np.asarray(sum(_closure_demand(model, rows, part) @ moved for part, moved in carried.items()))
     if port in ("scale", "link", "joint"):
         demand = np.zeros((count, 6, port_size(port, rows)))
-        demand[:, :n] = -model.joint_weights if port == "joint" else np.eye(n)
+        demand[:, :n] = {"scale": _extension(model), "link": np.eye(n), "joint": -model.joint_weights}[port]
+        if port == "scale" and model.actuators.kinds.any():
+            demand += _closure_demand(model, rows, "base_joint") @ _joints_by_scale(model, rows.scale_mm)
         return demand
-    link, axis = np.arange(n), np.arange(k)
+    link, axis, of_axis = np.arange(n), np.arange(k), model.hinges[:, 0]
+    on_base = model.hinges[:, 1:] == 1
     directions_P = rows.directions_M @ rows.rotation_M_P  # R^T u
     if port == "revolute_axis":
         tilted = np.zeros((count, 6, k, 3))
-        tilted[:, n + axis, axis] = -directions_P[:, :k] * rows.link_mm[:, :k, None]
+        directions = np.where(on_base, rows.directions_M[:, of_axis], directions_P[:, of_axis])
+        tilted[:, n + axis, axis] = -directions * rows.link_mm[:, of_axis, None]
         return tilted.reshape(count, 6, 3 * k)
     displaced = np.zeros((count, 6, n, 3))
     if port == "base_joint":
         displaced[:, link, link] = rows.directions_M
-        displaced[:, n + axis, axis] = rows.revolute_axes_M
+        displaced[:, n + axis, of_axis] = rows.revolute_axes_M
     else:
         displaced[:, link, link] = -directions_P
-        displaced[:, n + axis, axis] = -model.revolute_axes_P
+        axes_P = np.where(on_base, model.revolute_axes_P @ rows.rotation_M_P, model.revolute_axes_P)  # R^T e, or e
+        displaced[:, n + axis, of_axis] = -axes_P
     return displaced.reshape(count, 6, 3 * n)

@@ -22,7 +22,7 @@ from compd.model.structures import RESULT, WORKSPACE
 class TipDerivatives(NamedTuple):
     """Of the tip in {M}, with the tool on the plate of the touched place in {P}; nan where there is no pose.
 
-    by_gauge : (3, n + k + f), mm per mm of scales, joint and frame comparators.
+    by_gauge : (3, m + k + f), mm per mm of scales, joint and frame comparators.
     by_theta : (3, P), mm per unit of each fitted number of the live effects.
     by_quantity : (3, q), mm for each quantity's standard deviation, in the order of the model's program.
     """
@@ -46,7 +46,7 @@ def tip_derivatives(
 ) -> TipDerivatives:
     """Of one snapshot, at the pose without effects.
 
-    scale_mm (n,), joint_mm (k,), frame_mm (9,), or (0,) of a frame that is not measured : changes since machine zero.
+    scale_mm (m,), joint_mm (k,), frame_mm (9,), or (0,) of a frame that is not measured : changes since machine zero.
     quantities : those that the effects need.
     quantities_at_zero : the same at machine zero.
     sigmas : standard deviation of each, in its own unit; nan for one that is not named.
@@ -79,13 +79,14 @@ def tip_derivatives(
             _row_copy(model.frame.zero_supports_M_mm, 2),
             _row_copy(zero.platform_origin_M_mm, 1),
             _row_copy(zero.rotation_M_P, 2),
+            _row_copy(zero.actuator_mm, 1),
         ),
         packed.arrays,
         SolvedRows(np.zeros(1, WORKSPACE), np.zeros(1, RESULT)),
         arrays,
     )
     by_port, by_theta, by_quantity = arrays
-    derivatives = TipDerivatives(by_port[:, : model.links + len(joint_mm) + len(frame_mm)], by_theta, by_quantity)
+    derivatives = TipDerivatives(by_port[:, : model.scales + len(joint_mm) + len(frame_mm)], by_theta, by_quantity)
     if program.given:
         rows = _rows(model, scale_mm, joint_mm, frame_mm, quantities, quantities_at_zero, time_s, effects)
         _add_python_effects(model, rows, raised, effects, by_port, derivatives)

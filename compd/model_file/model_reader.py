@@ -126,7 +126,7 @@ def _warnings(document: ModelDocument, fitted: Sequence[FittedEffect], links: in
 def _links_of(effect: Effect, entry: EffectEntry) -> int:
     """How many links the file has numbers of an effect for; 0 where it has none for single links."""
     names = {parameter.name for parameter in entry.parameters}
-    of_links = [parameter for parameter in effect.parameters if parameter.per == "link"]
+    of_links = [parameter for parameter in effect.parameters if parameter.per in ("scale", "link")]
     return next(i for i in count() if not any(f"{parameter.name}_{i + 1}" in names for parameter in of_links))
 
 

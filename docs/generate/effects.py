@@ -19,7 +19,13 @@ range of a parameter comes from the source that is named beside it; a parameter 
 the cause is another one. "Needs" are the quantities that have to be measured; where one is missing the effect is not
 tried. Telescopes, stages and other machines have [effects of their own](effect-files.md).
 """
-_PER = {"machine": "the machine", "link": "each link", "axis": "each axis", "link_axis": "each link and axis"}
+_PER = {
+    "machine": "the machine",
+    "scale": "each scale",
+    "link": "each link",
+    "axis": "each axis",
+    "link_axis": "each link and axis",
+}
 
 
 def page() -> str:

@@ -73,6 +73,7 @@ CARRIED: Mapping[type, CarriedKind] = {
             CarriedField("origin_M_mm", "origin_M_mm", _VECTOR),
             CarriedField("rotation_M_P", "rotation_M_P", _MATRIX),
             CarriedField("effects", "effects", kind=EffectMemory),
+            CarriedField("actuator_mm", "actuator_mm", _VECTOR, may_lack=True),
         ),
     ),
     ComparatorSet: CarriedKind(

@@ -75,7 +75,7 @@ class CycleState(NamedTuple):
     @classmethod
     def at_start(cls, model: MachineModel) -> Self:
         """The state before the first cycle: at machine zero, with no correction applied."""
-        return cls(None, WarmStart.at_zero(model), np.zeros(model.links))
+        return cls(None, WarmStart.at_zero(model), np.zeros(model.scales))
 
 
 class CycleInputs(NamedTuple):
@@ -157,4 +157,4 @@ class CycleSettings:
     @cached_property
     def unread_scales_mm(self) -> FloatArray:
         """(n,) nan: scales in machine-tool mode, which does not use them."""
-        return np.full(self.model.links, math.nan)
+        return np.full(self.model.scales, math.nan)

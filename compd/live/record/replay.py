@@ -169,7 +169,7 @@ def replay_cycles(
     """
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
     # without scales the correction is that of a pose, and has no links
-    corrected = 0 if pipeline.settings.corrects_pose else configuration.geometry.links
+    corrected = 0 if pipeline.settings.corrects_pose else configuration.geometry.scales
     files = [*recording.model_files(), *model_files]
     read = [pipeline.loader.read(file, plausible=False) for file in files]
     models = {"": pipeline.loader.without_effects} | {model.hash: model for model in read}

@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
+from compd.link_count import scale_count
 from compd.model.effects.observations import Observations
 from compd.model.kernels import kernel_number
 from compd.reference_conditions import Datum
@@ -22,7 +23,7 @@ Port: TypeAlias = Literal[
     "scale", "joint", "frame", "link", "base_joint", "platform_joint", "revolute_axis", "plate", "tool", "reference"
 ]
 PORTS: dict[Port, str] = {
-    "scale": "reading of each linear scale, mm (n)",
+    "scale": "reading of each scale, mm (m)",
     "joint": "reading of each joint comparator, mm (k)",
     "frame": "reading of each frame comparator t1..t3, u1..u6, mm (9)",
     "link": "length of each link, mm (n)",
@@ -35,7 +36,7 @@ PORTS: dict[Port, str] = {
 }
 
 # What a parameter has one value for.
-Per: TypeAlias = Literal["machine", "link", "axis", "link_axis"]
+Per: TypeAlias = Literal["machine", "scale", "link", "axis", "link_axis"]
 
 # Values of an effect's nonlinear constants, by name.
 ConstantValues: TypeAlias = Mapping[str, float]
@@ -71,7 +72,8 @@ class CompiledBasis(Protocol):
 class KernelBasis:
     """The basis of an effect whose equation is a kernel.
 
-    kernel : of `compd.model.kernels.effects`.  states : how many numbers it remembers of each link.
+    kernel : of `compd.model.kernels.effects`.  states : how many numbers it remembers of each link; at the port `scale`
+    of each scale.
     """
 
     kernel: Any
@@ -79,7 +81,8 @@ class KernelBasis:
 
     def program(self, effect: Effect, links: int, sizes: Mapping[Port, int]) -> BasisProgram:
         """See `CompiledBasis`."""
-        return BasisProgram(kernel_number(self.kernel), _NO_CODE, _NO_NUMBERS, (links,) * self.states)
+        places = sizes["scale"] if effect.ports[0] == "scale" else links
+        return BasisProgram(kernel_number(self.kernel), _NO_CODE, _NO_NUMBERS, (places,) * self.states)
 
 
 _NO_CODE: IntArray = np.zeros((0, 2), dtype=np.int64)
@@ -101,7 +104,7 @@ class Parameter:
     source : str
         Where that range comes from.
     per : str
-        What there is one value for: ``"machine"``, ``"link"``, ``"axis"`` or ``"link_axis"``.
+        What there is one value for: ``"machine"``, ``"scale"``, ``"link"``, ``"axis"`` or ``"link_axis"``.
     reciprocal : bool
         The fit is linear in 1/value: a compliance is fitted, a stiffness shown.
     """
@@ -118,6 +121,7 @@ class Parameter:
         """What follows the name of each of its values on a machine of so many links: `_1`, `_2`, `_3`."""
         return {
             "machine": [""],
+            "scale": [f"_{i + 1}" for i in range(scale_count(links))],
             "link": [f"_{i + 1}" for i in range(links)],
             "axis": ["_x", "_y", "_z"],
             "link_axis": [f"_{i + 1}{axis}" for i in range(links) for axis in "xyz"],
@@ -208,7 +212,8 @@ class Effect:
     source : str
         Where the equation is from.
     needs : tuple of str
-        Quantities by name (``{link}`` stands for each link), or ``"force"``, ``"direction"``, ``"motion"``,
+        Quantities by name (``{link}`` stands for each link, ``{scale}`` for each scale), or ``"force"``,
+        ``"direction"``, ``"motion"``,
         ``"time"``, ``"order"`` (of the rows), ``"revolute_axes"``, ``"plate_thickness_mm"``.
     parameters : tuple of Parameter
         What is fitted.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from compd.arrays import BoolArray, FloatArray
 from compd.errors import CompdError, Problem
+from compd.link_count import scale_count
 from compd.model.effects.effect import Basis, BasisProgram, ConstantValues, Effect, Memory, Port
 from compd.model.effects.effect_needs import is_measured, needed_quantities
 from compd.model.effects.observations import MachineConstants, Observations
@@ -27,7 +28,7 @@ _ROWS_TO_TRY = 8
 def port_sizes(links: int, joints: int, axes: int) -> dict[Port, int]:
     """How many numbers each port takes on a machine with so many links, joint comparators and revolute axes."""
     return {
-        "scale": links,
+        "scale": scale_count(links),
         "joint": joints,
         "frame": 9,
         "link": links,
@@ -179,8 +180,8 @@ def row_structures(rows: Observations, chunk: slice) -> NDArray[np.void]:
             )
         )
     structures = np.zeros(len(rows.time_s[chunk]), dtype=ROW)
-    structures["links"] = rows.links
-    for name in (ROW.names or ())[1:]:
+    structures["links"], structures["scales"] = rows.links, scale_count(rows.links)
+    for name in (ROW.names or ())[2:]:
         values = getattr(rows, name)[chunk]
         if ROW[name].shape and values.shape[1:] != ROW[name].shape:
             structures[name][:, : values.shape[1]] = values
@@ -201,7 +202,7 @@ def machine_structure(constants: MachineConstants) -> NDArray[np.void]:
     machine["zero_rotation_M_P"] = math.nan if constants.zero is None else constants.zero.rotation_M_P
     for name in (
         *("platform_joints_P_mm", "revolute_axes_P", "hinges", "zero_directions_M", "zero_axes_M"),
-        *("zero_axial_force_N", "zero_axial_per_force"),
+        *("zero_axial_force_N", "zero_axial_per_force", "scale_of_link"),
     ):
         values = getattr(constants, name)
         machine[name][: len(values)] = values

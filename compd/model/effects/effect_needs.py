@@ -7,6 +7,7 @@ import re
 from collections.abc import Collection, Mapping
 
 from compd.errors import Problem
+from compd.link_count import scale_count
 from compd.model.effects.effect import Effect, Port
 
 # The words that an effect's `needs` may hold beside names of quantities, and what each stands for.
@@ -53,6 +54,13 @@ _NO_QUANTITIES: Mapping[str, tuple[str, str]] = {
     ),
 }
 # Those that no column of a recording can meet.
+# What a machine of known kinematics must have for a port to be there, and how that is said where it has not.
+_PORTS_OF: Mapping[Port, tuple[str, str, str]] = {
+    "frame": ("frame_points", "frame, of which this machine's configuration states no places", "`supports_B_mm`"),
+    "plate": ("frame_points", "plate, of which this machine's configuration states no places", "`plate_points_M_mm`"),
+    "joint": ("joint_comparators", "joint, and no comparator measures a joint of this machine", "`wiring: joint:`"),
+    "revolute_axis": ("revolute_axes", "revolute_axis, and this machine has no revolute axes", "`hinges`"),
+}
 _DESCRIBED = frozenset({"kinematics", "revolute_axes", "plate_thickness_mm", "scale_signal_period_mm"})
 _GAUGE_OF_QUANTITY = {
     "temperature": "a thermometer",
@@ -72,6 +80,8 @@ def needed_quantities(effect: Effect, links: int) -> list[str]:
     for need in effect.needs:
         if "{link}" in need:
             quantities += [need.format(link=i + 1) for i in range(links)]
+        elif "{scale}" in need:
+            quantities += [need.format(scale=i + 1) for i in range(scale_count(links))]
         elif "{axis}" in need:
             quantities += [need.format(axis=axis) for axis in "xyz"]
         elif need in _QUANTITIES_OF_NEED:
@@ -125,6 +135,19 @@ def unmet_needs(
             for name in needed_at_zero(effect, links)
             if name in available and name not in at_zero
         ]
+    if "kinematics" in available and all(
+        port in _PORTS_OF and _PORTS_OF[port][0] not in available for port in effect.ports
+    ):
+        _, what, key = _PORTS_OF[effect.ports[0]]
+        already = any(need in effect.needs for need in _DESCRIBED - {"kinematics"} if need not in available)
+        if not already:
+            problems.append(
+                Problem(
+                    where=f"effect {effect.id}",
+                    what=f"acts at the port {what}",
+                    next_step=f"write {key} where the machine has it",
+                )
+            )
     if not _reaches_prediction(effect, available, links):
         problems.append(
             Problem(

@@ -12,6 +12,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import CompdError, Problem
+from compd.link_count import LinkCount
 from compd.model.kinematics import Arrangement, Contact, Mechanism, link_forces
 from compd.reference_conditions import standard_value, value_at_zero
 from compd.rotation import to_outer
@@ -59,7 +60,7 @@ class MachineConstants(NamedTuple):
     """What effects need of the machine beyond the readings; computed once per machine, nan where it is not described.
 
     platform_joints_P_mm (n, 3), revolute_axes_P (k, 3): at machine zero's temperature, unbent.  hinges (k, 2): the
-    link of each axis, and whether the base carries it, as in `Mechanism`.
+    link of each axis, and whether the base carries it, as in `Mechanism`.  scale_of_link (n,): from 0.
     arrangement: where the tool is; its tool_mm (3,) in {P}, or in {M} where the tool stands on the plate, as at machine
         zero.
     zero_directions_M (n, 3): unit vectors of the links at machine zero, from base to platform.
@@ -70,12 +71,14 @@ class MachineConstants(NamedTuple):
     frame_zero_mm (9,): t1..t3, u1..u6 at machine zero.  plate_points_M_mm (3, 3).
     plate_thickness_mm, scale_signal_period_mm.
     instrument_M_mm (3,): where the reference instrument's beam starts; the origin of {M} unless configured.
+    joints : number of joint comparators.
     zero : the machine at machine zero; None where its kinematics is not known.
     """
 
     platform_joints_P_mm: FloatArray
     revolute_axes_P: FloatArray
     hinges: IntArray
+    scale_of_link: IntArray
     arrangement: Arrangement
     zero_directions_M: FloatArray
     zero_axes_M: FloatArray
@@ -88,6 +91,7 @@ class MachineConstants(NamedTuple):
     plate_thickness_mm: float
     scale_signal_period_mm: float
     instrument_M_mm: FloatArray
+    joints: int
     zero: AtZero | None
 
 
@@ -96,11 +100,11 @@ class Observations:
     """N instants of a machine; the pose is that of the nominal model, before any effect is applied.
 
     constants : of the machine, the same in every row.
-    scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9): readings, zero at machine zero.
+    scale_mm (N, m), joint_mm (N, k), frame_mm (N, 9): readings, zero at machine zero.
     quantities : everything else measured, by its name with its unit, (N,) each; no column of the reference.
     time_s (N,).  session_start (N,): True where a row has no history.
-    direction (N, n): +1, -1 as the link last moved, 0 where that is not known.
-    velocity_mm_per_s (N, n), joint_velocity_mm_per_s (N, k): of the readings.
+    direction (N, m): +1, -1 as the scale last moved, 0 where that is not known.
+    velocity_mm_per_s (N, m), joint_velocity_mm_per_s (N, k): of the readings.
     link_mm (N, n), directions_M (N, n, 3) from base to platform joint, base_joints_M_mm (N, n, 3).
     origin_M_mm (N, 3), rotation_M_P (N, 3, 3): the moving platform.  tip_M_mm (N, 3).
     recorded : of a machine without known kinematics, what of GIVEN_BY_KINEMATICS was recorded all the same.
@@ -167,8 +171,8 @@ class Observations:
 
     @property
     def links(self) -> int:
-        """n; 0 for a machine of another model, of which only the tip is known."""
-        return int(self.scale_mm.shape[1])
+        """n, which knows m; 0 for a machine of another model, of which only the tip is known."""
+        return LinkCount(self.link_mm.shape[1], self.scale_mm.shape[1])
 
     @property
     def revolute_axes_P(self) -> FloatArray:
@@ -263,8 +267,16 @@ class Observations:
 
     @cached_property
     def revolute_axes_M(self) -> FloatArray:
-        """(N, k, 3) revolute axes as they stand now."""
-        return np.asarray(to_outer(self.rotation_M_P[:, None], np.zeros(3), self.constants.revolute_axes_P))
+        """(N, k, 3) revolute axes as they stand now; those that the base carries as at machine zero."""
+        axes_M = np.asarray(to_outer(self.rotation_M_P[:, None], np.zeros(3), self.constants.revolute_axes_P))
+        on_base = self.constants.hinges[:, 1] == 1
+        if on_base.any():
+            axes_M[:, on_base] = self.constants.revolute_axes_P[on_base]
+        return axes_M
+
+    def of_links(self, of_scales: FloatArray) -> FloatArray:
+        """Values (N, m) of the scales for each link, (N, n): those of its own scale."""
+        return of_scales[:, self.constants.scale_of_link]
 
     @cached_property
     def joint_angles_rad(self) -> FloatArray:
@@ -281,6 +293,10 @@ def available_settings(constants: MachineConstants) -> set[str]:
     settings = {"revolute_axes"} if len(constants.revolute_axes_P) else set()
     if len(constants.platform_joints_P_mm):
         settings |= GIVEN_BY_KINEMATICS
+    if constants.joints:
+        settings.add("joint_comparators")
+    if not np.isnan(constants.plate_points_M_mm).any():
+        settings.add("frame_points")
     for name in ("plate_thickness_mm", "scale_signal_period_mm"):
         if not np.isnan(getattr(constants, name)):
             settings.add(name)

@@ -50,6 +50,11 @@ class ExternalModel(MachineModel):
         """Number of scales."""
         return self.link_count
 
+    @property
+    def scales(self) -> int:
+        """Number of scales."""
+        return self.link_count
+
     @cached_property
     def live_effects(self) -> tuple[FittedEffect, ...]:
         """All effects but those of the library at the reference, which are the reference instrument's."""

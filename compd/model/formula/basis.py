@@ -56,7 +56,7 @@ class FormulaBasis:
             column_codes(names, port, links, needed_quantities(effect, links), effect.counts_from == "machine zero"),
             along,
             places,
-            [parameter.per == "link" for parameter in effect.parameters],
+            [parameter.per in ("link", "scale") for parameter in effect.parameters],
         )
         return BasisProgram(FORMULA, program.code, np.append(program.numbers, self.to_mm), program.states)
 

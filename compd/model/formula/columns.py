@@ -9,6 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem
+from compd.link_count import scale_count
 from compd.model.effects import Observations, Port
 from compd.model.formula.program import ColumnCodes
 from compd.model.kernels import formula as machine_code
@@ -56,7 +57,8 @@ def column_needs(name: str, port: Port) -> tuple[str, ...] | Problem:
     if per_link and port not in PER_LINK:
         return Problem(where="", what=f"is one per link, and the port {port} has no links", allowed=", ".join(ANYWHERE))
     if per_link:
-        return _NEEDS_OF_LINK.get(name, (name.replace("_link_", "_link_{link}_", 1),))
+        needs = _NEEDS_OF_LINK.get(name, (name.replace("_link_", "_link_{link}_", 1),))
+        return tuple(need.replace("{link}", "{scale}") for need in needs) if port == "scale" else needs
     if not _QUANTITY.match(name):
         columns = ", ".join((*ANYWHERE, *(OF_LINK if port in PER_LINK else ())))
         return Problem(
@@ -100,7 +102,8 @@ def column_codes(
     for name in names:
         if name == "reading_mm" or name in _OF_PLACE:
             kind = _READINGS[port] if name == "reading_mm" else _OF_PLACE[name]
-            codes[name] = (kind, quantities.index("force_x_N") if name == "axial_force_N" else 0)
+            at_scale = machine_code.AT_SCALE if port == "scale" else machine_code.AT_LINK
+            codes[name] = (kind, quantities.index("force_x_N") if name == "axial_force_N" else at_scale)
             own.add(name)
         elif name == "time_s":
             codes[name] = (machine_code.TIME, 0)
@@ -121,7 +124,10 @@ def column_values(rows: Observations, name: str, port: Port) -> FloatArray:
     """The values of a column: (N, places of the port), or (N, 1) where all places have the same."""
     if name == "reading_mm":
         return {"scale": rows.scale_mm, "joint": rows.joint_mm, "frame": rows.frame_mm}[port]
-    if name in ("scale_mm", "link_mm", "direction", "velocity_mm_per_s", "axial_force_N"):
+    if name in ("scale_mm", "direction", "velocity_mm_per_s"):
+        of_scales: FloatArray = getattr(rows, name)
+        return of_scales if port == "scale" else rows.of_links(of_scales)
+    if name in ("link_mm", "axial_force_N"):
         return np.asarray(getattr(rows, name))
     if name == "time_s":
         return rows.time_s[:, None]
@@ -130,6 +136,11 @@ def column_values(rows: Observations, name: str, port: Port) -> FloatArray:
     if name == "temperature_link":
         name = "temperature_link_degC"
     if _PER_LINK_COLUMN.match(name):
-        names = [name.replace("_link_", f"_link_{i + 1}_", 1) for i in range(rows.links)]
+        names = [name.replace("_link_", f"_link_{i + 1}_", 1) for i in range(_places(rows, port))]
         return np.stack([rows.quantity(link_name) for link_name in names], axis=1)
     return rows.quantity(name)[:, None]
+
+
+def _places(rows: Observations, port: Port) -> int:
+    """Number of places of a port that has one for each scale or for each link."""
+    return scale_count(rows.links) if port == "scale" else rows.links

@@ -164,7 +164,13 @@ def _effect(
         symbols={**{name: f"parameter, {parameter.unit}" for name, parameter in declared.items()}, **columns},
         source="; ".join(dict.fromkeys(parameter.source for parameter in declared.values())),
         parameters=tuple(
-            Parameter(name, declared[name].unit, *declared[name].plausible, declared[name].source, declared[name].per)
+            Parameter(
+                name,
+                declared[name].unit,
+                *declared[name].plausible,
+                declared[name].source,
+                "scale" if declaration.port == "scale" and declared[name].per == "link" else declared[name].per,
+            )
             for name in linear
         ),
         mistaken_for=declaration.mistaken_for,

@@ -41,6 +41,7 @@ from compd.model.kernels.row_arguments import (
     WantedRows,
     WarmRows,
 )
+from compd.model.kernels.standing_machine import forward_standing, inverse_standing, stand_on
 from compd.model.structures import GIVEN, MODELS
 from compd.rotation import to_inner_frame
 
@@ -66,6 +67,11 @@ def _solve_bare(
     set_distances(model, frame_mm, distances_mm)
     frame, pose = result.bare_frame, result.bare_pose
     solve_frame(model, model.plate_points_M_mm, distances_mm, warm.supports_M_mm[w], frame)
+    if model.by_actuators:
+        _solve_by_actuators(
+            model, machine_tool, scale_mm, joint_mm, attitude_M_P, warm, w, work, result, contributions_mm
+        )
+        return
     shorten_by_joints(model.joint_weights[:n, :k], joint_mm, contributions_mm[0], work.altered.joint_reason)
     base_M_mm, zero_base_M_mm = frame.base_joints_M_mm, model.zero_base_joints_M_mm
     if machine_tool:
@@ -111,12 +117,69 @@ def _solve_bare(
 
 
 @helper
+def _solve_by_actuators(
+    model: Any,
+    machine_tool: bool,
+    scale_mm: FloatArray,
+    joint_mm: FloatArray,
+    attitude_M_P: FloatArray,
+    warm: WarmRows,
+    w: int,
+    work: Any,
+    result: Any,
+    contributions_mm: FloatArray,
+) -> None:
+    """As `_solve_bare` behind its frame, of a machine whose inverse takes the actuators as unknowns."""
+    n, m, k = model.links, model.scales, joint_mm.shape[0]
+    frame, pose, nominal, command = result.bare_frame, result.bare_pose, work.nominal, work.command
+    at_zero, standing = work.at_zero, work.standing
+    guess_mm, attitude = np.empty(m), np.empty((3, 3))
+    stand_on(model, model.zero_rotation_M_B, model.zero_base_joints_M_mm, at_zero)
+    stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, standing)
+    shortening_mm, reason = np.empty(n), standing.joint_reason
+    shorten_by_joints(model.joint_weights[:n, :k], joint_mm, shortening_mm, reason)
+    if not machine_tool:
+        standing.joint_shortening_mm[:n] = shortening_mm
+        forward_standing(model, standing, scale_mm, warm.origin_M_mm[w], warm.rotation_M_P[w], pose)
+        forward_standing(model, at_zero, scale_mm, warm.origin_M_mm[w], warm.rotation_M_P[w], nominal)
+        set_contact(model, nominal, model.tool_mm, result.target_M_mm, result.target_P_mm)
+        standing.joint_shortening_mm[:n] = 0.0
+        attitude[:, :] = nominal.rotation_M_P
+    else:
+        guess_mm[:] = warm.actuator_mm[w]
+        attitude[:, :] = attitude_M_P
+        inverse_standing(model, at_zero, result.target_M_mm, result.target_P_mm, attitude, guess_mm, nominal)
+    # what the frame does, and then what the joints do: an actuator may have several links
+    guess_mm[:] = nominal.actuator_mm[:m]
+    inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, guess_mm, command)
+    for a in range(m):
+        contributions_mm[1, a] = command.actuator_mm[a] - nominal.actuator_mm[a]
+        contributions_mm[0, a] = 0.0
+    if k > 0:
+        standing.joint_shortening_mm[:n] = shortening_mm
+        guess_mm[:] = command.actuator_mm[:m]
+        inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, guess_mm, command)
+        for a in range(m):
+            contributions_mm[0, a] = command.actuator_mm[a] - nominal.actuator_mm[a] - contributions_mm[1, a]
+    if machine_tool:
+        copy_pose(command, pose)
+        # where a target fixes fewer than six coordinates the others are those of the pose
+        set_contact(model, nominal, model.tool_mm, result.target_M_mm, result.target_P_mm)
+    set_contact(model, pose, model.tool_mm, result.tip_M_mm, result.tip_P_mm)
+    for a in range(m):
+        result.nominal_scale_mm[a] = nominal.actuator_mm[a] - model.zero_actuator_mm[a] if machine_tool else scale_mm[a]
+        result.scale_setpoint_mm[a] = command.actuator_mm[a] - model.zero_actuator_mm[a]
+    result.reason = max(reason[0], frame.reason[0], nominal.reason[0], pose.reason[0], command.reason[0])
+    copy_frame(frame, result.frame)
+    copy_pose(pose, result.pose)
+
+
+@helper
 def _finish(model: Any, result: Any, contributions_mm: FloatArray) -> None:
     """What follows from the tip and the target; where the row failed, every number is nan."""
-    n = model.links
     to_inner_frame(model.zero_rotation_M_B, model.zero_origin_M_mm, result.tip_M_mm, result.tip_B0_mm)
     to_inner_frame(result.frame.rotation_M_B, result.frame.origin_M_mm, result.target_M_mm, result.target_B_mm)
-    for i in range(n):
+    for i in range(model.scales):
         result.correction_mm[i] = result.scale_setpoint_mm[i] - result.nominal_scale_mm[i]
     if result.reason == OK:
         return
@@ -130,6 +193,22 @@ def _finish(model: Any, result: Any, contributions_mm: FloatArray) -> None:
     result.scale_setpoint_mm[:] = math.nan
     result.correction_mm[:] = math.nan
     contributions_mm[:, :] = math.nan
+
+
+@helper
+def _set_warm(model: Any, warm: WarmRows, w: int, result: Any) -> None:
+    """Where the next cycle starts: at this row's solution without effects, or where this row did if it failed."""
+    if result.reason == OK:
+        result.warm_supports_M_mm[:, :] = result.bare_frame.supports_M_mm
+        result.warm_origin_M_mm[:] = result.bare_pose.origin_M_mm
+        result.warm_rotation_M_P[:, :] = result.bare_pose.rotation_M_P
+        result.warm_actuator_mm[:] = result.bare_pose.actuator_mm
+        return
+    result.warm_supports_M_mm[:, :] = warm.supports_M_mm[w]
+    result.warm_origin_M_mm[:] = warm.origin_M_mm[w]
+    result.warm_rotation_M_P[:, :] = warm.rotation_M_P[w]
+    if model.by_actuators:
+        result.warm_actuator_mm[: model.scales] = warm.actuator_mm[w]
 
 
 @helper
@@ -154,6 +233,17 @@ def _solve_altered_pose(
 ) -> int:
     """Where the tip is in CMM mode on the machine with its effects; returns the reason."""
     n, altered = model.links, work.altered
+    if model.by_actuators:
+        forward_standing(
+            model,
+            altered,
+            scale_mm + altered.scale_mm[: model.scales],
+            warm_origin_M_mm,
+            warm_rotation_M_P,
+            result.pose,
+        )
+        set_contact(model, result.pose, altered.tool_mm, result.tip_M_mm, result.tip_P_mm)
+        return result.pose.reason[0]  # type: ignore[no-any-return]
     length_mm = np.empty(n)
     for i in range(n):
         length_mm[i] = model.zero_link_length_mm[i] + scale_mm[i] - altered.joint_shortening_mm[i]
@@ -201,7 +291,7 @@ def compensate_rows(
     solved: SolvedRows,
     contributions_mm: FloatArray,
 ) -> None:
-    """N rows of `solved` and of `contributions_mm` (N, 2 + K, n), which are of joints, frame, and each of K effects.
+    """N rows of `solved` and of `contributions_mm` (N, 2 + K, m), which are of joints, frame, and each of K effects.
 
     models (1,).  quantities (N, q + z) : those that the effects need, and behind them those from which the effects
     count, in the order of the program.
@@ -209,9 +299,9 @@ def compensate_rows(
     machine_tool, passes = options.machine_tool, options.passes
     effects, memory, motion = program.effects, carried.memories, carried.motion
     model, work = models[0], solved.works[0]
-    n = model.links
+    m = model.scales
     added_mm = np.zeros((effects.shape[0], given.added_mm.shape[2]))
-    at_mm = np.empty(n)
+    at_mm = np.empty(m)
     attitude = np.empty((3, 3))
     memory_before, motion_before = np.empty_like(memory), np.empty_like(motion)
     for r in range(gauges.scale_mm.shape[0]):
@@ -226,11 +316,8 @@ def compensate_rows(
         result.target_M_mm[:] = wanted.target_mm[r, :3]
         result.target_P_mm[:] = wanted.target_mm[r, 3:]
         _solve_bare(model, machine_tool, gauges, wanted, warm, r, work, result, contributions_mm[r])
-        result.warm_supports_M_mm[:, :] = result.bare_frame.supports_M_mm
-        result.warm_origin_M_mm[:] = result.bare_pose.origin_M_mm
-        result.warm_rotation_M_P[:, :] = result.bare_pose.rotation_M_P
         if effects.shape[0] > 0:
-            for i in range(n):
+            for i in range(m):
                 at_mm[i] = scale_mm[i]
                 if machine_tool:
                     effects_at_mm = given.effects_at_mm[r, i]
@@ -249,7 +336,6 @@ def compensate_rows(
                     _advance(motion, options.other_mode and r == 0, time_s, at_mm, joint_mm)
                 set_row(
                     model,
-                    result.bare_frame.base_joints_M_mm,
                     result.bare_pose,
                     result.tip_M_mm,
                     at_mm,
@@ -261,7 +347,7 @@ def compensate_rows(
                     work.row,
                 )
                 _add_each_effect(program, given.added_mm, r, quantities[r], memory, work.row, added_mm)
-                at_mm[:] = result.scale_setpoint_mm[:n]
+                at_mm[:] = result.scale_setpoint_mm[:m]
                 reason = add_effects(
                     model,
                     effects,
@@ -275,7 +361,7 @@ def compensate_rows(
                     contributions_mm[r],
                     at_mm,
                 )
-            result.scale_setpoint_mm[:n] = at_mm
+            result.scale_setpoint_mm[:m] = at_mm
             if machine_tool:
                 copy_pose(work.with_effects, result.pose)
             else:
@@ -284,8 +370,5 @@ def compensate_rows(
                     _solve_altered_pose(model, scale_mm, warm.origin_M_mm[w], warm.rotation_M_P[w], work, result),
                 )
             result.reason = max(result.reason, reason)
-        if result.reason != OK:
-            result.warm_supports_M_mm[:, :] = warm.supports_M_mm[w]
-            result.warm_origin_M_mm[:] = warm.origin_M_mm[w]
-            result.warm_rotation_M_P[:, :] = warm.rotation_M_P[w]
+        _set_warm(model, warm, w, result)
         _finish(model, result, contributions_mm[r])

@@ -17,6 +17,7 @@ from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import copy_frame, copy_pose, inverse_pose, solve_frame
 from compd.model.kernels.reason_codes import OK
 from compd.model.kernels.row_arguments import EffectArrays
+from compd.model.kernels.standing_machine import inverse_standing, stand_on
 from compd.model.structures import FRAME, LENGTHS
 from compd.rotation import to_outer_frame
 
@@ -24,7 +25,6 @@ from compd.rotation import to_outer_frame
 @helper
 def set_row(
     model: Any,
-    base_joints_M_mm: FloatArray,
     pose: Any,
     tip_M_mm: FloatArray,
     scale_mm: FloatArray,
@@ -36,18 +36,17 @@ def set_row(
     row: Any,
 ) -> None:
     """The instant from which effects are computed, at the pose without effects."""
-    n, k = model.links, joint_mm.shape[0]
-    row.links = n
+    n, m, k = model.links, model.scales, joint_mm.shape[0]
+    row.links, row.scales = n, m
     row.time_s = time_s
     row.session_start = 1 if starts else 0
     joint_M_mm = np.empty(3)
     for i in range(n):
-        row.scale_mm[i] = scale_mm[i]
         row.link_mm[i] = pose.link_length_mm[i]
         to_outer_frame(pose.rotation_M_P, pose.origin_M_mm, model.platform_joints_P_mm[i], joint_M_mm)
         for j in range(3):
-            row.base_joints_M_mm[i, j] = base_joints_M_mm[i, j]
-            row.directions_M[i, j] = (joint_M_mm[j] - base_joints_M_mm[i, j]) / pose.link_length_mm[i]
+            row.base_joints_M_mm[i, j] = pose.base_joints_M_mm[i, j]
+            row.directions_M[i, j] = (joint_M_mm[j] - pose.base_joints_M_mm[i, j]) / pose.link_length_mm[i]
     for i in range(k):
         row.joint_mm[i] = joint_mm[i]
     for i in range(9):
@@ -57,12 +56,13 @@ def set_row(
         row.tip_M_mm[i] = tip_M_mm[i]
         for j in range(3):
             row.rotation_M_P[i, j] = pose.rotation_M_P[i, j]
-    direction = 1 + 2 * n + k
-    for i in range(n):
+    direction = 1 + 2 * m + k
+    for i in range(m):
+        row.scale_mm[i] = scale_mm[i]
         row.direction[i] = motion[direction + i] if model.needs_motion else 0.0
-        row.velocity_mm_per_s[i] = motion[direction + n + i] if model.needs_motion else math.nan
+        row.velocity_mm_per_s[i] = motion[direction + m + i] if model.needs_motion else math.nan
     for i in range(k):
-        row.joint_velocity_mm_per_s[i] = motion[direction + 2 * n + i] if model.needs_motion else math.nan
+        row.joint_velocity_mm_per_s[i] = motion[direction + 2 * m + i] if model.needs_motion else math.nan
 
 
 @helper
@@ -106,35 +106,40 @@ def _add_to_machine(
 ) -> None:
     """The machine with what effects add at its ports, the frame solved anew where its distances or its plate change.
 
-    The ports' order in `added`: scale (n), joint (k), frame (9), link (n), base_joint (n x 3), platform_joint (n x 3),
-    revolute_axis (3 each), plate (9), tool (3).
+    The ports' order in `added` is that of `compd.model.effects.effect_program.LIVE_PORTS`.
     """
-    n, k, a = model.links, joint_mm.shape[0], model.axes
-    link = n + k + 9
+    n, m, k, a = model.links, model.scales, joint_mm.shape[0], model.axes
+    link = m + k + 9
     base = link + n
     platform, axis = base + 3 * n, base + 6 * n
     plate = axis + 3 * a
     tool = plate + 9
     reading_mm = np.empty(k)
     for i in range(k):
-        reading_mm[i] = joint_mm[i] + added[n + i]
-    shorten_by_joints(model.joint_weights[:n, :k], reading_mm, altered.joint_shortening_mm[:n], altered.joint_reason)
-    for i in range(n):
-        altered.reading_to_length_mm[i] = added[i] + added[link + i]
+        reading_mm[i] = joint_mm[i] + added[m + i]
     if level == FRAME:
         plate_points_M_mm = np.empty((3, 3))
         distances_mm = np.empty(9)
         for i in range(9):
             plate_points_M_mm[i // 3, i % 3] = model.plate_points_M_mm[i // 3, i % 3] + added[plate + i]
             shown_mm = frame_mm[i] if i < frame_mm.shape[0] else 0.0
-            distances_mm[i] = model.zero_distances_mm[i] + (shown_mm + added[n + k + i])
+            distances_mm[i] = model.zero_distances_mm[i] + (shown_mm + added[m + k + i])
         solve_frame(model, plate_points_M_mm, distances_mm, nominal_frame.supports_M_mm, frame)
+    if model.by_actuators:
+        stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, altered)
+    else:
+        altered.revolute_axes_P[:, :] = model.revolute_axes_P
+    shorten_by_joints(model.joint_weights[:n, :k], reading_mm, altered.joint_shortening_mm[:n], altered.joint_reason)
+    for i in range(m):
+        altered.scale_mm[i] = added[i]
+    for i in range(n):
+        altered.reading_to_length_mm[i] = added[link + i] if model.by_actuators else added[i] + added[link + i]
     for j in range(3):
         for i in range(n):
             altered.base_joints_M_mm[i, j] = frame.base_joints_M_mm[i, j] + added[base + 3 * i + j]
             altered.platform_joints_P_mm[i, j] = model.platform_joints_P_mm[i, j] + added[platform + 3 * i + j]
         for i in range(a):
-            altered.revolute_axes_P[i, j] = model.revolute_axes_P[i, j] + added[axis + 3 * i + j]
+            altered.revolute_axes_P[i, j] += added[axis + 3 * i + j]
         altered.tool_mm[j] = model.tool_mm[j] + added[tool + j]
 
 
@@ -158,7 +163,7 @@ def add_effects(
     the setpoint of those before it; otherwise the setpoint with all of them alone.  setpoint_mm : that without
     effects, and afterwards with them.
     """
-    n = model.links
+    m = model.scales
     total_mm = np.zeros(added_mm.shape[1])
     tip_M_mm, tip_P_mm = np.empty(3), np.empty(3)
     level = LENGTHS
@@ -173,17 +178,25 @@ def add_effects(
             continue
         altered = work.altered
         _add_to_machine(model, total_mm, level, joint_mm, frame_mm, result.bare_frame, result.frame, altered)
-        if level > LENGTHS:
+        if level > LENGTHS or model.by_actuators:
             tip_M_mm[:] = result.target_M_mm
             tip_P_mm[:] = result.target_P_mm
             if model.tool_on_plate:
                 tip_M_mm[:] = altered.tool_mm
             else:
                 tip_P_mm[:] = altered.tool_mm
-            inverse_pose(model, altered.base_joints_M_mm, altered, tip_M_mm, tip_P_mm, attitude_M_P, work.with_effects)
-        for i in range(n):
-            length_mm = work.with_effects.link_length_mm[i] - altered.reading_to_length_mm[i]
-            setpoint = length_mm - model.zero_link_length_mm[i] + altered.joint_shortening_mm[i]
+            if model.by_actuators:
+                guess_mm = work.command.actuator_mm
+                inverse_standing(model, altered, tip_M_mm, tip_P_mm, attitude_M_P, guess_mm, work.with_effects)
+            else:
+                base_M_mm = altered.base_joints_M_mm
+                inverse_pose(model, base_M_mm, altered, tip_M_mm, tip_P_mm, attitude_M_P, work.with_effects)
+        for i in range(m):
+            if model.by_actuators:
+                setpoint = work.with_effects.actuator_mm[i] - model.zero_actuator_mm[i] - altered.scale_mm[i]
+            else:
+                length_mm = work.with_effects.link_length_mm[i] - altered.reading_to_length_mm[i]
+                setpoint = length_mm - model.zero_link_length_mm[i] + altered.joint_shortening_mm[i]
             contributions_mm[2 + e, i] = setpoint - setpoint_mm[i]
             setpoint_mm[i] = setpoint
         reason = max(reason, altered.joint_reason[0], result.frame.reason[0], work.with_effects.reason[0])

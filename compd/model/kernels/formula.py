@@ -40,6 +40,8 @@ TIME, TIP, SCALE, LINK, DIRECTION, VELOCITY, AXIAL_FORCE, JOINT, FRAME, QUANTITY
 
 _HEADER = 4
 NOW, AT_ZERO = range(2)
+# What a place is of which a column of the scales is read.
+AT_LINK, AT_SCALE = range(2)
 # Deeper than any formula may be nested (`compd.model.formula.parser.DEEPEST`): two operands for each level, and a sum.
 STACK = 64
 
@@ -80,9 +82,9 @@ def set_formula_basis(
     for place in range(places):
         for c in range(count):
             kind, argument = code[column_at + c]
-            columns[NOW, c] = _column(row, quantities, axial_N[NOW], kind, argument, place)
+            columns[NOW, c] = _column(row, machine, quantities, axial_N[NOW], kind, argument, place)
             if lanes > 1:
-                columns[AT_ZERO, c] = _column(row, at_zero, axial_N[AT_ZERO], kind, argument, place)
+                columns[AT_ZERO, c] = _column(row, machine, at_zero, axial_N[AT_ZERO], kind, argument, place)
         at = parameter_at + parameters
         for _ in range(axes):
             axis, operations = code[at]
@@ -107,20 +109,34 @@ def set_formula_basis(
 
 
 @helper
-def _column(row: EffectRow, quantities: FloatArray, axial_N: FloatArray, kind: int, argument: int, place: int) -> float:
-    """The value of a column: the axis of the tip, and where a quantity stands, are its argument."""
+def _scale_at(machine: EffectMachine, at: int, place: int) -> int:
+    """The scale of a place, AT_SCALE or AT_LINK."""
+    return place if at == AT_SCALE else machine.scale_of_link[place]
+
+
+@helper
+def _column(
+    row: EffectRow,
+    machine: EffectMachine,
+    quantities: FloatArray,
+    axial_N: FloatArray,
+    kind: int,
+    argument: int,
+    place: int,
+) -> float:
+    """The value of a column: the axis of the tip, where a quantity stands, and what a place is, are its argument."""
     if kind == TIME:
         return float(row.time_s)
     if kind == TIP:
         return float(row.tip_M_mm[argument])
     if kind == SCALE:
-        return float(row.scale_mm[place])
+        return float(row.scale_mm[_scale_at(machine, argument, place)])
     if kind == LINK:
         return float(row.link_mm[place])
     if kind == DIRECTION:
-        return float(row.direction[place])
+        return float(row.direction[_scale_at(machine, argument, place)])
     if kind == VELOCITY:
-        return float(row.velocity_mm_per_s[place])
+        return float(row.velocity_mm_per_s[_scale_at(machine, argument, place)])
     if kind == AXIAL_FORCE:
         return float(axial_N[place])
     if kind == JOINT:

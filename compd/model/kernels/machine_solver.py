@@ -63,8 +63,9 @@ def forward_pose(
 ) -> None:
     """`machine`: that has the platform joints and revolute axes, a model or a machine with effects."""
     n, k = model.links, model.axes
+    pose.base_joints_M_mm[:, :] = base_joints_M_mm
     solve_forward(
-        base_joints_M_mm[:n],
+        pose.base_joints_M_mm[:n],
         machine.platform_joints_P_mm[:n],
         machine.revolute_axes_P[:k],
         model.hinges[:k],
@@ -91,8 +92,9 @@ def inverse_pose(
     pose: Any,
 ) -> None:
     n, k = model.links, model.axes
+    pose.base_joints_M_mm[:, :] = base_joints_M_mm
     solve_inverse(
-        base_joints_M_mm[:n],
+        pose.base_joints_M_mm[:n],
         machine.platform_joints_P_mm[:n],
         machine.revolute_axes_P[:k],
         model.hinges[:k],
@@ -134,6 +136,8 @@ def copy_frame(source: Any, copy: Any) -> None:
 
 @helper
 def copy_pose(source: Any, copy: Any) -> None:
+    copy.base_joints_M_mm[:, :] = source.base_joints_M_mm
+    copy.actuator_mm[:] = source.actuator_mm
     copy.origin_M_mm[:] = source.origin_M_mm
     copy.rotation_M_P[:, :] = source.rotation_M_P
     copy.link_length_mm[:] = source.link_length_mm

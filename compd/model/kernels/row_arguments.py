@@ -41,7 +41,7 @@ class EffectArrays(NamedTuple):
 
 
 class GaugeRows(NamedTuple):
-    """Changes since machine zero: scale_mm (N, n), joint_mm (N, k), frame_mm (N, 9), or (N, 0) where no
+    """Changes since machine zero: scale_mm (N, m), joint_mm (N, k), frame_mm (N, 9), or (N, 0) where no
     comparator measures the frame; time_s (N,), monotonic.
     """
 
@@ -64,7 +64,7 @@ class WantedRows(NamedTuple):
 class GivenRows(NamedTuple):
     """What is known of the effects before they are computed.
 
-    effects_at_mm : (N, n), in machine-tool mode the scales at which effects are computed first; nan for the setpoint
+    effects_at_mm : (N, m), in machine-tool mode the scales at which effects are computed first; nan for the setpoint
         without effects.
     added_mm : (N, K, size), what effects without a kernel add.
     """
@@ -74,11 +74,13 @@ class GivenRows(NamedTuple):
 
 
 class WarmRows(NamedTuple):
-    """Where Newton starts: supports_M_mm (N, 3, 3), origin_M_mm (N, 3), rotation_M_P (N, 3, 3); or one row for all."""
+    """Where Newton starts: supports_M_mm (N, 3, 3), origin_M_mm (N, 3), rotation_M_P (N, 3, 3), actuator_mm (N, m); or
+    one row for all."""
 
     supports_M_mm: FloatArray
     origin_M_mm: FloatArray
     rotation_M_P: FloatArray
+    actuator_mm: FloatArray
 
 
 class MemoryArrays(NamedTuple):
@@ -136,7 +138,9 @@ EFFECT_ARRAYS = structure(
 GAUGE_ROWS = structure(GaugeRows, scale_mm=ROWS, joint_mm=ROWS, frame_mm=ROWS, time_s=NUMBERS)
 WANTED_ROWS = structure(WantedRows, target_mm=ROWS, attitude_M_P=ROW_MATRICES)
 GIVEN_ROWS = structure(GivenRows, effects_at_mm=ROWS, added_mm=ROW_MATRICES)
-WARM_ROWS = structure(WarmRows, supports_M_mm=ROW_MATRICES, origin_M_mm=ROWS, rotation_M_P=ROW_MATRICES)
+WARM_ROWS = structure(
+    WarmRows, supports_M_mm=ROW_MATRICES, origin_M_mm=ROWS, rotation_M_P=ROW_MATRICES, actuator_mm=ROWS
+)
 MEMORY_ARRAYS = structure(MemoryArrays, motion=NUMBERS, memories=NUMBERS)
 SOLVED_ROWS = structure(SolvedRows, works=WORKSPACES, results=RESULTS)
 ROW_OPTIONS = structure(RowOptions, machine_tool=FLAG, passes=COUNT, starts=FLAG, other_mode=FLAG)

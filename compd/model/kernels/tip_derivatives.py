@@ -31,6 +31,7 @@ from compd.model.kernels.row_arguments import (
     TipDerivativeArrays,
     WarmRows,
 )
+from compd.model.kernels.standing_machine import forward_standing, stand_on
 from compd.model.kernels.tip_sensitivity import set_tip_by_closure, set_tip_by_ports
 from compd.model.structures import GIVEN, MODELS
 
@@ -105,25 +106,44 @@ def set_tip_derivatives(
     scale_mm, joint_mm, frame_mm = gauges.scale_mm[0], gauges.joint_mm[0], gauges.frame_mm[0]
     time_s, motion, effects = gauges.time_s[0], carried.motion, program.effects
     by_port, by_theta, by_quantity = derivatives.by_port, derivatives.by_theta, derivatives.by_quantity
-    n = model.links
+    n, standing = model.links, work.standing
     by_port[:, :] = by_theta[:, :] = by_quantity[:, :] = math.nan
     frame, pose = result.bare_frame, result.bare_pose
     distances_mm, length_mm = np.empty(9), np.empty(n)
     set_distances(model, frame_mm, distances_mm)
     solve_frame(model, model.plate_points_M_mm, distances_mm, warm.supports_M_mm[0], frame)
     shorten_by_joints(model.joint_weights[:n, : joint_mm.shape[0]], joint_mm, length_mm, work.altered.joint_reason)
-    for i in range(n):
-        length_mm[i] = model.zero_link_length_mm[i] + scale_mm[i] - length_mm[i]
-    forward_pose(model, frame.base_joints_M_mm, model, length_mm, warm.origin_M_mm[0], warm.rotation_M_P[0], pose)
+    stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, standing)
+    standing.joint_shortening_mm[:n] = length_mm
+    if model.by_actuators:
+        forward_standing(model, standing, scale_mm, warm.origin_M_mm[0], warm.rotation_M_P[0], pose)
+    else:
+        for i in range(n):
+            length_mm[i] = model.zero_link_length_mm[i] + scale_mm[i] - length_mm[i]
+        forward_pose(model, frame.base_joints_M_mm, model, length_mm, warm.origin_M_mm[0], warm.rotation_M_P[0], pose)
     if max(frame.reason[0], work.altered.joint_reason[0], pose.reason[0]) != OK:
         return
     set_contact(model, pose, model.tool_mm, result.tip_M_mm, result.tip_P_mm)
     row, tip_M_mm = work.row, result.tip_M_mm
-    set_row(model, frame.base_joints_M_mm, pose, tip_M_mm, scale_mm, joint_mm, frame_mm, time_s, False, motion, row)
-    by_closure = np.empty((3, 6))
-    if not set_tip_by_closure(model, frame.base_joints_M_mm, pose, tip_M_mm, by_closure):
+    set_row(model, pose, tip_M_mm, scale_mm, joint_mm, frame_mm, time_s, False, motion, row)
+    by_closure, by_scale, targets = np.empty((3, 6)), np.empty((6, model.scales)), program.targets
+    if not set_tip_by_closure(model, standing, pose, tip_M_mm, by_closure, by_scale):
         return
-    set_tip_by_ports(model, frame, pose, row, by_closure, joint_mm, frame_mm, program.targets, result.frame, by_port)
+    set_tip_by_ports(
+        model,
+        standing,
+        frame,
+        pose,
+        row,
+        by_closure,
+        by_scale,
+        joint_mm,
+        frame_mm,
+        targets,
+        result.frame,
+        work.at_zero,
+        by_port,
+    )
     by_theta[:, :] = by_quantity[:, :] = 0.0
     for e in range(effects.shape[0]):
         if effects[e].number != GIVEN:

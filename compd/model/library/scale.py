@@ -18,7 +18,7 @@ EFFECTS = (
         source="Slocum, Precision Machine Design (1992), chapter 4: linear error of graduated scales",
         needs=("scale",),
         parameters=(
-            Parameter("k", "ppm", -50, 50, "accuracy grades of exposed scales: 3-10 um/m; steel tape: 50", "link"),
+            Parameter("k", "ppm", -50, 50, "accuracy grades of exposed scales: 3-10 um/m; steel tape: 50", "scale"),
         ),
         mistaken_for=("link_sag", "scale_expansion"),
         separated_by="long and short links in several attitudes, at two temperatures",
@@ -35,7 +35,7 @@ EFFECTS = (
             "dT_link_i": "temperature of link i above 20 degC, K",
         },
         source="Slocum, Precision Machine Design (1992), chapter 4; ISO 1 for the reference temperature",
-        needs=("scale", "temperature_link_{link}_degC"),
+        needs=("scale", "temperature_link_{scale}_degC"),
         parameters=(Parameter("a", "ppm/K", 0, 23, "Zerodur 0, glass 8, steel 10.5-12, aluminium 23"),),
         mistaken_for=("scale_gain", "link_expansion"),
         separated_by="the same long and short links at two temperatures 3 K apart",
@@ -57,7 +57,7 @@ EFFECTS = (
         needs=("scale",),
         parameters=tuple(
             Parameter(
-                name, "um", -2, 2, "1 % of the period for a good scale (0.2 um at 20 um), 10 % for a bad one", "link"
+                name, "um", -2, 2, "1 % of the period for a good scale (0.2 um at 20 um), 10 % for a bad one", "scale"
             )
             for name in ("A1", "B1", "A2", "B2")
         ),
@@ -88,7 +88,7 @@ EFFECTS = (
         },
         source="ISO 230-2: reversal value of an axis",
         needs=("direction",),
-        parameters=(Parameter("b", "um", 0, 20, "preloaded ball screw 0.1-1, worn or plain screw 20", "link"),),
+        parameters=(Parameter("b", "um", 0, 20, "preloaded ball screw 0.1-1, worn or plain screw 20", "scale"),),
         mistaken_for=("friction_hysteresis", "gauge_latency"),
         separated_by="approach each point from both sides, by long and by short moves, at two speeds and at rest",
         basis=KernelBasis(scale.backlash),

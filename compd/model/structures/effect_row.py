@@ -1,7 +1,7 @@
 """What the kernel of an effect is computed from: one instant of a machine, under the names of `Observations`.
 
 Both are C structures, handed from function to function by a pointer. Their arrays have room for the largest machine;
-`links` says how many places are in use.
+`links` and `scales` say how many places are in use.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ MAX_JOINTS = 4 * MAX_LINKS
 ROW = np.dtype(
     [
         ("links", np.int64),
+        ("scales", np.int64),
         ("scale_mm", np.float64, MAX_LINKS),
         ("joint_mm", np.float64, MAX_JOINTS),
         ("frame_mm", np.float64, 9),
@@ -45,6 +46,7 @@ MACHINE = np.dtype(
         ("platform_joints_P_mm", np.float64, (MAX_LINKS, 3)),
         ("revolute_axes_P", np.float64, (3, 3)),
         ("hinges", np.int64, (3, 2)),
+        ("scale_of_link", np.int64, MAX_LINKS),
         ("tool_mm", np.float64, 3),
         ("tool_on_plate", np.int64),
         ("zero_directions_M", np.float64, (MAX_LINKS, 3)),

@@ -1,7 +1,7 @@
 """What the compensation is computed from and what it gives, as C structures; see `compd.compensation.compensation`.
 
-Their arrays have room for six links and their 24 joint comparators. Every field is named as in the models and results
-that it is taken from.
+Their arrays have room for six links, six scales and 24 joint comparators. Every field is named as in the models and
+results that it is taken from.
 """
 
 from __future__ import annotations
@@ -19,10 +19,13 @@ _POINTS = (np.float64, (MAX_LINKS, 3))
 _VECTOR = (np.float64, 3)
 _MATRIX = (np.float64, (3, 3))
 
-# Of `compd.model.machine.MachineModel`; axes: of its revolute joints. zero_: of machine zero.
+# Of `compd.model.machine.MachineModel`; axes: of its revolute joints. zero_: of machine zero, base joints with the
+# actuators at 0. by_actuators: whether the inverse takes the actuators as its unknowns; what follows are these, of
+# `compd.model.kinematics.actuators.Actuators`.
 MODEL = np.dtype(
     [
         ("links", np.int64),
+        ("scales", np.int64),
         ("joints", np.int64),
         ("axes", np.int64),
         ("tool_on_plate", np.int64),
@@ -41,6 +44,15 @@ MODEL = np.dtype(
         ("zero_base_joints_M_mm", *_POINTS),
         ("zero_link_length_mm", *_LENGTHS),
         ("zero_distances_mm", np.float64, 9),
+        ("by_actuators", np.int64),
+        ("kinds", np.int64, MAX_LINKS),
+        ("cosine_M", *_POINTS),
+        ("sine_M", *_POINTS),
+        ("radius_mm", *_LENGTHS),
+        ("of_link", np.int64, MAX_LINKS),
+        ("rod_length_mm", *_LENGTHS),
+        ("fixed", np.int64, 6),
+        ("zero_actuator_mm", *_LENGTHS),
     ]
 )
 
@@ -83,9 +95,12 @@ SOLVED_FRAME = np.dtype(
     ]
 )
 
-# The platform, of `compd.model.kinematics.link_kinematics.Pose`.
+# The platform, of `compd.model.kinematics.link_kinematics.Pose`, with the base joints of its links; actuator_mm: where
+# they move base joints.
 SOLVED_POSE = np.dtype(
     [
+        ("base_joints_M_mm", *_POINTS),
+        ("actuator_mm", *_LENGTHS),
         ("origin_M_mm", *_VECTOR),
         ("rotation_M_P", *_MATRIX),
         ("link_length_mm", *_LENGTHS),
@@ -95,9 +110,14 @@ SOLVED_POSE = np.dtype(
     ]
 )
 
-# The machine between gauges and platform, of `compd.model.prediction.PerturbedMachine`.
+# The machine between gauges and platform, of `compd.model.prediction.PerturbedMachine`: base joints with the actuators
+# at 0, cosine_M and sine_M where the base has turned them; scale_mm: what is added to the scales' readings. Where the
+# scales read the links' lengths, reading_to_length_mm has that, too.
 SOLVED_MACHINE = np.dtype(
     [
+        ("cosine_M", *_POINTS),
+        ("sine_M", *_POINTS),
+        ("scale_mm", *_LENGTHS),
         ("base_joints_M_mm", *_POINTS),
         ("platform_joints_P_mm", *_POINTS),
         ("revolute_axes_P", *_MATRIX),
@@ -128,14 +148,18 @@ RESULT = np.dtype(
         ("warm_supports_M_mm", *_MATRIX),
         ("warm_origin_M_mm", *_VECTOR),
         ("warm_rotation_M_P", *_MATRIX),
+        ("warm_actuator_mm", *_LENGTHS),
     ]
 )
 
-# Room for what a row is computed with. nominal: of a machine without joints' and frame's errors; command: of the links
-# at the target; with_effects: likewise, with the effects added so far.
+# Room for what a row is computed with. at_zero: the machine on its frame at machine zero, standing: on its frame now.
+# nominal: of a machine without joints' and frame's errors; command: of the links at the target; with_effects: likewise,
+# with the effects added so far.
 WORKSPACE = np.dtype(
     [
         ("row", ROW),
+        ("at_zero", SOLVED_MACHINE),
+        ("standing", SOLVED_MACHINE),
         ("altered", SOLVED_MACHINE),
         ("nominal", SOLVED_POSE),
         ("command", SOLVED_POSE),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, get_args
 
 from compd.errors import Problem
+from compd.link_count import scale_count
 from compd.model.effects import PORTS, Observations, external_ports, port_size
 from compd.model.formula import (
     ANYWHERE,
@@ -70,7 +71,8 @@ def _columns(rows: Observations, port: Any) -> list[dict[str, str]]:
 def _is_met(need: str, rows: Observations) -> bool:
     if need == "force":
         return all(f"force_{axis}_N" in rows.quantities for axis in AXES)
-    return all(need.format(link=i + 1) in rows.available for i in range(rows.links or 1))
+    places = scale_count(rows.links) if "{scale}" in need else rows.links
+    return all(need.format(link=i + 1, scale=i + 1) in rows.available for i in range(places or 1))
 
 
 def form(workbench: Workbench) -> dict[str, Any]:

@@ -197,7 +197,7 @@ def test_every_effect(effect: Any) -> None:
 
 def test_every_word_that_an_effect_may_need_has_a_meaning() -> None:
     words = {need for effect in BUNDLED for need in effect.needs}
-    quantities = {need for need in words if parse_name(need.replace("{link}", "1"))}
+    quantities = {need for need in words if parse_name(need.replace("{link}", "1").replace("{scale}", "1"))}
     assert words - quantities <= set(NEEDS)
 
 

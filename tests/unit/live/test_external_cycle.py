@@ -60,8 +60,8 @@ def test_what_the_class_gives_is_read_by_an_effect(tmp_path):
     live.change_mm |= {X: 40.0, Y: 7.0}
     setpoint = live.step()
     assert setpoint.state is State.OK
-    assert setpoint.values.tip_M_mm == pytest.approx([40.0, 7.04 + 0.08e-3, 300.0], abs=1e-9)
-    assert setpoint.values.pose_correction[:3] == pytest.approx([0, -0.08e-3, 0], abs=1e-9)
+    assert setpoint.values.tip_M_mm == pytest.approx([40.0, 7.04 + 0.08, 300.0], abs=1e-9)
+    assert setpoint.values.pose_correction[:3] == pytest.approx([0, -0.08, 0], abs=1e-9)
 
 
 def test_a_correction_beyond_its_limit_has_the_tip_that_belongs_to_what_is_applied(tmp_path):

@@ -18,7 +18,7 @@ from compd.model.effects.effect import PORTS, FittedEffect, Port
 from compd.model.effects.effect_basis import evaluate_basis, port_size
 from compd.model.effects.observations import Observations
 from compd.model.kernels.solve_status import Reason
-from compd.model.kinematics.link_kinematics import inverse_kinematics, scale_for_length_mm
+from compd.model.kinematics import inverse_kinematics
 from compd.model.kinematics.motion import Movement
 from compd.model.kinematics.tool import ToolOnPlate
 from compd.model.machine import MachineModel
@@ -136,12 +136,11 @@ def test_the_altered_machine_leads_back_to_its_scales(name: str) -> None:
     each, _ = deltas_by_effect(fitted, rows, {})
     found = sum_deltas(list(each.values()))
     shown = predict(model, rows, found)
-    machine = perturb_machine(model, rows.joint_mm, rows.frame_mm, found)
+    no_scale_mm = np.zeros_like(rows.scale_mm)
+    machine = perturb_machine(model, no_scale_mm, rows.joint_mm, rows.frame_mm, found)
     places = (machine.tool_mm, shown.tip_mm) if name == "tool on plate" else (shown.tip_mm, machine.tool_mm)
     pose = inverse_kinematics(machine.mechanism, *places, shown.rotation_M_P)
-    length_mm = pose.link_length_mm - machine.reading_to_length_mm
-    scale_mm = scale_for_length_mm(model.zero.link_length_mm, length_mm, machine.joint_shortening_mm)
-    np.testing.assert_allclose(scale_mm, rows.scale_mm, atol=1e-9)
+    np.testing.assert_allclose(pose.link_length_mm - machine.length_mm, rows.scale_mm, atol=1e-9)
     assert np.abs(shown.tip_mm - predict(model, rows, {}).tip_mm).max() > 1e-3
 
 

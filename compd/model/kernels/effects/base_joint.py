@@ -40,13 +40,12 @@ def runout(
     """
     n = row.links
     R = row.rotation_M_P
-    for i in range(n):
+    for h in range(machine.axes):
+        i = machine.hinges[h, 0]
         sine_p, cosine_p, sine_q, cosine_q = _turned(row, machine, i)
-        ex = machine.revolute_axes_P[i, 0]
-        ey = machine.revolute_axes_P[i, 1]
-        ez = machine.revolute_axes_P[i, 2]
+        e = machine.revolute_axes_P[h]
         for j in range(3):
-            axis_M = R[j, 0] * ex + R[j, 1] * ey + R[j, 2] * ez
+            axis_M = e[j] if machine.hinges[h, 1] == 1 else R[j, 0] * e[0] + R[j, 1] * e[1] + R[j, 2] * e[2]
             basis[3 * i + j, i] = UM * sine_p * axis_M
             basis[3 * i + j, n + i] = UM * (cosine_p - constants[0]) * axis_M
             basis[3 * i + j, 2 * n + i] = UM * sine_q * axis_M

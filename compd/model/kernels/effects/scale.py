@@ -25,7 +25,7 @@ def gain(
     memory: FloatArray,
     basis: FloatArray,
 ) -> None:
-    for i in range(row.links):
+    for i in range(row.scales):
         basis[i, i] = PPM * row.scale_mm[i]
 
 
@@ -39,7 +39,7 @@ def expansion(
     basis: FloatArray,
 ) -> None:
     """A graduation has its own reference: it is true at 20 degC (ISO 1), wherever machine zero was taken."""
-    for i in range(row.links):
+    for i in range(row.scales):
         basis[i, 0] = PPM * row.scale_mm[i] * (quantities[i] - REFERENCE_TEMPERATURE_degC)
 
 
@@ -52,7 +52,7 @@ def cyclic(
     memory: FloatArray,
     basis: FloatArray,
 ) -> None:
-    n = row.links
+    n = row.scales
     for i in range(n):
         phase_rad = 2 * math.pi / constants[0] * row.scale_mm[i]
         basis[i, i] = UM * math.sin(phase_rad)
@@ -70,7 +70,7 @@ def backlash(
     memory: FloatArray,
     basis: FloatArray,
 ) -> None:
-    for i in range(row.links):
+    for i in range(row.scales):
         if row.direction[i] > 0.0:
             basis[i, i] = -UM / 2
         elif row.direction[i] < 0.0:
@@ -89,7 +89,7 @@ def hysteresis(
     basis: FloatArray,
 ) -> None:
     """Memory: the position of each link, then its strain."""
-    n = row.links
+    n = row.scales
     for i in range(n):
         position_mm = row.scale_mm[i]
         if math.isnan(position_mm):
@@ -118,7 +118,7 @@ def latency(
     memory: FloatArray,
     basis: FloatArray,
 ) -> None:
-    n = row.links
+    n = row.scales
     for i in range(n):
         basis[i, 0] = MS * row.velocity_mm_per_s[i]
     for k in range(basis.shape[0] - n):
