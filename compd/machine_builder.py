@@ -98,7 +98,7 @@ def own_kinematics(geometry: ExternalGeometry) -> Kinematics | None:
         return None
     file, name = geometry.own_class
     where = "geometry.kinematics"
-    kind = getattr(geometry.code.module(file, where, "kinematics"), name, None)
+    kind = getattr(geometry.code.module(file, where, "class"), name, None)
     what = ""
     if not (isinstance(kind, type) and issubclass(kind, Kinematics)):
         what = "the file has no such subclass of `compd.Kinematics`"

@@ -12,4 +12,6 @@ from .own_kinematics import OwnPose as OwnPose
 from .own_kinematics import given_pose as given_pose
 from .own_kinematics import own_columns as own_columns
 from .own_kinematics import own_pose as own_pose
+from .prediction import ExternalPrediction as ExternalPrediction
+from .prediction import predict_external as predict_external
 from .tip_derivative import external_tip_derivatives as external_tip_derivatives

@@ -160,17 +160,19 @@ def external_rows(
     time_s: FloatArray,
     quantities_at_zero: Mapping[str, float] | None,
     memory: EffectMemory,
+    given: Sequence[OwnPose] | None = None,
 ) -> ExternalRows:
     """Rows that follow each other in time.
 
     scale_mm : (N, n) since machine zero.  quantities : (N,) each, those of the settings and of the effects.
+    given : the pose of each row; None where the model has it.
     Raises OwnKinematicsError where the own kinematics gives no pose, and none was given.
     """
     poses: list[OwnPose] = []
     columns: dict[str, list[FloatArray]] = {name: [] for name in model.columns}
     for row, scales in enumerate(scale_mm):
         settings = {name: float(quantities[name][row]) for name in model.settings}
-        poses.append(_pose(model, scales, settings))
+        poses.append(_pose(model, scales, settings) if given is None else given[row])
         if model.own is not None:
             for name, value in own_columns(model.own, scales, settings).items():
                 columns[name].append(value)
