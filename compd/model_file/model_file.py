@@ -156,7 +156,8 @@ class ModelFile:
                     next_step="`compare` predicts the rows of its recordings",
                 )
             )
-        columns = {str(name): np.asarray(rows[name], dtype=np.float64) for name in rows}
+        names = list(map(str, rows))
+        columns = {name: np.asarray(rows[name], dtype=np.float64) for name in names}
         links = next(i for i in count() if f"scale_{i + 1}_mm" not in columns)
         for fitted in self.fitted:
             if len(fitted.theta) != len(fitted.effect.columns(links)):

@@ -61,10 +61,10 @@ def predict_external(model: ExternalModel, columns: Mapping[str, FloatArray]) ->
         tips, unknown = np.stack([columns[name] for name in given], axis=1), np.full(3, np.nan)
         poses = [OwnPose(tip, unknown, np.full((6, model.links), np.nan)) for tip in tips]
     read = {name: columns[name] for name in dict.fromkeys([*model.settings, *effects]) if name in columns}
-    rows, poses, _ = external_rows(model, scale_mm, read, time_s, None, EffectMemory(), poses)
+    rows, found, _ = external_rows(model, scale_mm, read, time_s, None, EffectMemory(), poses)
     deltas, _ = deltas_by_effect(model.live_effects, rows, {})
-    change = carried_to_pose(sum_deltas(deltas.values()), poses) if deltas else np.zeros((count, 6))
-    moved = [moved_pose(pose, change[row]) for row, pose in enumerate(poses)]
+    change = carried_to_pose(sum_deltas(deltas.values()), found) if deltas else np.zeros((count, 6))
+    moved = [moved_pose(pose, change[row]) for row, pose in enumerate(found)]
     rotation_rad = np.array([rotation for _, rotation in moved]).reshape(-1, 3)
     return ExternalPrediction(
         np.array([tip for tip, _ in moved]).reshape(-1, 3),

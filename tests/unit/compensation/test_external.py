@@ -10,7 +10,7 @@ import pytest
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool, external_as_applied
 from compd.model import tip_derivatives
 from compd.model.effects import FittedEffect
-from compd.model.external import Kinematics, OwnKinematicsError, new_external_model, given_pose
+from compd.model.external import Kinematics, OwnKinematicsError, given_pose, new_external_model
 from compd.model.library import find_effect
 
 UPPER_MM, FOREARM_MM = 400.0, 300.0

@@ -152,7 +152,7 @@ def test_targets_of_a_client_are_recorded_with_their_derivatives(tmp_path):
     run, sent = Run(live), []
     with run.recorder(tmp_path / "run") as recorder:
         for number, (line, message, setpoint) in enumerate(run.quiet(20)):
-            live.commands.target = Target((1.0, 2.0, number), tip_by_scale=((0.3, ), (0.1 * number, ), (0.0, )))
+            live.commands.target = Target((1.0, 2.0, number), tip_by_scale=((0.3,), (0.1 * number,), (0.0,)))
             recorder.put(line, message)
             sent.append(setpoint.to_json())
     replayed = list(replay_cycles(live.configuration, RecordedCycles(tmp_path / "run"), [tmp_path / "model.yaml"]))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
+from compd.cli.live.watch import view
 from compd.client import Client, connect
 from compd.errors import DaemonError
 from tests.support.external_machines import GANTRY, Served, class_geometry, served
@@ -171,3 +175,17 @@ def test_a_class_takes_no_target(tmp_path: Path) -> None:
         client.target([0.0, 0.0, 0.0])
         with pytest.raises(DaemonError, match="it takes no target"):
             first(setpoints, lambda s: s["mode"] == "machine_tool")
+
+
+def test_watch_shows_the_correction_of_the_tip(tmp_path: Path, spindle_file: Path) -> None:
+    with served(tmp_path, class_geometry(tmp_path)) as device, running(device), connected(device) as client:
+        take_zero(client)
+        device.values["spindle"] = 30.0
+        client.model(str(spindle_file))
+        grown = first(client.watch(), lambda s: is_ok(s) and s["tip_correction_mm"][2] > 0.0199)
+        console = Console(width=150, record=True, file=StringIO())
+        console.print(view(client.version, grown, client.status(), None))
+        text = console.export_text()
+    assert re.search(r"tip correction, um +\+0.00 +\+0.00 +\+20.00", text)
+    assert re.search(r"spindle_growth, um +\+0.00 +\+0.00 +\+20.00", text)
+    assert re.search(r"3 +-20.00", text)

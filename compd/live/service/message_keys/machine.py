@@ -41,7 +41,8 @@ class MachineLimitKeys(Keys):
         default=None, description="machines without scales: largest of the tip, mm; absent: `correction_mm`"
     )
     rotation_correction_rad: float | None = Field(
-        default=None, description="machines without scales: largest of the attitude, rad; absent: as the tip's at 100 mm"
+        default=None,
+        description="machines without scales: largest of the attitude, rad; absent: as the tip's at 100 mm",
     )
     tip_error_um: float | None = Field(
         default=None, description="largest bound of the tip's error that is valid, um; absent: none"
