@@ -20,6 +20,7 @@ SKEW_COLUMN = "skew_s"
 POSITION_COLUMNS = tuple(f"reference_{axis}_mm" for axis in AXES)
 MODEL_COLUMNS = tuple(f"model_{axis}_mm" for axis in AXES)
 ATTITUDE_COLUMNS = tuple(f"reference_{axis}_rad" for axis in ATTITUDES)
+QUATERNION_COLUMNS = tuple(f"reference_q{part}" for part in "xyzw")
 # Decimals by unit: a picometre, a microsecond, a tenth of a nanoradian. Finer than any gauge, and coarse enough
 # that the conversion from mm to um leaves no digits of its own behind. Other units are written in full.
 DECIMALS = {"mm": 9, "um": 6, "s": 6, "rad": 10}
@@ -58,7 +59,7 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             r"time",
             "s",
             "seconds from the start, different in every row; rows count in this order, however the file is sorted. "
-            "With `machine: external` optional: the rows then count as taken in order",
+            "Optional for poses at rest: nothing that depends on time can be told then",
         ),
         (
             "session",
@@ -106,6 +107,12 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             r"(?:reference|model)_r[xyz]",
             "rad",
             "the attitude as it was measured: rotation vector of {P} in {M}; optional",
+        ),
+        (
+            "reference_qx, reference_qy, reference_qz, reference_qw",
+            r"reference_q[xyzw]",
+            "",
+            "in place of the rotation vector: the same attitude as a quaternion of length 1, scalar last",
         ),
         (
             "reference_link_<i>_mm",

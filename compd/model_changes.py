@@ -146,7 +146,9 @@ def _changed(
     """
     aligned = before.aligned
     fitted_ids = [fitted.effect.id for fitted in result.fitted]
-    others = library_pool(aligned, list(load_library().values()), fitted_ids, criteria.candidates)
+    others = library_pool(
+        aligned, list(map(aligned.on_machine, load_library().values())), fitted_ids, criteria.candidates
+    )
     result = with_disturbances(result, aligned, before.floor.by_axis_um, others.candidates, criteria)
     after = compare(aligned, result.fitted, result.covariance)
     step = ModelStep(

@@ -11,6 +11,7 @@ from compd.comparison import AlignedRecording, ComparisonCriteria, open_recordin
 from compd.errors import Problem, StateError
 from compd.model.effects import Effect
 from compd.model_file import ModelFile, read_model_file
+from compd.parameter_ranges import fitted_on_machine
 
 # An opened recording, or the path of one whose machine is found by its name.
 Recorded: TypeAlias = AlignedRecording | str | Path
@@ -36,7 +37,7 @@ def opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:
     if model is None:
         return ModelFile(machine, links)
     if not isinstance(model, ModelFile):
-        return read_model_file(Path(model), machine, links)
+        return _on_machine(read_model_file(Path(model), machine, links), aligned)
     if model.machine != machine:
         raise StateError(
             Problem(
@@ -58,4 +59,9 @@ def opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:
             )
         )
     # an external model, whose effects lack numbers of single links
-    return replace(model, links=links)
+    return _on_machine(replace(model, links=links), aligned)
+
+
+def _on_machine(model: ModelFile, aligned: AlignedRecording) -> ModelFile:
+    """The model, its effects with the ranges that they have on the recording's machine."""
+    return replace(model, fitted=fitted_on_machine(model.fitted, aligned.rows, aligned.ranges))

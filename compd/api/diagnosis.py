@@ -11,6 +11,7 @@ from compd.diagnosis import Criteria, Diagnosis
 from compd.diagnosis import diagnose as diagnose_aligned
 from compd.model.effects import can_concern
 from compd.model.library import gather_effects, load_library
+from compd.parameter_ranges import check_ranges
 
 
 def compare(recording: Recorded, model: Model = None, *, criteria: ComparisonCriteria | None = None) -> Comparison:
@@ -113,6 +114,7 @@ def diagnose(
     given = gather_effects(effects)
     rows = aligned.rows
     library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
-    candidates = [*library, *given.values()]
+    check_ranges(aligned.ranges, [*load_library().values(), *given.values()])
+    candidates = [aligned.on_machine(effect) for effect in (*library, *given.values())]
     progress = progress or (lambda status: None)
     return diagnose_aligned(aligned, file.fitted, file.covariance, candidates, progress, criteria)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +112,8 @@ def add_effect(
     resolved = _resolve_effect(effect, gather_effects(effects))
     declared = resolved.declared if isinstance(resolved.declared, str) else dict(resolved.declared)
     aligned = opened_recording(recording)
-    return add_to_model(opened_model(model, aligned), declared or resolved.id, resolved, aligned, refine, criteria)
+    on_machine = aligned.on_machine(resolved)
+    return add_to_model(opened_model(model, aligned), declared or resolved.id, on_machine, aligned, refine, criteria)
 
 
 def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapping[str, Effect]) -> Effect:
@@ -120,7 +122,7 @@ def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapp
         return find_effect(effect, "effect")
     if not isinstance(effect, Effect):
         return named_effect(str(effect), "effect", known)
-    if not effect.declared and load_library().get(effect.id) != effect:
+    if not effect.declared and not _is_of_library(effect):
         raise CompdError(
             Problem(
                 where=f"effect {effect.id}",
@@ -129,6 +131,12 @@ def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapp
             )
         )
     return effect
+
+
+def _is_of_library(effect: Effect) -> bool:
+    """Whether the library has this effect, with whatever plausible ranges a machine gives it."""
+    known = load_library().get(effect.id)
+    return known is not None and replace(effect, parameters=known.parameters) == known
 
 
 def _shipped_links(name: str, path: Path) -> int:

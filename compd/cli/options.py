@@ -24,6 +24,15 @@ EffectsOption = Annotated[
         "that comes with compd. May be repeated.",
     ),
 ]
+RangesOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--range",
+        metavar="EFFECT.PARAMETER=LOW..HIGH",
+        help="The plausible range of one parameter on this machine, such as link_zero.z=-3..3mm, in the place of the "
+        "library's or of what geometry.tolerance_mm gives. May be repeated.",
+    ),
+]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Overwrite a file of another kind.")]
 
 

@@ -65,6 +65,13 @@ class ComparisonCriteria:
         meaning="fewer pairs of repeats do not say what noise is",
         reason="a choice: eight independent pairs know the noise within a quarter",
     )
+    min_target_motion: float = threshold(
+        0.02,
+        unit="mm per mm",
+        meaning="the place of an instrument's target on the platform is fitted along directions in which it moves the "
+        "measured coordinates by more, rms, otherwise than the instrument's frame does",
+        reason="a choice: attitudes that vary by a degree; a target mounted 1 mm elsewhere then shows as 20 um",
+    )
     declared_dof: float = threshold(
         200.0,
         unit="degrees of freedom",

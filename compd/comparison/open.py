@@ -11,18 +11,27 @@ Example::
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from compd.comparison.alignment.align_recording import align_recording
 from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.alignment.target_place import held_numbers
 from compd.comparison.criteria import ComparisonCriteria
 from compd.configuration import Configuration, Machine, load_machine, shipped_names
 from compd.errors import Problem, RecordingError
+from compd.parameter_ranges import read_range
 from compd.recording import EXTERNAL, Recording, read_recording, read_sidecar
 
 
 def open_recording(
-    path: str | Path, machine: Machine | None = None, *, criteria: ComparisonCriteria = ComparisonCriteria()
+    path: str | Path,
+    machine: Machine | None = None,
+    *,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    ranges: Sequence[str] = (),
+    hold: Sequence[str] = (),
 ) -> AlignedRecording:
     """Open a recording with its machine, and compute what the machine's kinematics predicts in each of its rows.
 
@@ -37,6 +46,14 @@ def open_recording(
         read from the columns ``model_x_mm`` ...
     criteria : ComparisonCriteria
         The numbers by which the recording is aligned, compared and fitted; every one has its default.
+    ranges : sequence of str
+        Plausible ranges of single parameters, such as ``"link_zero.z=-3..3mm"``. Left out, geometric effects have the
+        ranges that follow from the machine's ``geometry.tolerance_mm``, and all others those of the library.
+
+    hold : sequence of str
+        What of an instrument's registration is not fitted along: ``"frame"``, ``"target"``, ``"target.place"``,
+        ``"target.attitude"``, or single numbers, ``"frame.x"`` to ``"target.c"``. The frame keeps what the first
+        registration finds; a target that is held is at the tip, its axes along those of {P}.
 
     Returns
     -------
@@ -50,6 +67,8 @@ def open_recording(
         what is allowed and what to do.
     ConfigurationError
         Where the configuration `machine` cannot be used.
+    CompdError
+        Where a text of `ranges` states no range, or one of `hold` no part of a registration.
 
     Examples
     --------
@@ -58,8 +77,9 @@ def open_recording(
     >>> recording.labels, recording.measured_mm.shape
     (('x', 'y', 'z'), (608, 3))
     """
+    stated, held = tuple(map(read_range, ranges)), held_numbers(hold)
     recording, configuration = read_with_machine(Path(path), machine)
-    return align_recording(recording, configuration, criteria)
+    return replace(align_recording(recording, configuration, criteria, held), ranges=stated)
 
 
 def read_with_machine(

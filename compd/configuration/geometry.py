@@ -57,6 +57,12 @@ class MovingPlatform(Section):
     weight_at_P_mm: Vector = Field(default=(0.0, 0.0, 0.0), description="where the weight acts, in {P}")
 
 
+# Of places and lengths, in mm. Ground parts, and a drawing of measured places: some micrometres. Milled and turned
+# parts without stated tolerance: 0.05, ISO 2768-1 fine for small dimensions. Printed parts 0.2 to 1; joints placed by
+# hand, with a tape measure, 5.
+TOLERANCES_MM = {"ground": 0.005, "measured": 0.005, "machined": 0.05, "printed": 1.0, "hand-built": 5.0}
+
+
 class ToolOnPlatformSettings(Section):
     """The usual arrangement: the tool moves, the work lies on the surface plate."""
 
@@ -108,6 +114,18 @@ class Geometry(Section):
     )
     plate_thickness_mm: Positive | None = Field(default=None, description="thickness of the surface plate")
     scale_signal_period_mm: Positive | None = Field(default=None, description="signal period of the linear scales")
+
+    tolerance_mm: Literal["ground", "measured", "machined", "printed", "hand-built"] | Positive | None = Field(
+        default=None,
+        description="how far places and lengths of the machine as built may be from those in this file: a number, or a "
+        "class: ground, measured 0.005; machined 0.05; printed 1; hand-built 5. Plausible ranges of geometric effects "
+        "follow from it; left out, they are the library's",
+    )
+
+    @property
+    def made_to_mm(self) -> float | None:
+        """The tolerance in mm; None where it is not stated."""
+        return TOLERANCES_MM[self.tolerance_mm] if isinstance(self.tolerance_mm, str) else self.tolerance_mm
 
     @property
     def mechanism(self) -> MechanismDescription:

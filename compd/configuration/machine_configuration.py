@@ -223,8 +223,8 @@ class Configuration:
 
     @property
     def geometry_hash(self) -> str:
-        """Hash of the basis of a model: the geometry without the limits of the links' length."""
-        return hash_of(self, ("geometry",), without=("link_length_mm",))
+        """Hash of the basis of a model: the geometry without the limits of the links' length and its tolerance."""
+        return hash_of(self, ("geometry",), without=("link_length_mm", "tolerance_mm"))
 
     @property
     def zero_hash(self) -> str:

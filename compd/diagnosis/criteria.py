@@ -105,6 +105,13 @@ class Criteria:
         meaning="a parameter farther outside its plausible range is implausible",
         reason="by noise alone once in 370 parameters (normal distribution, two-sided)",
     )
+    rough_factor: float = threshold(
+        3.0,
+        unit="times the range",
+        meaning="a number whose range follows from the machine's stated tolerance is excluded only so far outside; "
+        "between, it is named with a question",
+        reason="a choice: classes of tolerance are a factor of ten apart, and an owner's statement is rough",
+    )
     range_slack: float = threshold(
         0.25,
         unit="share of the range's width",

@@ -316,6 +316,8 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         scale_signal_period_mm=details.scale_signal_period_mm,
         instrument_M_mm=np.array(details.instrument_M_mm),
         joints=model.joint_weights.shape[1],
+        tolerance_mm=details.tolerance_mm,
+        stroke_mm=details.stroke_mm,
         zero=zero,
     )
 

@@ -132,6 +132,8 @@ def observe_external(
         scale_signal_period_mm=np.nan,
         instrument_M_mm=np.zeros(3),
         joints=0,
+        tolerance_mm=np.nan,
+        stroke_mm=np.nan,
         zero=None,
     )
     return Observations(

@@ -74,8 +74,6 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
     ending = REFERENCE_UNITS[sidecar.unit] if sidecar is not None else "mm"
     if sidecar is not None and reference_valid:
         names = _names_in_unit(names, sidecar, problems)
-    if "time_s" not in names:
-        _add_missing(["time_s"], names, problems)
     scales = _count(names, "scale", "mm", external, problems)
     joints = _count(names, "joint", "um", external, problems)
     approaches = _count(names, "approach", "", external, problems)

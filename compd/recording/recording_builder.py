@@ -35,6 +35,7 @@ from compd.recording.checks import (
     largest_joint_um,
 )
 from compd.recording.layout import Layout, machine_problems, read_layout
+from compd.recording.quaternion import with_rotation_vector
 from compd.recording.recording import Recording
 from compd.recording.sidecar import Sidecar, read_sidecar
 from compd.tables import FIRST_ROW, ProblemList, Table, rows_text
@@ -94,7 +95,8 @@ class RecordingBuilder:
         if table is None:
             raise RecordingError([*problems, *table_problems.problems])
         table = correct_names(table, table_problems)
-        has_time = "time_s" in table.letters or sidecar is None or not sidecar.external
+        table = with_rotation_vector(table, table_problems)
+        has_time = "time_s" in table.letters or sidecar is None
         if not has_time:
             table = _with_row_numbers(table, self._count.rows)
         layout = read_layout(list(table.letters), sidecar, self._reference_valid, table_problems)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
+from compd.cli.options import EffectsOption, MachineOption, OverwriteOption, RangesOption
 
 if TYPE_CHECKING:
     from compd.comparison import AlignedRecording
@@ -28,6 +29,7 @@ def diagnose(
         Path | None, typer.Option("--model", help="The model file with the known effects; it is not changed.")
     ] = None,
     effects: EffectsOption = None,
+    ranges: RangesOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
     html: Annotated[Path | None, typer.Option("--html", help="Write the page with pictures; works offline.")] = None,
     overwrite: OverwriteOption = False,
@@ -41,6 +43,7 @@ def diagnose(
     from compd.api import diagnose as diagnose_recording
     from compd.cli.progress import steps_shown
     from compd.diagnosis import evaluate_holdout
+    from compd.parameter_ranges import read_range
     from compd.report import print_diagnosis
 
     if html is not None:
@@ -49,6 +52,7 @@ def diagnose(
         check_page_path(html, overwrite)
     sealed = [_open(path, machine)[0] for path in recordings[1:]]
     aligned, all_rows = _open(recordings[0], machine)
+    aligned = replace(aligned, ranges=tuple(map(read_range, ranges or ())))
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]

@@ -12,6 +12,7 @@ from compd.comparison.alignment.external_machine import external_observations
 from compd.comparison.alignment.fixed_ends import place_balls, place_pins
 from compd.comparison.alignment.measured_attitude import attitude_mm, measured_attitude, target_turn
 from compd.comparison.alignment.registration import Registration, register
+from compd.comparison.alignment.target_place import PlacedTarget, attitude_M_P, place_target
 from compd.comparison.alignment.velocity import velocities
 from compd.comparison.criteria import ComparisonCriteria, SpeedCriteria
 from compd.configuration import Configuration
@@ -28,6 +29,7 @@ def align_recording(
     recording: Recording,
     configuration: Configuration | None,
     criteria: ComparisonCriteria = ComparisonCriteria(),
+    held: frozenset[str] = frozenset(),
 ) -> AlignedRecording:
     """A recording on the machine that the configuration describes; None only for an external model.
 
@@ -36,7 +38,7 @@ def align_recording(
     model = None if configuration is None else build_model(configuration.geometry, configuration.wiring)
     geometry_hash = "" if configuration is None else configuration.geometry_hash
     return align_observations(
-        recording, model, recorded_observations(recording, model, criteria), geometry_hash, criteria
+        recording, model, recorded_observations(recording, model, criteria), geometry_hash, criteria, held=held
     )
 
 
@@ -63,10 +65,12 @@ def align_observations(
     geometry_hash: str = "",
     criteria: ComparisonCriteria = ComparisonCriteria(),
     part_of: AlignedRecording | None = None,
+    held: frozenset[str] = frozenset(),
 ) -> AlignedRecording:
     """As `align_recording`, for rows that are observed already.
 
     part_of : of a block of a long recording the sample of it that places the instrument's frame, or the fixed ends.
+    held : numbers of the registration that are not fitted along; see `HELD`.
     """
     assert recording.reference is not None
     if recording.reference_link_mm is not None:
@@ -104,15 +108,21 @@ def align_observations(
         raise RecordingError(Problem(where=str(recording.path), what="has no column of the reference"))
     axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
     registration = None if part_of is None else part_of.registration
-    if registration is not None:
+    target = None if part_of is None else part_of.target
+    rotation_rad, nominal = recording.reference_rotation_rad, observations.rotation_M_P
+    if part_of is None and recording.reference.frame == "instrument" and rotation_rad is not None and model is not None:
+        target = _placed(recording, rotation_rad, observations, axes, criteria, held)
+    if target is not None and rotation_rad is not None:
+        registration = target.registration
+        measured_mm = target.tip_M_mm(measured_mm, attitude_M_P(rotation_rad, nominal, registration))
+    elif registration is not None:
         measured_mm = registration.into_M(_in_space(measured_mm, axes))[:, list(axes)]
     elif recording.reference.frame == "instrument" and part_of is None:
         registration, measured_mm = _registered(recording, measured_mm, observations.tip_M_mm, axes, criteria)
     labels = recording.reference_axes
     # without a known noise nothing says what a urad counts beside a um: the attitude is compared, and fits no effect
-    weighed = model is not None and len(axes) == 3 and np.isfinite(recording.reference.sigma_urad)
-    if weighed and recording.reference_rotation_rad is not None:
-        nominal, rotation_rad = observations.rotation_M_P, recording.reference_rotation_rad
+    weighed = model is not None and len(axes) == 3
+    if weighed and rotation_rad is not None:
         turn = target_turn(rotation_rad, nominal, registration) if part_of is None else part_of.target_turn
         attitude = measured_attitude(rotation_rad, registration, turn)
         measured_mm = np.concatenate([measured_mm, attitude_mm(attitude, nominal)], axis=1)
@@ -128,6 +138,8 @@ def align_observations(
         geometry_hash,
         part_of=part_of,
         criteria=criteria,
+        target=target,
+        held=held if part_of is None else part_of.held,
     )
 
 
@@ -153,6 +165,21 @@ def _at_fixed_ends(aligned: AlignedRecording, end: IntArray) -> AlignedRecording
         return replace(aligned, ends=ends, measured_mm=ends.place_of_row_mm)
     measured_mm = np.where(ends.of_row >= 0, distance_mm + ends.added_mm[ends.of_row], np.nan)[:, None]
     return replace(aligned, ends=ends, labels=("distance",), measured_mm=measured_mm)
+
+
+def _placed(
+    recording: Recording,
+    rotation_rad: FloatArray,
+    observations: Observations,
+    axes: tuple[int, ...],
+    criteria: ComparisonCriteria,
+    held: frozenset[str],
+) -> PlacedTarget | None:
+    """Frame and target of an instrument that shows both place and attitude; None where the place is not shown."""
+    if len(axes) < 3 or recording.reference_mm is None:
+        return None
+    points_mm = np.where(recording.excluded[:, None], np.nan, recording.reference_mm)
+    return place_target(points_mm, rotation_rad, observations.tip_M_mm, observations.rotation_M_P, criteria, held)
 
 
 def _registered(
@@ -201,9 +228,13 @@ def _observations(
     frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
     approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
     at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
-    velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm, criteria)
+    if recording.has_time:
+        velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm, criteria)
+    else:
+        velocity = np.full((count, scale_mm.shape[1] + comparators), np.nan)
+        approach = approach if recording.approach_measured else np.zeros_like(scale_mm)
     movement = Movement(approach, *np.split(velocity, [scale_mm.shape[1]], axis=1))
-    return observe(
+    rows = observe(
         model,
         model.constants,
         scale_mm=scale_mm,
@@ -215,6 +246,10 @@ def _observations(
         movement=movement,
         quantities_at_zero=recording.sidecar.quantities_at_zero,
     )
+    if recording.has_time:
+        return rows
+    direction = () if recording.approach_measured else ("direction",)
+    return replace(rows, lacking=frozenset({"time", "order", "motion", *direction}))
 
 
 def session_starts(recording: Recording) -> BoolArray:

@@ -24,6 +24,7 @@ from compd.comparison.alignment.registration import (
     points_spread_mm,
     registration_columns,
 )
+from compd.comparison.alignment.target_place import HELD, PlacedTarget
 from compd.comparison.criteria import ComparisonCriteria
 from compd.display_unit import ATTITUDE_LABELS, ATTITUDE_UNIT, MM_PER_RAD, in_place_unit
 from compd.errors import CompdError
@@ -39,6 +40,7 @@ from compd.model import (
 )
 from compd.model.effects import ConstantValues, Effect, FittedEffect, Observations, Port, evaluate_basis, unmet_needs
 from compd.model.kernels import Reason
+from compd.parameter_ranges import StatedRange, on_machine
 from compd.recording import Recording, UsableRows
 from compd.result_tables import Columns, data_frame, html_table
 from compd.statistics import filled
@@ -82,6 +84,12 @@ class AlignedRecording:
         None for a whole recording.
     criteria : ComparisonCriteria
         The numbers by which it was aligned, and by which it is compared and fitted.
+    target : PlacedTarget or None
+        Where the instrument's target is on the platform; None where it is taken to be at the tip.
+    held : frozenset of str
+        Numbers of the registration that are not fitted along; see `HELD`.
+    ranges : tuple of StatedRange
+        Plausible ranges that were stated for single parameters; others are the machine's or the library's.
     """
 
     recording: Recording
@@ -95,7 +103,14 @@ class AlignedRecording:
     ends: FixedEnds | None = None
     part_of: AlignedRecording | None = None
     criteria: ComparisonCriteria = ComparisonCriteria()
+    target: PlacedTarget | None = None
+    held: frozenset[str] = frozenset()
+    ranges: tuple[StatedRange, ...] = ()
     _by_port: dict[Port, Sensitivity] = field(default_factory=dict, repr=False)
+
+    def on_machine(self, effect: Effect) -> Effect:
+        """The effect with its plausible ranges on this recording's machine; see `compd.parameter_ranges`."""
+        return on_machine(effect, self.rows, self.ranges)
 
     @property
     def unit(self) -> str:
@@ -225,12 +240,31 @@ class AlignedRecording:
         if self.registered:
             points_M_mm = self.rows.tip_M_mm if self.part_of is None else self.part_of.rows.tip_M_mm
             columns = registration_columns(self.rows.tip_M_mm, self.axes, points_M_mm)
-            if not self.with_attitude:
-                return columns
-            return attitude_registration_columns(columns, self.rows.rotation_M_P, points_spread_mm(points_M_mm))
+            place = self._place_columns
+            spread_mm = points_spread_mm(points_M_mm)
+            if self.with_attitude:
+                columns = attitude_registration_columns(columns, place, self.rows.rotation_M_P, spread_mm)
+            else:
+                columns = np.concatenate([columns, place], axis=2)
+            return columns[:, :, self._fitted_along(columns.shape[2], place.shape[2])]
         if self.model is None:
             return displacement_columns(*self.measured_mm.shape)
         return np.zeros((*self.measured_mm.shape, 0))
+
+    @property
+    def _place_columns(self) -> FloatArray:
+        """(N, 3, K) derivatives of the measured tip by the place of the target on the platform."""
+        if self.target is None:
+            return np.zeros((len(self.rows), len(self.axes), 0))
+        return np.asarray(self.rows.rotation_M_P @ self.target.directions_P)
+
+    def _fitted_along(self, count: int, places: int) -> list[int]:
+        """Those of the registration's columns that are not held. count : of all.  places : of the target's place."""
+        if not self.held:
+            return list(range(count))
+        frame = [f"frame.{name}" for name in "xyzabc"] if len(self.axes) == 3 else [""] * (count - places)
+        names = [*frame, *[""] * places, *(f"target.{name}" for name in "abc" if self.with_attitude)]
+        return [k for k, name in enumerate(names) if name not in self.held]
 
     @cached_property
     def gaps_filled(self) -> AlignedRecording:
@@ -328,7 +362,9 @@ class AlignedRecording:
         if self.part_of is not None:
             return self.part_of.target_turn
         measured = self.recording.reference_rotation_rad
-        return None if measured is None else target_turn(measured, self.rows.rotation_M_P, self.registration)
+        if measured is None or self.held >= HELD["target.attitude"]:
+            return None
+        return target_turn(measured, self.rows.rotation_M_P, self.registration)
 
     def _why_no_pose(self, rows: BoolArray) -> str:
         if self.model is None:

@@ -53,15 +53,20 @@ def measured_attitude(
     return np.asarray(attitude if turn is None else compose(attitude, turn.T))
 
 
-def attitude_registration_columns(tip_columns: FloatArray, nominal_M_P: FloatArray, spread_mm: float) -> FloatArray:
-    """(N, 6, Q + 3) derivatives of tip and attitude by the instrument's frame and by the target's turn on the platform.
+def attitude_registration_columns(
+    tip_columns: FloatArray, place_columns: FloatArray, nominal_M_P: FloatArray, spread_mm: float
+) -> FloatArray:
+    """(N, 6, Q + K + 3) derivatives of tip and attitude by the instrument's frame, and by the place and the turn of its
+    target on the platform.
 
     tip_columns : (N, 3, Q) of the tip, displacements first, then rotations about x, y, z as in `registration_columns`.
-    spread_mm : by which these rotations are divided.
+    place_columns : (N, 3, K) of the tip.  spread_mm : by which the rotations are divided.
     """
     count, _, own = tip_columns.shape
-    columns = np.zeros((count, 6, own + 3))
+    turn = own + place_columns.shape[2]
+    columns = np.zeros((count, 6, turn + 3))
     columns[:, :3, :own] = tip_columns
+    columns[:, :3, own:turn] = place_columns
     columns[:, 3:, own - 3 : own] = np.eye(3) * MM_PER_RAD / spread_mm
-    columns[:, 3:, own:] = nominal_M_P
+    columns[:, 3:, turn:] = nominal_M_P
     return columns

@@ -29,6 +29,7 @@ class Candidate:
     best_of : among how many choices of its constants, unlike one another, the residual itself chose this one; 1 where
         it was chosen without looking at the residual.
     constants : values of its nonlinear constants.
+    rough : of each parameter, whether its range follows from a stated tolerance; empty where none does.
     kind : "effect" names a cause; "proxy" stands for one that was not measured; the others name none.
     """
 
@@ -40,11 +41,16 @@ class Candidate:
     constants: ConstantValues = field(default_factory=dict)
     kind: Kind = "effect"
     best_of: int = field(default=1, kw_only=True)
+    rough: tuple[bool, ...] = field(default=(), kw_only=True)
 
     @property
     def largest(self) -> FloatArray:
         """(P,) the largest plausible size of each parameter."""
         return np.asarray(np.abs(self.limits).max(axis=1))
+
+    def allowed(self, rough_factor: float) -> FloatArray:
+        """(P, 2) limits beyond which the candidate explains nothing: those that a stated tolerance gives, widened."""
+        return self.limits * np.where(self.rough, rough_factor, 1.0)[:, None] if self.rough else self.limits
 
     @property
     def parameter_count(self) -> int:
@@ -136,9 +142,11 @@ def searched_parameters(effect: Effect, grid: Sequence[ConstantValues], criteria
 
 def variant(effect: Effect, constants: ConstantValues, aligned: AlignedRecording, searched: int) -> Candidate:
     """The effect at one choice of its constants; searched : for how many parameters their search counts."""
-    limits = np.array([column.parameter.theta_range for column in effect.columns(aligned.rows.links)])
+    parameters = [column.parameter for column in effect.columns(aligned.rows.links)]
+    limits = np.array([parameter.theta_range for parameter in parameters])
+    rough = tuple(parameter.rough for parameter in parameters)
     columns_um = aligned.columns(effect, constants) * UM_PER_MM
-    return Candidate(effect.id, effect, columns_um, limits, searched, constants)
+    return Candidate(effect.id, effect, columns_um, limits, searched, constants, rough=rough if any(rough) else ())
 
 
 def _missing_inputs(effect: Effect, aligned: AlignedRecording) -> str:

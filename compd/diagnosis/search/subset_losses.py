@@ -168,7 +168,8 @@ class SubsetLosses:
             if candidate.kind not in ("effect", "proxy", "change"):
                 continue
             std = np.sqrt(np.diag(covariance))
-            for (low, high), value, error in zip(candidate.limits, theta, std, strict=True):
+            allowed = candidate.allowed(self.criteria.rough_factor)
+            for (low, high), value, error in zip(allowed, theta, std, strict=True):
                 limits = (min(low, 0.0), max(high, 0.0))
                 if not is_plausible(limits, float(value), float(error), self.criteria):
                     return False

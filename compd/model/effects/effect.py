@@ -107,6 +107,11 @@ class Parameter:
         What there is one value for: ``"machine"``, ``"scale"``, ``"link"``, ``"axis"`` or ``"link_axis"``.
     reciprocal : bool
         The fit is linear in 1/value: a compliance is fitted, a stiffness shown.
+    tolerance : str
+        How the tolerance to which a machine was made limits it: ``"place"`` by itself, ``"gain"`` over the stroke,
+        ``"tilt"`` over the radius of the platform joints; ``""`` for what no workshop's tolerance limits.
+    rough : bool
+        The range follows from such a tolerance, which is stated to an order of magnitude.
     """
 
     name: str
@@ -116,6 +121,8 @@ class Parameter:
     source: str
     per: Per = "machine"
     reciprocal: bool = False
+    tolerance: Literal["", "place", "gain", "tilt"] = ""
+    rough: bool = False
 
     def suffixes(self, links: int) -> list[str]:
         """What follows the name of each of its values on a machine of so many links: `_1`, `_2`, `_3`."""

@@ -28,7 +28,8 @@ ANSWER_PREFIXES = ("reference_", "model_")
 class MachineDetails(NamedTuple):
     """What effects need of a machine's description beyond its kinematics; nan where it says nothing.
 
-    plate_thickness_mm, scale_signal_period_mm: of the configuration's `geometry:`.
+    plate_thickness_mm, scale_signal_period_mm, tolerance_mm: of the configuration's `geometry:`.
+    stroke_mm: by how much a link's length changes at most.
     instrument_M_mm: where the reference instrument's beam starts. Only the refractive index of air depends on it;
         without a place of its own the beam is taken to start at the origin of {M}.
     """
@@ -36,6 +37,8 @@ class MachineDetails(NamedTuple):
     plate_thickness_mm: float = math.nan
     scale_signal_period_mm: float = math.nan
     instrument_M_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tolerance_mm: float = math.nan
+    stroke_mm: float = math.nan
 
 
 class AtZero(NamedTuple):
@@ -72,6 +75,7 @@ class MachineConstants(NamedTuple):
     plate_thickness_mm, scale_signal_period_mm.
     instrument_M_mm (3,): where the reference instrument's beam starts; the origin of {M} unless configured.
     joints : number of joint comparators.
+    tolerance_mm, stroke_mm : what plausible ranges of geometric effects rest on.
     zero : the machine at machine zero; None where its kinematics is not known.
     """
 
@@ -92,6 +96,8 @@ class MachineConstants(NamedTuple):
     scale_signal_period_mm: float
     instrument_M_mm: FloatArray
     joints: int
+    tolerance_mm: float
+    stroke_mm: float
     zero: AtZero | None
 
 
@@ -108,6 +114,8 @@ class Observations:
     link_mm (N, n), directions_M (N, n, 3) from base to platform joint, base_joints_M_mm (N, n, 3).
     origin_M_mm (N, 3), rotation_M_P (N, 3, 3): the moving platform.  tip_M_mm (N, 3).
     recorded : of a machine without known kinematics, what of GIVEN_BY_KINEMATICS was recorded all the same.
+    lacking : of a machine of known kinematics, what of GIVEN_BY_KINEMATICS these rows do not tell: of poses at rest
+        without times, when and in which order they were taken.
     quantities_at_zero : the quantities when machine zero was taken, by name, from which effects count; None where they
         are not known: effects then count from the standard conditions.
     """
@@ -129,6 +137,7 @@ class Observations:
     rotation_M_P: FloatArray
     tip_M_mm: FloatArray
     recorded: frozenset[str] = frozenset()
+    lacking: frozenset[str] = frozenset()
     quantities_at_zero: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
@@ -152,7 +161,7 @@ class Observations:
         chosen: dict[str, Any] = {
             column.name: getattr(self, column.name)[index]
             for column in fields(self)
-            if column.name not in ("constants", "quantities", "recorded", "quantities_at_zero")
+            if column.name not in ("constants", "quantities", "recorded", "lacking", "quantities_at_zero")
         }
         quantities = {name: values[index] for name, values in self.quantities.items()}
         return replace(self, **chosen, quantities=quantities)
@@ -182,7 +191,7 @@ class Observations:
     @property
     def available(self) -> set[str]:
         """Names of the quantities and settings that there are, as `unmet_needs` takes them."""
-        return set(self.quantities) | available_settings(self.constants) | self.recorded
+        return (set(self.quantities) | available_settings(self.constants) | self.recorded) - self.lacking
 
     def setting(self, name: str) -> float | None:
         """A number from the machine's description, None where it has none."""

@@ -14,7 +14,7 @@ EFFECTS = (
         symbols={"d_i": "displacement of base joint i in {M}, um"},
         source="Wampler, Hollerbach, Arai (1995): kinematic calibration of closed chains",
         needs=(),
-        parameters=(Parameter("d", "um", -100, 100, "machining and assembly", "link_axis"),),
+        parameters=(Parameter("d", "um", -100, 100, "machining and assembly", "link_axis", tolerance="place"),),
         mistaken_for=("link_zero", "platform_joint_position"),
         separated_by="the whole workspace to its edges; measuring the joints on a coordinate measuring machine",
         basis=KernelBasis(base_joint.position),

@@ -127,7 +127,7 @@ EFFECTS = (
         symbols={"z_i": "error of link i's length at machine zero, um"},
         source="Wampler, Hollerbach, Arai (1995): kinematic calibration of closed chains",
         needs=(),
-        parameters=(Parameter("z", "um", -50, 50, "adjustment of machine zero", "link"),),
+        parameters=(Parameter("z", "um", -50, 50, "adjustment of machine zero", "link", tolerance="place"),),
         mistaken_for=("tool_offset",),
         separated_by="the edges of the workspace, where the links point differently than in the middle",
         basis=KernelBasis(link.zero),

@@ -18,7 +18,15 @@ EFFECTS = (
         source="Slocum, Precision Machine Design (1992), chapter 4: linear error of graduated scales",
         needs=("scale",),
         parameters=(
-            Parameter("k", "ppm", -50, 50, "accuracy grades of exposed scales: 3-10 um/m; steel tape: 50", "scale"),
+            Parameter(
+                "k",
+                "ppm",
+                -50,
+                50,
+                "accuracy grades of exposed scales: 3-10 um/m; steel tape: 50",
+                "scale",
+                tolerance="gain",
+            ),
         ),
         mistaken_for=("link_sag", "scale_expansion"),
         separated_by="long and short links in several attitudes, at two temperatures",

@@ -36,7 +36,7 @@ EFFECTS = (
         symbols={"d": "displacement of the tip in {P}; of a tool that stands on the plate, in {M}; um"},
         source="ISO 10360-5: qualification of a stylus on a sphere",
         needs=(),
-        parameters=(Parameter("d", "um", -50, 50, "tool change and qualification", "axis"),),
+        parameters=(Parameter("d", "um", -50, 50, "tool change and qualification", "axis", tolerance="place"),),
         mistaken_for=("link_zero",),
         separated_by="the edges of the workspace, where the platform tilts; a tool of another length",
         basis=KernelBasis(tool.offset),

@@ -137,7 +137,8 @@ class Workbench:
     def _set_candidates(self) -> None:
         rows = self.opened.aligned.rows
         library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
-        self.candidates = Candidates(self.opened.comparison, [*library, *self.sources.effects])
+        on_machine = self.opened.aligned.on_machine
+        self.candidates = Candidates(self.opened.comparison, list(map(on_machine, [*library, *self.sources.effects])))
         self.drafts = Drafts(self.opened.comparison, self.candidates)
 
     def use_libraries(self, libraries: Sequence[str]) -> None:
