@@ -54,6 +54,7 @@ def compensate_external(
         reason=np.array(int(Reason.OK if usable else Reason.NOT_FINITE)),
         rotation_M_rad=rotation_rad if np.isfinite(rotation_rad).all() else None,
         pose_correction=_undone(change, pose),
+        own_columns={name: float(rows.quantities[name][0]) for name in model.columns} or None,
     )
     if model.live_effects:
         memory = EffectMemory(motion, {**memory.memories, **memories}, commanded)

@@ -102,6 +102,7 @@ class Compensation(NamedTuple):
     pose_correction : (6,), what is added to the commanded tip, mm, and to the commanded attitude, rad, in {B0}: the
         rotation is about the axes of {B0} and follows that of the command; nan where the attitude is not known. None
         where links are corrected and no pose.
+    own_columns : what own kinematics gives for effects to read, by name; None of any other machine.
     """
 
     tip_M_mm: FloatArray
@@ -118,6 +119,7 @@ class Compensation(NamedTuple):
     reason: IntArray
     rotation_M_rad: FloatArray | None = None
     pose_correction: FloatArray | None = None
+    own_columns: Mapping[str, float] | None = None
 
 
 class Wanted(NamedTuple):

@@ -17,7 +17,8 @@ def json_schema() -> dict[str, Any]:
     for name, kind in SECTIONS.items():
         properties[name] = _collect(kind, definitions)
     for name, kind in EXTERNAL_SECTIONS.items():
-        properties[name] = {"anyOf": [properties[name], _collect(kind, definitions)]}
+        forms = [properties[name], _collect(kind, definitions)]
+        properties[name] = {"description": forms[0]["description"], "anyOf": forms}
     gauges = []
     for driver in names(GAUGES):
         options = _collect(load(GAUGES, driver, driver).Options, definitions)

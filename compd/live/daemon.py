@@ -20,6 +20,7 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock, MonotonicClock
+from compd.columns import MODEL_COLUMNS
 from compd.configuration import Configuration, listed_code
 from compd.errors import DaemonError, StateError
 from compd.kernel_versions import kernel_versions
@@ -62,6 +63,7 @@ from compd.live.service import (
 from compd.live.system import changed_ports, port_names
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.model import MachineModel
+from compd.model.external import ExternalModel
 from compd.release import __version__
 
 _log = structlog.get_logger()
@@ -210,7 +212,7 @@ class Daemon:
                     status=report.message,
                     budget=BudgetMessage(pipeline.settings.model, self._newest_setpoint).message,
                     models=lambda: {**adopted.summary, **keeping(adopted.summary)},
-                    readings=ReadingsMessage(self._wires, self.latest.channels),
+                    readings=ReadingsMessage(self._wires, self.latest.channels, model_columns(pipeline.settings.model)),
                 ),
                 errands=Errands(
                     take_zero=zero_capture.start,
@@ -361,6 +363,11 @@ class Daemon:
             return error
         _log.info("machine zero", taken_at=zero.taken_at)
         return zero
+
+
+def model_columns(model: MachineModel) -> tuple[str, ...]:
+    """Columns of a recording that are made of the setpoints: those of `machine: external`."""
+    return (*MODEL_COLUMNS, *model.columns) if isinstance(model, ExternalModel) else ()
 
 
 def _target_keys(configuration: Configuration) -> TargetKeys:

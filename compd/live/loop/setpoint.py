@@ -32,6 +32,8 @@ _DECIMALS_MM = 7
 # 0.1 nrad: 0.1 nm at the end of a lever of 1 m.
 _DECIMALS_RAD = 10
 _DECIMALS_S = 6
+# As columns of a recording.
+_DECIMALS_OWN = 9
 # 0.1 nm, as lengths: an uncertainty is not known better.
 _DECIMALS_UM = 4
 
@@ -275,11 +277,15 @@ def _json_pose(values: Compensation, moved_mm: float) -> dict[str, Any]:
         "tip_correction_mm": (None if correction is None else correction[:3], _DECIMALS_MM),
         "rotation_correction_rad": (rotation_correction_rad, _DECIMALS_RAD),
     }
-    return {
+    message: dict[str, Any] = {
         name: _rounded(numbers, decimals, moved_mm)
         for name, (numbers, decimals) in known.items()
         if numbers is not None
     }
+    if values.own_columns:
+        columns = np.array(list(values.own_columns.values()))
+        message["own_columns"] = dict(zip(values.own_columns, _rounded(columns, _DECIMALS_OWN, moved_mm), strict=True))
+    return message
 
 
 def _target_named(target: Target) -> dict[str, Any]:

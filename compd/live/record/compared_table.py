@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from compd.columns import MODEL_COLUMNS
 from compd.live.record.recording_part import CYCLES_SUFFIX
 from compd.live.record.replay import RecordedCycles
 from compd.live.record.table_rows import Message, TableRows
@@ -55,7 +54,7 @@ def _of_part(table: Path, messages: Iterator[tuple[str, Message]]) -> Iterator[D
                 return
             where = f"{table}:{lines.line_num}"
             if rows is None:
-                rows = TableRows(watch, message, _origin_s(message, header, cells), MODEL_COLUMNS[0] in header)
+                rows = TableRows(watch, message, _origin_s(message, header, cells))
             yield from _of_row(where, header, cells, dict(zip(rows.names, rows.row(message), strict=True)))
 
 

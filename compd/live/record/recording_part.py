@@ -59,7 +59,7 @@ class RecordingPart:
         self.start_s: float = first_readings["time_s"]
         self.rows = 0
         self._rows_added = 0
-        self._table_rows = TableRows(watch, first_readings, origin_s, version["machine"] == EXTERNAL)
+        self._table_rows = TableRows(watch, first_readings, origin_s)
         sidecar = sidecar_text(self._sidecar(version, watch, started_at)).encode()
         first_lines = b"".join(encode_compact(message).encode() + b"\n" for message in first_messages)
         self._table = part_table(stem, table_format, self._table_rows.names, self._table_rows.in_full)
@@ -174,6 +174,7 @@ class RecordingPart:
                     if "sign" in column
                 },
             },
-            quantities_at_zero=self.zero.get("quantities"),
+            # effects of an external machine count as they are written
+            quantities_at_zero=None if version["machine"] == EXTERNAL else self.zero.get("quantities"),
             notes="Raw readings less machine zero, before any correction: raw in mm = zero_mm + sign * column.",
         )

@@ -21,17 +21,16 @@ class TableRows:
     names : of the columns. in_full : those that are written with every digit.
     """
 
-    def __init__(self, watch: Message, first_readings: Message, origin_s: float, external: bool = False) -> None:
+    def __init__(self, watch: Message, first_readings: Message, origin_s: float) -> None:
         """`watch`: the daemon's answer to WATCH. `first_readings`: the first READINGS of the part. `origin_s`:
-        monotonic time that is 0 in the column time_s. `external`: whether own kinematics or a client gives the pose,
-        which is recorded."""
+        monotonic time that is 0 in the column time_s."""
         self._columns: Sequence[Message] = watch["columns"]
         self._zero: Message = first_readings["zero"]
         self._origin_s = origin_s
         self._links = len(first_readings.get("approach", ()))
         of_gauges = ["time_s", *(column["column"] for column in self._columns), SKEW_COLUMN]
         self._decimals = {name: decimals(name) for name in of_gauges}
-        self._model = MODEL_COLUMNS if external else ()
+        self._model: Sequence[str] = watch.get("model_columns", ())
         self._decimals |= {name: decimals(name) for name in self._model}
         self.names = [*of_gauges, *approach_columns(self._links), *self._model]
         self.in_full = {column["column"] for column in self._columns if "sign" not in column}
@@ -49,13 +48,14 @@ class TableRows:
         return row
 
     def _pose(self, setpoint: Message) -> list[float | None]:
-        """The tip before any correction; None where the setpoint is not valid."""
+        """The tip before any correction, and what the class gives; None where the setpoint is not valid."""
         if not setpoint["valid"]:
             return [None] * len(self._model)
         tip_mm = setpoint["tip_M_mm"]
         if setpoint["mode"] == Mode.CMM:
             tip_mm = [tip + undone for tip, undone in zip(tip_mm, setpoint["tip_correction_mm"], strict=True)]
-        return [self._number(name, value) for name, value in zip(self._model, tip_mm, strict=True)]
+        known = {**dict(zip(MODEL_COLUMNS, tip_mm, strict=True)), **setpoint.get("own_columns", {})}
+        return [self._number(name, known[name]) if name in known else None for name in self._model]
 
     def _value(self, column: Message, reading: Message, now_s: float) -> float | None:
         """None where the reading is not good, or too old for the daemon to use."""

@@ -43,6 +43,9 @@ class WatchKeys(SentMessage):
     what: Literal["setpoints", "readings"] | None = Field(default=None, description="as in the request")
     rate_hz: float | None = Field(default=None, description="as in the request, Hz")
     columns: list[ColumnKeys] | None = Field(default=None, description="of readings: which channel is which column")
+    model_columns: list[str] | None = Field(
+        default=None, description="of readings, with `machine: external`: columns that are made of the setpoints"
+    )
 
 
 class WatchRequest(Request):
@@ -70,7 +73,9 @@ class WatchRequest(Request):
             # READINGS are several times a SETPOINT's size, and their times are those of this computer's clock.
             raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
         client.watch(self.rate_hz, Stream.READINGS)
-        return line(message | {"columns": context.messages.readings.columns})
+        readings = context.messages.readings
+        model_columns = {"model_columns": readings.model_columns} if readings.model_columns else {}
+        return line(message | {"columns": readings.columns} | model_columns)
 
 
 class TargetRequest(Request):

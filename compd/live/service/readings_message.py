@@ -42,8 +42,10 @@ class RecordedCycle(NamedTuple):
 class ReadingsMessage:
     """Makes the READINGS messages of a machine, and the `columns` that describe them in the answer to WATCH."""
 
-    def __init__(self, wires: MachineWires, channels: Sequence[str]) -> None:
-        """`channels`: names of a snapshot's readings, in order."""
+    def __init__(self, wires: MachineWires, channels: Sequence[str], model_columns: Sequence[str] = ()) -> None:
+        """`channels`: names of a snapshot's readings, in order. `model_columns`: of a recording, that are made of
+        setpoints: the pose that own kinematics or a client gives, and what its class gives beside it."""
+        self.model_columns = list(model_columns)
         self.columns = columns(wires)
         self._channels = tuple(channels)
 

@@ -142,9 +142,12 @@ def own_columns(kinematics: Kinematics, scale_mm: FloatArray, settings: Mapping[
         return {}
     try:
         found = kinematics.columns(scale_mm.copy(), settings)
-        return {name: np.array(float(found[name])) for name in kinematics.gives}
+        columns = {name: np.array(float(found[name])) for name in kinematics.gives}
     except (Exception, SystemExit) as error:
         raise _failed(kinematics, "columns", error) from error
+    if not all(map(np.isfinite, columns.values())):
+        raise _wrong(kinematics, "columns", np.array(list(columns.values())), "finite numbers")
+    return columns
 
 
 def _asked(

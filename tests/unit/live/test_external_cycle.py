@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
+import compd
 from compd.errors import StateError
 from compd.live.loop import Target
 from compd.live.loop.limits import limit_pose_correction
@@ -144,6 +146,7 @@ def test_a_recording_replays_bit_for_bit_with_refused_and_clamped_cycles(tmp_pat
         model_x = float(row["model_x_mm"] or "nan")
         expected = math.nan if given is None else float(row["scale_1_mm"])
         assert model_x == pytest.approx(expected, abs=2e-7, nan_ok=True)
+        assert float(row["d_square_y_mm"] or "nan") == pytest.approx(expected, abs=1e-9, nan_ok=True)
 
 
 def test_targets_of_a_client_are_recorded_with_their_derivatives(tmp_path):
@@ -158,3 +161,49 @@ def test_targets_of_a_client_are_recorded_with_their_derivatives(tmp_path):
     replayed = list(replay_cycles(live.configuration, RecordedCycles(tmp_path / "run"), [tmp_path / "model.yaml"]))
     assert [cycle.replayed for cycle in replayed] == sent
     assert b'"tip_correction_mm":[-0.009,' in sent[-1]
+
+
+def test_a_recording_gives_a_model_with_which_the_live_error_falls(tmp_path):
+    live, random = gantry(tmp_path, limits={**LIMITS, "correction_mm": 1.0}), np.random.default_rng(3)
+    off_square = 0.8e-3
+
+    def true_tip_mm():
+        x, y, z = (live.change_mm[name] for name in (X, Y, Z))
+        return np.array([x, y + (1e-3 + off_square) * x, 300.0 - z])
+
+    def live_error_mm():
+        live.change_mm |= dict(zip((X, Y, Z), random.uniform(-100, 100, 3), strict=True))
+        return live.settle().values.tip_M_mm - true_tip_mm()
+
+    run, truth = Run(live), []
+    with run.recorder(tmp_path / "run") as recorder:
+        for _ in range(80):
+            live.change_mm |= dict(zip((X, Y, Z), random.uniform(-100, 100, 3), strict=True))
+            line, message, _ = run.recorded(live.step())
+            recorder.put(line, message)
+            truth.append(true_tip_mm() + random.normal(0, 1e-3, 3))
+    (recorded,) = tmp_path.glob("run-*.csv")
+    with recorded.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    measured = tmp_path / "measured.csv"
+    names = [f"reference_{axis}_mm" for axis in "xyz"]
+    with measured.open("w", newline="") as file:
+        writer = csv.DictWriter(file, [*rows[0], *names])
+        writer.writeheader()
+        writer.writerows(
+            {**row, **dict(zip(names, tip.round(6), strict=True))} for row, tip in zip(rows, truth, strict=True)
+        )
+    reference = {"quantity": "tool_position", "frame": "machine", "sigma_um": 1.0}
+    sidecar = yaml.safe_load(recorded.with_suffix(".yaml").read_text())
+    measured.with_suffix(".yaml").write_text(yaml.safe_dump({**sidecar, "reference": reference}))
+
+    before = max(np.abs(live_error_mm()).max() for _ in range(5))
+    model = compd.add_effect(None, SQUARE, measured)
+    model.write(tmp_path / "fitted.yaml")
+    live.commands.models = Models(live.loader.read(tmp_path / "fitted.yaml"))
+    after = max(np.abs(live_error_mm()).max() for _ in range(5))
+    assert before > 0.02
+    assert after < before / 20
+    scales = {f"scale_{k}_mm": [live.change_mm[name]] for k, name in enumerate((X, Y, Z), start=1)}
+    own = live.model.own
+    np.testing.assert_allclose(model.predict(scales, own).tip_M_mm[0], live.settle().values.tip_M_mm, atol=1e-12)

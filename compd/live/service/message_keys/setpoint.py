@@ -86,6 +86,11 @@ class SetpointKeys(SentMessage):
         description="the same for the attitude that is commanded: a small turn about the axes of {B0} that follows "
         "it, as a rotation vector, rad; absent where the attitude is not known",
     )
+    own_columns: dict[str, float] | None = Field(
+        default=None,
+        description="`machine: external` with a class: what its method `columns` gives, by name, for effects and "
+        "recordings",
+    )
     frame: FrameKeys | None = Field(default=None, description="where the base platform is, and how it has moved")
     link_length_mm: Links | None = Field(
         default=None, description="length of each link, mm: measured (cmm) or needed (machine_tool)"
