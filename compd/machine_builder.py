@@ -43,32 +43,35 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
     """
     if (external := external_of(geometry)) is not None:
         return build_external(external, wiring)
+    model = machine_model(machine_parts(geometry, wiring))
+    return replace(model, constants=machine_constants(model, machine_details(geometry)))
+
+
+def machine_parts(geometry: Geometry, wiring: Wiring) -> MachineParts:
+    """The parts that the configuration describes, whether or not they make a machine."""
     base, mechanism = geometry.base, geometry.mechanism
     rotation_M_B = rotation_matrix(np.array(base.rotation_B0_in_M_rad))
     origin_M_mm = np.array(base.origin_B0_in_M_mm)
     attitude_rad = np.array(geometry.tool.zero_rotation_P_in_M_rad)
     tool, contact = _tool(geometry.tool)
-    model = machine_model(
-        MachineParts(
-            supports_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.supports_B_mm or np.zeros((3, 3)))),
-            plate_points_M_mm=geometry.plate_points_M_mm or np.full((3, 3), np.nan),
-            rotation_M_B=rotation_M_B,
-            base_joints_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array([rod.base_B_mm for rod in mechanism.rods])),
-            support_of_joint=np.array(base.support_of_joint or np.ones(geometry.links, dtype=np.int64)) - 1,
-            platform_joints_P_mm=[rod.platform_P_mm for rod in mechanism.rods],
-            revolute_axes_P=_hinge_axes(mechanism, rotation_M_B),
-            hinges=_hinges(mechanism),
-            actuators=_actuators(mechanism, rotation_M_B),
-            actuator_guess_mm=[_guess_mm(actuator) for actuator in mechanism.actuators],
-            arrangement=tool,
-            zero_contact=contact,
-            zero_rotation_M_P=None if geometry.kinematics == "tripod_3spr" else rotation_matrix(attitude_rad),
-            joint_weights=joint_weights(wiring, geometry.links),
-            weight_N=geometry.platform.weight_N,
-            weight_at_P_mm=geometry.platform.weight_at_P_mm,
-        )
+    return MachineParts(
+        supports_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array(base.supports_B_mm or np.zeros((3, 3)))),
+        plate_points_M_mm=geometry.plate_points_M_mm or np.full((3, 3), np.nan),
+        rotation_M_B=rotation_M_B,
+        base_joints_M_mm=to_outer(rotation_M_B, origin_M_mm, np.array([rod.base_B_mm for rod in mechanism.rods])),
+        support_of_joint=np.array(base.support_of_joint or np.ones(geometry.links, dtype=np.int64)) - 1,
+        platform_joints_P_mm=[rod.platform_P_mm for rod in mechanism.rods],
+        revolute_axes_P=_hinge_axes(mechanism, rotation_M_B),
+        hinges=_hinges(mechanism),
+        actuators=_actuators(mechanism, rotation_M_B),
+        actuator_guess_mm=[_guess_mm(actuator) for actuator in mechanism.actuators],
+        arrangement=tool,
+        zero_contact=contact,
+        zero_rotation_M_P=None if geometry.kinematics == "tripod_3spr" else rotation_matrix(attitude_rad),
+        joint_weights=joint_weights(wiring, geometry.links),
+        weight_N=geometry.platform.weight_N,
+        weight_at_P_mm=geometry.platform.weight_at_P_mm,
     )
-    return replace(model, constants=machine_constants(model, machine_details(geometry)))
 
 
 def build_external(geometry: ExternalGeometry, wiring: Wiring) -> ExternalModel:

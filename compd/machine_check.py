@@ -25,11 +25,12 @@ from compd.configuration import (
 )
 from compd.documents import Document, Location, Section, readable
 from compd.errors import ConfigurationError, KinematicsError, PluginError, Problem
-from compd.machine_builder import build_model
+from compd.machine_builder import build_model, machine_parts
+from compd.machine_reach import dependences_as_drawn
 from compd.machine_slips import axes_along_links, slips
 from compd.model import MachineModel
 from compd.model.external import ExternalModel, OwnKinematicsError, own_pose
-from compd.operation_settings import SocketSettings, StateSettings
+from compd.operation_settings import SocketSettings, StateSettings, Wiring
 
 SectionT = TypeVar("SectionT", bound=Section)
 
@@ -65,6 +66,7 @@ def examine_whole(path: Path) -> Examined:
             except (KinematicsError, ValueError) as error:
                 along = list(axes_along_links(document, examined.geometry))
                 problems += _at_machine_zero(error, document, warnings, along)
+                problems += _dependences(document, examined.geometry, examined.wiring)
             else:
                 if isinstance(model, ExternalModel):
                     problems += _faults_at_zero(document, model)
@@ -94,6 +96,17 @@ def _faults_at_zero(document: Document, model: ExternalModel) -> Iterator[Proble
     except OwnKinematicsError as error:
         where = document.where(("geometry", "kinematics"))
         yield from (replace(problem, where=where, what=f"{problem.where} {problem.what}") for problem in error.problems)
+
+
+def _dependences(document: Document, geometry: Geometry, wiring: Wiring) -> Iterator[Problem]:
+    """Rods and hinges that say one thing twice, so that nothing holds the platform in one direction."""
+    for names in dependences_as_drawn(machine_parts(geometry, wiring)):
+        yield Problem(
+            where=document.where(("geometry",)),
+            what=f"{', '.join(names)} repeat or contradict each other at machine zero: something of the platform's six "
+            "coordinates is held twice, and something not at all",
+            next_step="look at `compd machine draw`; mend the joints, axes or actuators of these",
+        )
 
 
 def _section(kind: type[SectionT], document: Document, name: str) -> SectionT | None:

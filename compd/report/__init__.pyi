@@ -9,6 +9,7 @@ from .evidence_json import evidence as evidence
 from .ledger_page import LEDGER_HEAD as LEDGER_HEAD
 from .ledger_page import ledger_rows as ledger_rows
 from .ledger_page import write_ledger_page as write_ledger_page
+from .machine_drawing import machine_svg as machine_svg
 from .page import COLOURS as COLOURS
 from .page import Panel as Panel
 from .page import check_page_path as check_page_path

@@ -61,6 +61,8 @@ def check(
     ]
     print_problems(warnings, "warning: ", sys.stdout)
     print_zero(configuration)
+    if configuration.external is None:
+        print_reach(configuration)
     wiring = configuration.wiring
     if not wiring.frame and configuration.external is None:
         typer.echo(f"Not measured: the frame, which is taken to stand still; {_frame_drift(wiring.frame_drift_um)}.")
@@ -68,6 +70,7 @@ def check(
     processes = f" (polled in processes of their own: {', '.join(own_process)})" if own_process else ""
     typer.echo(
         f"{config}: {configuration.machine} is complete: {configuration.geometry.links} links, "
+        f"{len(wiring.scale)} scales, "
         f"{len(wiring.joint)} joint and {len(wiring.frame)} frame comparators, {len(wiring.quantities)} quantities, "
         f"{len(configuration.gauges)} gauges on {len(configuration.lines)} lines{processes}; "
         f"hash {configuration.config_hash}"
@@ -95,6 +98,16 @@ def print_zero(configuration: Configuration) -> None:
     rods = ", ".join(f"{name} {mm:.1f}" for name, mm in zip(FRAME_DISTANCES, zero.distances_mm, strict=True))
     rods = f"; rods {rods}" if configuration.geometry.has_frame else ""
     typer.echo(f"Machine zero, for a tape measure, mm between centres of joints: links {links}{rods}.")
+
+
+def print_reach(configuration: Configuration) -> None:
+    """Print the degrees of freedom, how far the machine gets, and the nearest singularity."""
+    from compd.machine_builder import build_model
+    from compd.machine_reach import machine_reach, reach_lines
+
+    model = build_model(configuration.geometry, configuration.wiring)
+    for line in reach_lines(machine_reach(model, configuration.geometry.link_length_mm)):
+        typer.echo(line)
 
 
 def print_blind_spots(configuration: Configuration) -> None:

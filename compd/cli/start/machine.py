@@ -1,0 +1,114 @@
+"""`compd machine`: a configuration from a few dimensions, and a drawing of a configuration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, TypeAlias
+
+import typer
+
+from compd.cli.options import OverwriteOption
+
+machine = typer.Typer(no_args_is_help=True, help="Begin the configuration of a machine, and draw one.")
+
+Kind: TypeAlias = Literal["6-ups", "6-pus", "6-rus", "3-spr", "3-rps", "3-prs", "linear-delta", "rotary-delta"]
+Tolerance: TypeAlias = Literal["ground", "measured", "machined", "printed", "hand-built"]
+
+
+@machine.command()
+def new(
+    kind: Annotated[
+        Kind,
+        typer.Option(
+            "--kind",
+            help="6-ups: six legs that extend; 6-pus: six rods on rails; 6-rus: six cranks with rods; 3-spr, 3-rps: "
+            "three legs that extend, hinged at the platform or at the base; 3-prs: three rods on rails; linear-delta, "
+            "rotary-delta: three carriages or cranks with two rods each.",
+        ),
+    ],
+    out: Annotated[Path | None, typer.Option("--out", help="Write the file; left out, the text is printed.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Of the machine; left out, that of the file.")] = None,
+    base_radius_mm: Annotated[
+        float | None, typer.Option("--base-radius", help="Of the circle of the base joints, mm.")
+    ] = None,
+    platform_radius_mm: Annotated[
+        float | None, typer.Option("--platform-radius", help="Of the circle of the platform joints, mm.")
+    ] = None,
+    height_mm: Annotated[
+        float | None,
+        typer.Option(
+            "--height",
+            help="Of the platform joints above the base joints at machine zero, mm; negative where the platform hangs.",
+        ),
+    ] = None,
+    base_angle_deg: Annotated[
+        float | None,
+        typer.Option("--base-angle", help="Six legs: between the two base joints of a pair, degrees."),
+    ] = None,
+    platform_angle_deg: Annotated[
+        float | None,
+        typer.Option("--platform-angle", help="Six legs: between the two platform joints of a pair, degrees."),
+    ] = None,
+    spacing_mm: Annotated[
+        float | None, typer.Option("--spacing", help="Deltas: between the two rods of an arm, mm.")
+    ] = None,
+    crank_mm: Annotated[float | None, typer.Option("--crank", help="6-rus, rotary-delta: of a crank, mm.")] = None,
+    tool_mm: Annotated[float | None, typer.Option("--tool", help="Of the tip beyond the platform joints, mm.")] = None,
+    tolerance: Annotated[
+        Tolerance,
+        typer.Option("--tolerance", help="How the machine is made: what is plausible of its geometry follows."),
+    ] = "machined",
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Write the configuration of a machine of a kind, from a few dimensions, in at most 60 lines.
+
+    Dimensions that are left out have usual values. The scales are read over Modbus TCP: put in your own gauges.
+    """
+    from compd.machine_kinds import KINDS, machine_text
+
+    given = {
+        "base_radius_mm": base_radius_mm,
+        "platform_radius_mm": platform_radius_mm,
+        "height_mm": height_mm,
+        "base_angle_deg": base_angle_deg,
+        "platform_angle_deg": platform_angle_deg,
+        "spacing_mm": spacing_mm,
+        "crank_mm": crank_mm,
+        "tool_mm": tool_mm,
+    }
+    dimensions = KINDS[kind].usual._replace(**{key: value for key, value in given.items() if value is not None})
+    own_name = name or (out.stem if out is not None else kind)
+    text = machine_text(own_name, kind, dimensions, tolerance)
+    if out is None:
+        typer.echo(text, nl=False)
+        return
+    if out.exists() and not overwrite:
+        raise typer.BadParameter(f"{out} exists: give --overwrite to replace it")
+    out.write_text(text, encoding="utf-8")
+    typer.echo(f"{out}: a {kind}. Next: `compd machine draw {out}`, `compd check {out}`")
+
+
+@machine.command()
+def draw(
+    config: Annotated[Path, typer.Argument(help="The machine's configuration (YAML).")],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="The picture, SVG; left out, the configuration's name with .svg.")
+    ] = None,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Draw a machine at machine zero in three views: joints, rods with their numbers, rails, cranks, hinges, tool."""
+    from compd.configuration import load
+    from compd.machine_builder import build_model
+    from compd.report import machine_svg
+
+    out = config.with_suffix(".svg") if out is None else out
+    if out.suffix != ".svg":
+        raise typer.BadParameter(f"{out}: the picture is SVG, so end the name in .svg")
+    if out.exists() and not overwrite and not out.read_text(encoding="utf-8", errors="replace").startswith("<svg"):
+        raise typer.BadParameter(f"{out} exists and is no picture: give --overwrite to replace it")
+    configuration = load(config)
+    if configuration.external is not None:
+        raise typer.BadParameter(f"{config}: compd knows no joints of `machine: external`, so there is nothing to draw")
+    model = build_model(configuration.geometry, configuration.wiring)
+    out.write_text(machine_svg(model, configuration.machine), encoding="utf-8")
+    typer.echo(f"{out}: {configuration.machine} at machine zero")
