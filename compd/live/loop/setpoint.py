@@ -224,6 +224,9 @@ class Setpoint(NamedTuple):
             flags = FLAG_VALID | FLAG_TOOL_ON_PLATE if self.tool_on_plate else FLAG_VALID
             unused = (math.nan,) * (PACKET_LINKS - links)
             unknown = (math.nan,) * (PACKET_LINKS - len(values.link_length_mm))
+            of_pose = links == 0 and values.pose_correction is not None
+            correction = values.pose_correction if of_pose else values.correction_mm
+            assert correction is not None, "checked above"
             vectors = (
                 *tip_mm.tolist(),
                 *values.frame.displacement_M_mm.tolist(),
@@ -232,8 +235,8 @@ class Setpoint(NamedTuple):
                 *unknown,
                 *values.scale_setpoint_mm.tolist(),
                 *unused,
-                *values.correction_mm.tolist(),
-                *unused,
+                *correction.tolist(),
+                *((math.nan,) * (PACKET_LINKS - len(correction))),
             )
         body = BODY.pack(
             MAGIC,

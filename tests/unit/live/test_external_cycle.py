@@ -14,6 +14,7 @@ import compd
 from compd.errors import StateError
 from compd.live.loop import Target
 from compd.live.loop.limits import limit_pose_correction
+from compd.live.loop.packet_layout import BODY, PACKET_BODY
 from compd.live.machine import Models
 from compd.live.record.agreement import Agreement
 from compd.live.record.compared_table import differing_cells
@@ -207,3 +208,24 @@ def test_a_recording_gives_a_model_with_which_the_live_error_falls(tmp_path):
     scales = {f"scale_{k}_mm": [live.change_mm[name]] for k, name in enumerate((X, Y, Z), start=1)}
     own = live.model.own
     np.testing.assert_allclose(model.predict(scales, own).tip_M_mm[0], live.settle().values.tip_M_mm, atol=1e-12)
+
+
+def test_a_packet_has_the_correction_of_a_pose_where_no_links_are_corrected(tmp_path):
+    live = Machine(load_whole(external_yaml(tmp_path, {"kinematics": "client"}, limits=LIMITS)))
+    grown = {**SHIFT, "id": "growth", "port": "reference", "axis": "z"}
+    with_effect(live, tmp_path, grown, growth=30.0)
+    live.commands.target = Target((1.0, 2.0, 3.0), (0.0, 0.0, 0.1))
+    packet = live.step().to_packet(bytes(8))
+    names = [field.name for field in PACKET_BODY if field.name != "spare"]
+    sizes = [
+        int(field.format[:-1]) if field.format.endswith("d") and len(field.format) > 1 else 1
+        for field in PACKET_BODY
+        if field.name != "spare"
+    ]
+    values, found = list(BODY.unpack(packet[: BODY.size])), {}
+    for name, size in zip(names, sizes, strict=True):
+        found[name], values = values[:size], values[size:]
+    assert found["links"] == [0]
+    assert found["tip_mm"] == [1, 2, 3]
+    assert found["correction_mm"] == pytest.approx([0, 0, -0.03, 0, 0, 0], abs=1e-12)
+    assert np.isnan(found["scale_setpoint_mm"]).all()
