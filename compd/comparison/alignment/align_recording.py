@@ -12,7 +12,7 @@ from compd.comparison.alignment.external_machine import external_observations
 from compd.comparison.alignment.fixed_ends import place_balls, place_pins
 from compd.comparison.alignment.measured_attitude import attitude_mm, measured_attitude, target_turn
 from compd.comparison.alignment.registration import Registration, register
-from compd.comparison.alignment.target_place import PlacedTarget, attitude_M_P, place_target
+from compd.comparison.alignment.target_place import PlacedTarget, place_target
 from compd.comparison.alignment.velocity import velocities
 from compd.comparison.criteria import ComparisonCriteria, SpeedCriteria
 from compd.configuration import Configuration
@@ -114,14 +114,18 @@ def align_observations(
         target = _placed(recording, rotation_rad, observations, axes, criteria, held)
     if target is not None and rotation_rad is not None:
         registration = target.registration
-        measured_mm = target.tip_M_mm(measured_mm, attitude_M_P(rotation_rad, nominal, registration))
+        turn = target_turn(rotation_rad, nominal, registration) if part_of is None else part_of.target_turn
+        measured_mm = target.tip_M_mm(measured_mm, measured_attitude(rotation_rad, registration, turn))
     elif registration is not None:
         measured_mm = registration.into_M(_in_space(measured_mm, axes))[:, list(axes)]
     elif recording.reference.frame == "instrument" and part_of is None:
         registration, measured_mm = _registered(recording, measured_mm, observations.tip_M_mm, axes, criteria)
     labels = recording.reference_axes
-    # without a known noise nothing says what a urad counts beside a um: the attitude is compared, and fits no effect
+    # beside a declared noise of the position nothing says what a urad counts: the attitude is compared, and fits no
+    # effect; where no noise is declared, each counts by the size of its own residual
+    reference = recording.reference
     weighed = model is not None and len(axes) == 3
+    weighed &= bool(np.isfinite(reference.sigma_urad)) or not reference.standard_uncertainty
     if weighed and rotation_rad is not None:
         turn = target_turn(rotation_rad, nominal, registration) if part_of is None else part_of.target_turn
         attitude = measured_attitude(rotation_rad, registration, turn)

@@ -82,13 +82,14 @@ def place_target(
     None where fewer than three rows are left: nothing fixes a frame.
     """
     registration = register(points_mm, tip_M_mm, criteria)
-    known = np.isfinite(points_mm).all(axis=1) & np.isfinite(tip_M_mm).all(axis=1)
-    known &= np.isfinite(rotation_rad).all(axis=1)
+    measured = np.concatenate([points_mm, rotation_rad, tip_M_mm], axis=1)
+    known: BoolArray = np.asarray(np.isfinite(measured).all(axis=1))
     if registration is None or not known.any():
         return None
     use = known.copy()
     free = [axis for axis, name in enumerate("xyz") if f"target.{name}" not in held]
-    directions = np.eye(3)[:, free] @ shown_directions(tip_M_mm, nominal_M_P[:, :, free], known, criteria)
+    axes: FloatArray = np.eye(3)[:, free]
+    directions = np.asarray(axes @ shown_directions(tip_M_mm, nominal_M_P[:, :, free], known, criteria))
     place = np.zeros(3)
     placed = PlacedTarget(registration, place, directions)
     for _ in range(ROUNDS if directions.shape[1] else 0):
@@ -98,7 +99,7 @@ def place_target(
         limit_mm = criteria.outlier_sigmas * float(robust_sigma(size_mm[use][:, None])[0])
         use = known & (size_mm <= max(limit_mm, MIN_SIGMA))
         frame = registration_columns(tip_M_mm, (0, 1, 2), tip_M_mm[known])
-        columns = np.concatenate([frame, -attitude @ directions], axis=2)
+        columns = np.concatenate([frame, np.asarray(-attitude @ directions)], axis=2)
         step, *_ = np.linalg.lstsq(columns[use].reshape(-1, columns.shape[2]), residual_mm[use].ravel(), rcond=None)
         placed = _moved(placed, frame, step, tip_M_mm[known])
         if np.abs(step).max() < _CONVERGED_MM:

@@ -65,7 +65,7 @@ class Campaign:
         self._reference = reference
         self._balls_M = balls_M
         self._places = places
-        self._direction = np.ones(self._mechanism.links)
+        self._direction = np.ones(self._mechanism.scales)
         self._postures = [posture_at_scales(self._mechanism, scale_mm) for scale_mm in plan.points_mm]
         self._visit = 0
 

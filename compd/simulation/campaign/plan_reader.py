@@ -16,7 +16,6 @@ from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.motion import SPEED_MM_PER_S
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.warm_up import PARTS
-from compd.simulation.truth.workspace import STROKE_SHARE
 
 # Limits of heaters and coolers in a laboratory, of a climate chamber and of a loading device; pressure: the lowest and
 # highest at sea level on record (WMO).
@@ -54,7 +53,7 @@ def read_plan(path: Path, mechanism: Mechanism, measured: Collection[str] | None
     names = holdable_quantities(mechanism.links)
     limits = {name: _LIMITS_BY_UNIT[name.rpartition("_")[2]] for name in names}
     problems: list[Problem] = []
-    file = read_plan_file(path, mechanism.links, {**limits, SPEED_COLUMN: (0.0, SPEED_MM_PER_S)}, problems)
+    file = read_plan_file(path, mechanism.scales, {**limits, SPEED_COLUMN: (0.0, SPEED_MM_PER_S)}, problems)
     problems[:0] = _unmeasured(file, names, names if measured is None else measured)  # header before cells
     rows = _planned_rows(file, mechanism, names, problems)
     if problems:
@@ -94,7 +93,7 @@ def _planned_rows(
             not time_s > previous_s,
             time_s,
             _scale_mm(file, line, tip_M_mm, mechanism, problems),
-            np.array([line.values.get(name, 0.0) for name in approach_columns(mechanism.links)]),
+            np.array([line.values.get(name, 0.0) for name in approach_columns(mechanism.scales)]),
             line.values.get(SPEED_COLUMN, 0.0),
             {name: line.values[name] for name in names if name in line.values},
         )
@@ -108,14 +107,14 @@ def _scale_mm(
     file: PlanFile, line: PlanLine, tip_M_mm: Sequence[float], mechanism: Mechanism, problems: list[Problem]
 ) -> FloatArray:
     """(n,) scale values for a tip in {M}, with the attitude of machine zero, all parts as drawn; nan where unknown."""
-    unknown = np.full(mechanism.links, math.nan)
+    unknown = np.full(mechanism.scales, math.nan)
     if not all(map(math.isfinite, tip_M_mm)):
         return unknown
     try:
         posture = mechanism.posture_at(np.array(tip_M_mm), np.zeros(3))
     except KinematicsError:
         posture = None
-    scale_mm = unknown if posture is None else mechanism.lengths(posture) - mechanism.lengths0_mm
+    scale_mm = unknown if posture is None else mechanism.scales_at(posture)
     if _within_stroke(scale_mm, mechanism):
         return scale_mm
     problems.append(
@@ -159,8 +158,8 @@ def _approach_problems(file: PlanFile, line: PlanLine, row: PlannedRow, mechanis
 
 
 def _within_stroke(scale_mm: FloatArray, mechanism: Mechanism) -> bool:
-    return bool(np.all(np.abs(scale_mm) <= STROKE_SHARE * mechanism.lengths0_mm))
+    return bool(np.all(np.abs(scale_mm) <= mechanism.stroke_mm))
 
 
 def _stroke_text(mechanism: Mechanism) -> str:
-    return f"links within {STROKE_SHARE * float(mechanism.lengths0_mm.min()):.0f} mm of machine zero"
+    return f"links within {float(mechanism.stroke_mm.min()):.0f} mm of machine zero"

@@ -49,7 +49,7 @@ class PlannedCampaign:
         rng = np.random.default_rng([seed, 4, number])
         self._log = RowLog(self._world, wiring, rng, reference)
         self._rows = rows
-        self._direction: FloatArray = np.ones(geometry.links)
+        self._direction: FloatArray = np.ones(geometry.scales)
         self._visit = 0
 
     def run(self) -> LoggedRows:

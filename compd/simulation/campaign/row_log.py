@@ -73,7 +73,6 @@ class RowLog:
         """Add a row. direction : (n,) of each link's last motion. measured : whether the reference measures, too."""
         world = self._world
         readings = {name: world.sense(name) for name in world.names}
-        links = world.mechanism.links
         joints = [name for name in readings if name.startswith("joint_")]
         frames = [name for name in readings if name.startswith("frame_")]
         others = [name for name in readings if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
@@ -83,10 +82,10 @@ class RowLog:
                 "session": session,
                 "point": np.nan if point is None else point,
                 "visit": visit,
-                **{column: readings[f"scale_{i}"] for i, column in enumerate(scale_columns(links), 1)},
+                **{column: readings[f"scale_{i}"] for i, column in enumerate(scale_columns(world.mechanism.scales), 1)},
                 **{f"{name}_um": readings[name] / UM for name in (*joints, *frames)},
                 **{name: round(readings[name], 3) for name in others},
-                **dict(zip(approach_columns(links), direction, strict=True)),
+                **dict(zip(approach_columns(world.mechanism.scales), direction, strict=True)),
                 **(self._reference_values(point) if measured else dict.fromkeys(self._reference_columns(), np.nan)),
             }
         )

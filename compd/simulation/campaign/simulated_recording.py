@@ -133,5 +133,5 @@ def _days(
     balls_M = ball_plate_mm(mechanism.tip0_M)
     turn_rad = np.zeros(3)
     postures = [mechanism.posture_at(ball_M, turn_rad) for ball_M in balls_M]
-    points_mm = np.array([mechanism.lengths(posture) - mechanism.lengths0_mm for posture in postures])
+    points_mm = np.array([mechanism.scales_at(posture) for posture in postures])
     return balls_M, None, draw_campaign_plan(mechanism, seed, number, points_mm=points_mm, passes=0, air_at_zero=air)

@@ -62,6 +62,7 @@ class FrameComparatorGain(Cause):
     id = "frame_comparator_gain"
     unit = "1"
     max_strength = 0.05
+    acts_on_frame = True
     signed = True
 
     def frame_reading_mm(self, frame_mm: FloatArray, warm: WarmUp) -> FloatArray:
@@ -78,6 +79,7 @@ class FrameRodExpansion(Cause):
     id = "frame_rod_expansion"
     unit = "ppm/K"
     max_strength = 12.0
+    acts_on_frame = True
 
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
         super().__init__(strength, mechanism, rng)

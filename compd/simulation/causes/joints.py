@@ -7,7 +7,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.simulation.truth.cause import PPM, UM, URAD, Cause, CauseInputs, unit_rms_scatter
 from compd.simulation.truth.closure import homogeneous
-from compd.simulation.truth.joints import Runout, angles, link_directions, triads
+from compd.simulation.truth.joints import Runout, angles, hinge_axes_M, link_directions, triads
 from compd.simulation.truth.mechanism import Mechanism
 
 # Share of its link's temperature that a platform joint takes, by conduction.
@@ -66,7 +66,7 @@ class JointRunout(Cause):
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
         super().__init__(strength, mechanism, rng)
         directions_M = link_directions(mechanism.joints0_M, homogeneous(mechanism.joints_P) @ mechanism.posture0)
-        axes_M = mechanism.axes_P @ mechanism.posture0[1:] if len(mechanism.axes_P) else None
+        axes_M = hinge_axes_M(mechanism)
         self._triads = triads(directions_M, axes_M)
         self._runout = Runout(mechanism.links, strength * np.array([0.0, 1.0, 1.0]), rng)
 

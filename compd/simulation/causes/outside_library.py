@@ -37,6 +37,7 @@ class PlateSwelling(Cause):
     id = "plate_swelling"
     unit = "um/pct"
     max_strength = 0.5
+    acts_on_frame = True
     in_library = False
     covariates = ("humidity_pct",)
 

@@ -32,6 +32,7 @@ class PlateBending(Cause):
     unit = "ppm/K"
     min_strength = 4.0
     max_strength = 12.0
+    acts_on_frame = True
 
     def reference_shift(self, inputs: CauseInputs) -> FloatArray:
         thickness = self.mechanism.geometry.plate_thickness_mm or FOOT_BELOW_PLATE_MM

@@ -32,9 +32,9 @@ class ScaleGain(Cause):
 
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
         super().__init__(strength, mechanism, rng)
-        self.part_strengths = strength * unit_rms_scatter(rng, mechanism.links)
+        self.part_strengths = strength * unit_rms_scatter(rng, mechanism.scales)
 
-    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+    def scale_extension_mm(self, inputs: CauseInputs) -> FloatArray:
         return np.asarray(PPM * self.part_strengths * inputs.scale_mm)
 
 
@@ -51,10 +51,11 @@ class ScaleExpansion(Cause):
     unit = "ppm/K"
     max_strength = 23.0
 
-    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
-        pieces_K = inputs.warm.link_pieces_K + (inputs.warm.zero_degC - REFERENCE_degC)
+    def scale_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+        links = self.mechanism.link_of_scale
+        pieces_K = inputs.warm.link_pieces_K[links] + (inputs.warm.zero_degC - REFERENCE_degC)
         middle = LINK_PIECES // 2
-        head = middle + np.clip(inputs.scale_mm / inputs.link_mm * LINK_PIECES, -middle, middle)
+        head = middle + np.clip(inputs.scale_mm / inputs.link_mm[links] * LINK_PIECES, -middle, middle)
         places = np.arange(LINK_PIECES)
         head_K = np.array([np.interp(place, places, K) for place, K in zip(head, pieces_K, strict=True)])
         mean_K = (pieces_K[:, middle] + head_K) / 2
@@ -78,12 +79,12 @@ class ScaleCyclic(Cause):
         self._period_mm = mechanism.geometry.scale_signal_period_mm or DEFAULT_PERIOD_MM
         # An offset of 1 of the amplitude causes an error of p / (2 pi).
         offset = strength * UM * 2 * np.pi / self._period_mm
-        angle = rng.uniform(0, 2 * np.pi, mechanism.links)
+        angle = rng.uniform(0, 2 * np.pi, mechanism.scales)
         self._offsets = offset * np.array([np.cos(angle), np.sin(angle)])
-        self._unequal = 0.5 * offset * rng.uniform(-1, 1, mechanism.links)
-        self._skew_rad = 0.5 * offset * rng.uniform(-1, 1, mechanism.links)
+        self._unequal = 0.5 * offset * rng.uniform(-1, 1, mechanism.scales)
+        self._skew_rad = 0.5 * offset * rng.uniform(-1, 1, mechanism.scales)
 
-    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+    def scale_extension_mm(self, inputs: CauseInputs) -> FloatArray:
         phase = 2 * np.pi * inputs.scale_mm / self._period_mm
         cosine = np.cos(phase - self._skew_rad / 2) + self._offsets[0]
         sine = (1 + self._unequal) * np.sin(phase + self._skew_rad / 2) + self._offsets[1]
@@ -105,7 +106,7 @@ class GaugeLatency(Cause):
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
         super().__init__(strength, mechanism, rng)
         self._time_s = 0.0
-        self._scale: deque[tuple[float, FloatArray]] = deque([(0.0, np.zeros(mechanism.links))])
+        self._scale: deque[tuple[float, FloatArray]] = deque([(0.0, np.zeros(mechanism.scales))])
         self._joint: deque[tuple[float, FloatArray]] = deque()
 
     def pass_time(self, interval: Interval, warm: WarmUp) -> None:
@@ -146,15 +147,15 @@ class Backlash(Cause):
 
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
         super().__init__(strength, mechanism, rng)
-        self._play_mm = strength * UM * uniform_scatter(rng, mechanism.links)
+        self._play_mm = strength * UM * uniform_scatter(rng, mechanism.scales)
         self.part_strengths = self._play_mm / UM
-        self._extension_mm: FloatArray = np.zeros(mechanism.links)
+        self._extension_mm: FloatArray = np.zeros(mechanism.scales)
 
     def pass_time(self, interval: Interval, warm: WarmUp) -> None:
         half_mm = self._play_mm / 2
         self._extension_mm = np.clip(self._extension_mm - (interval.end_mm - interval.start_mm), -half_mm, half_mm)
 
-    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+    def scale_extension_mm(self, inputs: CauseInputs) -> FloatArray:
         return self._extension_mm
 
 
@@ -177,13 +178,13 @@ class FrictionHysteresis(Cause):
         self.distance_mm = float(np.exp(rng.uniform(np.log(3.0), np.log(30.0))))
         share = (2 * np.arange(SLIDERS) + 1) / SLIDERS
         self._yield_mm = self.distance_mm * share[:, None]
-        self._bent_mm: FloatArray = np.zeros((SLIDERS, mechanism.links))
+        self._bent_mm: FloatArray = np.zeros((SLIDERS, mechanism.scales))
 
     def pass_time(self, interval: Interval, warm: WarmUp) -> None:
         moved_mm = interval.end_mm - interval.start_mm
         self._bent_mm = np.clip(self._bent_mm + moved_mm, -self._yield_mm, self._yield_mm)
 
-    def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
+    def scale_extension_mm(self, inputs: CauseInputs) -> FloatArray:
         # stiff springs slide early, so that each carries the same force when it slides
         return np.asarray(-self.strength * UM * (self._bent_mm / self._yield_mm).mean(axis=0))
 

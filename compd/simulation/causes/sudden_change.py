@@ -49,6 +49,9 @@ class SuddenChange(Cause):
     def link_extension_mm(self, inputs: CauseInputs) -> FloatArray | float:
         return self._acting.link_extension_mm(inputs)
 
+    def scale_extension_mm(self, inputs: CauseInputs) -> FloatArray | float:
+        return self._acting.scale_extension_mm(inputs)
+
     def base_shift_M(self, inputs: CauseInputs) -> FloatArray | float:
         return self._acting.base_shift_M(inputs)
 

@@ -77,6 +77,7 @@ class Cause:
     in_library : the effect library has an effect of the same id. If not, `covariates` names the recorded quantities
         by which the cause can be described.
     only_in_motion : no effect while the machine is at rest.
+    acts_on_frame : it acts on the plate, or on what measures the frame, which a machine may not have.
 
     Attributes
     ----------
@@ -84,6 +85,7 @@ class Cause:
     part_strengths : strength of every single part (link, coordinate), any shape, in `unit`.
     """
 
+    acts_on_frame: ClassVar[bool] = False
     id: ClassVar[str]
     unit: ClassVar[str]
     max_strength: ClassVar[float]
@@ -103,7 +105,7 @@ class Cause:
     @classmethod
     def applies_to(cls, mechanism: Mechanism) -> bool:
         """Whether this machine has the part that the cause acts on."""
-        return True
+        return mechanism.has_frame or not cls.acts_on_frame
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -125,6 +127,10 @@ class Cause:
 
     def platform_shift_P(self, inputs: CauseInputs) -> FloatArray | float:
         """(n, 3) displacement of the platform joint centres in {P}."""
+        return 0.0
+
+    def scale_extension_mm(self, inputs: CauseInputs) -> FloatArray | float:
+        """(m,) by how much each actuator is farther than its scale shows."""
         return 0.0
 
     def tilted_axes_P(self, axes_P: FloatArray) -> FloatArray:

@@ -39,12 +39,43 @@ def direction_rows(axes_P: FloatArray) -> FloatArray:
     return np.concatenate([np.zeros((*axes_P.shape[:-1], 1)), axes_P], axis=-1)
 
 
-class Closure:
-    """Closure of a 3-SPR tripod (three revolute axes) or a 6-UPS hexapod (none)."""
+class TargetRows:
+    """The coordinates that a target fixes: x, y, z of the tip, and turns about x, y, z of {M}.
 
-    def __init__(self, axes_P: FloatArray) -> None:
-        """`axes_P`: (3, 3) unit vectors of the revolute joints, or (0, 3)."""
-        self._axes = direction_rows(axes_P)
+    With the axes w_j of the attitude wanted, sum_j w_j x (axis j) / 2 is the sine of the angle between the two
+    attitudes, along the axis about which they differ.
+    """
+
+    def __init__(self, fixed: NDArray[np.bool_], tip_P: FloatArray, tip_M: FloatArray, axes: FloatArray) -> None:
+        """fixed : (6,).  tip_P, tip_M : (3,) the place of the platform, and where it is to be.  axes : (3, 3), rows."""
+        self.tip_M = tip_M
+        self._fixed, self._row, self._axes = fixed, homogeneous(tip_P), axes
+        self._by_tip = np.einsum("k,cd->ckd", self._row, np.eye(3)).reshape(3, 12)
+        by_turn = np.zeros((3, 4, 3))
+        for j in range(3):
+            x, y, z = PLATFORM_RADIUS_MM / 2 * axes[j]
+            by_turn[:, 1 + j] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]  # w x
+        self._by_turn = by_turn.reshape(3, 12)
+
+    def equations(self, posture: Posture) -> tuple[FloatArray, FloatArray]:
+        """(m,) what is left, mm, and (m, 12) its gradient."""
+        turned = PLATFORM_RADIUS_MM / 2 * np.cross(self._axes, posture[1:]).sum(axis=0)
+        left = np.concatenate([self._row @ posture - self.tip_M, turned])
+        return left[self._fixed], np.concatenate([self._by_tip, self._by_turn])[self._fixed]
+
+
+class Closure:
+    """Closure of n links and 6 - n revolute joints, each of which keeps its link square to an axis."""
+
+    def __init__(self, axes: FloatArray, link_of_axis: NDArray[np.intp], on_base: NDArray[np.bool_]) -> None:
+        """`axes`: (r, 3) unit vectors of the revolute joints, in {P}, or in {M} where `on_base` (r,).
+
+        link_of_axis : (r,), from 0.
+        """
+        # an axis of the base moves with nothing: its row is 0, and it is added in {M}
+        self._axes = direction_rows(np.where(on_base[:, None], 0.0, axes))
+        self._fixed_M: FloatArray = np.where(on_base[:, None], axes, 0.0)
+        self._link = link_of_axis
 
     def by_lengths(self, base_M: FloatArray, joints_P: FloatArray, lengths_mm: FloatArray, guess: Posture) -> Posture:
         """The posture in which the links have these lengths.
@@ -74,6 +105,44 @@ class Closure:
 
         return _newton(equations, guess, "tip", tip_M)
 
+    def by_target(
+        self,
+        moved: Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray, FloatArray]],
+        joints_P: FloatArray,
+        target: TargetRows,
+        guess: Posture,
+        guess_mm: FloatArray,
+    ) -> tuple[Posture, FloatArray]:
+        """The posture and the actuators (m,) that bring the platform to what a target fixes, m equations.
+
+        moved : from actuators (m,) to the base joints (n, 3), their derivatives (n, 3, m), the links' lengths (n,) and
+            theirs (n, m).
+        """
+        rows = homogeneous(joints_P)
+        posture, actuator_mm = guess, guess_mm
+        for _ in range(MAX_ITERATIONS):
+            base_M, base_by, lengths_mm, lengths_by = moved(actuator_mm)
+            along, across = self._joints(posture, base_M, rows)
+            directions_M = (rows @ posture - base_M) / along[0][:, None]
+            wanted, by_posture = target.equations(posture)
+            departure, rigid = _rigidity(posture)
+            residual = np.concatenate([along[0] - lengths_mm, across[0], wanted, departure])
+            if np.abs(residual).max() < CLOSED_MM and np.linalg.det(posture[1:]) > 0:
+                return posture, actuator_mm
+            along_by = -np.einsum("nd,ndm->nm", directions_M, base_by) - lengths_by
+            axes_M = self._axes @ posture + self._fixed_M
+            across_by = -np.einsum("rd,rdm->rm", axes_M, base_by[self._link])
+            by_actuator = np.concatenate([along_by, across_by, np.zeros((len(wanted) + 6, len(actuator_mm)))])
+            gradient = np.concatenate([along[1], across[1], by_posture, rigid])
+            try:
+                step = np.linalg.solve(np.concatenate([gradient, by_actuator], axis=1), residual)
+            except np.linalg.LinAlgError:
+                break
+            if not np.abs(step).max() < LOST_MM:
+                break
+            posture, actuator_mm = posture - step[:12].reshape(4, 3), actuator_mm - step[12:]
+        raise _out_of_reach("target", target.tip_M)
+
     def forces(
         self, posture: Posture, base_M: FloatArray, joints_P: FloatArray, loads: Sequence[tuple[FloatArray, FloatArray]]
     ) -> tuple[FloatArray, FloatArray]:
@@ -92,7 +161,7 @@ class Closure:
         n = len(base_M)
         lateral = multipliers[n : n + len(self._axes)]
         lateral_M = np.zeros((n, 3))
-        lateral_M[: len(lateral)] = lateral[:, None] * (self._axes @ posture)
+        np.add.at(lateral_M, self._link, lateral[:, None] * (self._axes @ posture + self._fixed_M))
         return multipliers[:n], lateral_M
 
     def _joints(
@@ -102,9 +171,9 @@ class Closure:
         links_M = rows @ posture - base_M
         lengths = np.sqrt((links_M * links_M).sum(axis=1))
         along = (rows[:, :, None] * (links_M / lengths[:, None])[:, None, :]).reshape(-1, 12)
-        axes_M = self._axes @ posture
-        hinged_M = links_M[: len(axes_M)]
-        across = rows[: len(axes_M), :, None] * axes_M[:, None, :] + self._axes[:, :, None] * hinged_M[:, None, :]
+        axes_M = self._axes @ posture + self._fixed_M
+        hinged_M = links_M[self._link]
+        across = rows[self._link][:, :, None] * axes_M[:, None, :] + self._axes[:, :, None] * hinged_M[:, None, :]
         return (lengths, along), ((hinged_M * axes_M).sum(axis=1), across.reshape(-1, 12))
 
 
@@ -140,7 +209,11 @@ def _newton(
         except np.linalg.LinAlgError:
             break
         posture = posture - step.reshape(4, 3)
-    raise KinematicsError(
+    raise _out_of_reach(what, wanted)
+
+
+def _out_of_reach(what: str, wanted: FloatArray) -> KinematicsError:
+    return KinematicsError(
         Problem(
             where="simulated machine",
             what=f"the links cannot meet at these {what}",

@@ -63,13 +63,13 @@ class Equilibrium:
         axes_P = mechanism.axes_P
         for cause in causes:
             axes_P = cause.tilted_axes_P(axes_P)
-        self._closure = Closure(axes_P)
+        self._closure = Closure(axes_P, mechanism.link_of_axis, mechanism.hinge_on_base)
         self._axial0_N, self._lateral0_M = self._forces(
             mechanism.posture0, mechanism.joints0_M, mechanism.joints_P, np.zeros(3)
         )
 
     def solve(self, scale_mm: FloatArray, guess: Posture, force_M_N: FloatArray) -> EquilibriumState:
-        """State at scale values (n,) under the load (3,) on the tip; `guess`: a posture near by.
+        """State at scale values (m,) under the load (3,) on the tip; `guess`: a posture near by.
 
         Two passes: first closure and forces with thermal displacements alone, then all displacements that follow from
         them. Forces and joint angles change by parts per million in between, so that no third pass is needed.
@@ -82,10 +82,10 @@ class Equilibrium:
         joints_P = machine.joints_P * (1 + platform)
         # rods between the balls and the scale (paper, figure 5) are part of the link
         rods_mm = strengths.scale_rod_expansion_ppm_per_K * PPM * warm.links_K * machine.lengths0_mm
-        lengths_mm = machine.lengths0_mm + scale_mm + rods_mm
+        lengths_mm = machine.lengths_at(scale_mm) + rods_mm
 
         supports_M = self._frame.supports_M(warm, np.zeros((3, 3)))
-        base_M = machine.base_joints_M(supports_M, stretch)
+        base_M = machine.base_joints_M(supports_M, stretch, scale_mm)
         posture = self._closure.by_lengths(base_M, joints_P, lengths_mm, guess)
         platform_M = homogeneous(joints_P) @ posture
         total_N, total_lateral_M = self._forces(posture, base_M, joints_P, force_M_N)
@@ -111,14 +111,16 @@ class Equilibrium:
             self._weather.humidity_pct(warm.time_s),
             self._weather.at_zero,
         )
+        beyond_mm = _sum((cause.scale_extension_mm(inputs) for cause in causes), machine.scales)
         link_mm = (
             lengths_mm
             + balls.base_along_mm
             - balls.platform_along_mm
             + _sum((cause.link_extension_mm(inputs) for cause in causes), machine.links)
+            + machine.extensions(beyond_mm)
         )
         posture = self._closure.by_lengths(
-            machine.base_joints_M(supports_M, stretch)
+            machine.base_joints_M(supports_M, stretch, scale_mm + beyond_mm)
             + balls.base_across_M
             + _sum((cause.base_shift_M(inputs) for cause in causes), machine.links, 3),
             joints_P

@@ -10,7 +10,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.errors import KinematicsError
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.workspace import HEIGHT_SHARE, RADIUS_SHARE, STROKE_SHARE, TURN_RAD
+from compd.simulation.truth.workspace import HEIGHT_SHARE, RADIUS_SHARE, TURN_RAD
 
 # Nominal length of the ballbar, mm: the shortest that is sold, which a machine of half a metre can carry around.
 BALLBAR_MM = 100.0
@@ -70,7 +70,7 @@ def touched_ball_places(mechanism: Mechanism, rng: np.random.Generator) -> Fixed
 def pin_places(mechanism: Mechanism, rng: np.random.Generator) -> FixedPlaces:
     """Three pins at different heights, each of which a hexapod reaches with twelve attitudes."""
     ends_M = _ring(mechanism, PINS)
-    count = ATTITUDES_PER_PIN if len(mechanism.axes_P) == 0 else 1
+    count = ATTITUDES_PER_PIN if mechanism.turned.any() else 1
     return _places(mechanism, rng, ends_M, lambda end: ends_M[end].copy(), count, True)
 
 
@@ -101,7 +101,7 @@ def _places(
 ) -> FixedPlaces:
     """`count` points at each end; a place beyond the workspace or the stroke of a link is drawn again."""
     length_mm = float(mechanism.lengths0_mm.mean())
-    turn_rad = TURN_RAD if len(mechanism.axes_P) == 0 else 0.0
+    turn_rad = TURN_RAD if mechanism.turned.any() else 0.0
     end_of_point, tips_M, scales_mm = [], [], []
     for end in range(len(ends_M)):
         found = 0
@@ -111,11 +111,11 @@ def _places(
             if np.hypot(*away_mm[:2]) > RADIUS_SHARE * length_mm or abs(away_mm[2]) > HEIGHT_SHARE * length_mm:
                 continue
             try:
-                posture = mechanism.posture_at(tip_M, rng.uniform(-turn_rad, turn_rad, 3))
+                posture = mechanism.posture_at(tip_M, rng.uniform(-turn_rad, turn_rad, 3) * mechanism.turned)
             except KinematicsError:
                 continue
-            scale_mm = mechanism.lengths(posture) - mechanism.lengths0_mm
-            if np.any(np.abs(scale_mm) >= STROKE_SHARE * mechanism.lengths0_mm):
+            scale_mm = mechanism.scales_at(posture)
+            if np.any(np.abs(scale_mm) >= mechanism.stroke_mm):
                 continue
             end_of_point.append(end)
             tips_M.append(tip_M)

@@ -46,7 +46,10 @@ class Frame:
         self._distances0_mm = distances_mm(supports, mechanism.plate0_M)
 
     def supports_M(self, warm: WarmUp, pull_M: FloatArray) -> FloatArray:
-        """(3, 3) mm. pull_M : (3, 3) N, force on each support less that at machine zero."""
+        """(3, 3) mm. pull_M : (3, 3) N, force on each support less that at machine zero. A frame of which nothing is
+        described stands still."""
+        if not self._mechanism.has_frame:
+            return self._mechanism.supports0_M
         return self._mechanism.supports0_M + self._growth(warm) + self._lean(warm) + self._give(pull_M)
 
     def plate_M(self, warm: WarmUp) -> FloatArray:

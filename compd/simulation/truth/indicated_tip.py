@@ -38,11 +38,14 @@ class IndicatedTip:
         Raises KinematicsError if the links cannot meet.
         """
         mechanism = self._mechanism
-        scale_mm = np.array([readings[f"scale_{i + 1}"] for i in range(mechanism.links)])
+        scale_mm = np.array([readings[f"scale_{i + 1}"] for i in range(mechanism.scales)])
         joint_mm = np.array([readings[f"joint_{k + 1}"] for k in range(self._weights.shape[1])])
-        frame_mm = np.array([readings[f"frame_{name}"] for name in DISTANCES])
-        base_M = mechanism.base_joints_M(self._supports_M(self._distances0_mm + frame_mm))
-        lengths_mm = mechanism.lengths0_mm + scale_mm - self._weights @ joint_mm
+        supports_M = mechanism.supports0_M
+        if mechanism.has_frame:
+            frame_mm = np.array([readings[f"frame_{name}"] for name in DISTANCES])
+            supports_M = self._supports_M(self._distances0_mm + frame_mm)
+        base_M = mechanism.base_joints_M(supports_M, 0.0, scale_mm)
+        lengths_mm = mechanism.lengths_at(scale_mm) - self._weights @ joint_mm
         posture = mechanism.closure.by_lengths(base_M, mechanism.joints_P, lengths_mm, guess)
         if mechanism.tip_frame == "M":
             return np.asarray(homogeneous(mechanism.tip0_P) @ posture)

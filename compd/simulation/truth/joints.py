@@ -60,7 +60,7 @@ class Joints:
         self._strengths = strengths
         self._n = mechanism.links
         directions_M = link_directions(mechanism.joints0_M, homogeneous(mechanism.joints_P) @ mechanism.posture0)
-        axes_M = mechanism.axes_P @ mechanism.posture0[1:] if len(mechanism.axes_P) else None
+        axes_M = hinge_axes_M(mechanism)
         self._base_triads = triads(directions_M, axes_M)
         self._platform_triads = self._base_triads @ mechanism.posture0[1:].T
         across = strengths.ball_runout_across_share
@@ -87,6 +87,14 @@ class Joints:
             _across(self._platform_triads, platform) - across * lateral_M @ posture[1:].T,
             self._shank.displacement_mm(platform_angles_rad)[:, 0],
         )
+
+
+def hinge_axes_M(mechanism: Mechanism) -> FloatArray | None:
+    """(n, 3) the axis of each link's revolute joint at machine zero; None where not every link has one."""
+    if len(mechanism.axes_P) != mechanism.links:
+        return None
+    axes_M = np.where(mechanism.hinge_on_base[:, None], mechanism.axes_P, mechanism.axes_P @ mechanism.posture0[1:])
+    return np.asarray(axes_M[np.argsort(mechanism.link_of_axis)])
 
 
 def link_directions(base_M: FloatArray, platform_M: FloatArray) -> FloatArray:

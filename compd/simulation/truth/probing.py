@@ -29,17 +29,17 @@ def probing_steps_mm(world: World, ball: FloatArray, posture: Posture) -> Iterat
     """
     mechanism = world.mechanism
     turn_rad = _turn_rad(mechanism, posture)
-    drawn_mm = mechanism.lengths(mechanism.posture_at(ball, turn_rad))
+    drawn_mm = mechanism.scales_at(mechanism.posture_at(ball, turn_rad))
     for _ in range(STEPS):
         error_mm = world.reference_tip_mm() - ball
-        yield world.scale_mm + mechanism.lengths(mechanism.posture_at(ball - error_mm, turn_rad)) - drawn_mm
+        yield world.scale_mm + mechanism.scales_at(mechanism.posture_at(ball - error_mm, turn_rad)) - drawn_mm
 
 
 def probe_ball(world: World, ball: FloatArray) -> Posture:
     """Move to `ball` with the attitude of machine zero and probe it; returns the posture there, as drawn."""
     mechanism = world.mechanism
     posture = mechanism.posture_at(ball, np.zeros(3))
-    scale_mm = mechanism.lengths(posture) - mechanism.lengths0_mm
+    scale_mm = mechanism.scales_at(posture)
     world.advance_to(scale_mm, posture, 4 * PROBING_STEP_S, 2 * PROBING_STEP_S)
     for scale_mm in probing_steps_mm(world, ball, posture):
         world.advance_to(scale_mm, posture, PROBING_STEP_S, PROBING_STEP_S / 2)

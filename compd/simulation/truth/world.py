@@ -26,7 +26,7 @@ from compd.simulation.truth.sensors import Sensors
 from compd.simulation.truth.strengths import Strengths
 from compd.simulation.truth.warm_up import Heat, WarmUp
 from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero, Weather
-from compd.simulation.truth.workspace import STROKE_SHARE, draw_points_mm
+from compd.simulation.truth.workspace import draw_points_mm
 
 # Fastest change (K/s) at a real part's thermometer: 94 W in each kilogram of steel. A part held 20 K away by a water
 # jacket begins ten times as fast.
@@ -77,9 +77,9 @@ class World:
         self._joints = Joints(self._mechanism, self._strengths, joint_rng)
         self._sensors = Sensors(geometry, wiring, self._strengths, sensor_rng)
         self._points_mm = draw_points_mm(self._mechanism, self._tour_rng)
-        self._stroke_mm = STROKE_SHARE * self._mechanism.lengths0_mm
+        self._stroke_mm = self._mechanism.stroke_mm
         self._motion: TourMotion | SetpointMotion | PlanMotion | FollowMotion = SetpointMotion(
-            standing(np.zeros(self._mechanism.links))
+            standing(np.zeros(self._mechanism.scales))
         )
         self._rows = rows
         self._unsolved_s = 0.0, 0.0  # time (s) since the last `advance`, and the part of it with moving links
@@ -342,10 +342,10 @@ class World:
         for cause in self._causes:
             scale_mm, joint_mm = cause.scale_reading_mm(scale_mm), cause.joint_reading_mm(joint_mm)
             frame_mm = cause.frame_reading_mm(frame_mm, warm)
-        return {
-            **self._sensors.read(scale_mm, joint_mm, frame_mm, warm.thermometers_degC()),
-            **self._air_and_load(),
-        }
+        readings = self._sensors.read(scale_mm, joint_mm, frame_mm, warm.thermometers_degC())
+        if not self._mechanism.has_frame:
+            readings = {name: value for name, value in readings.items() if not name.startswith("frame_")}
+        return {**readings, **self._air_and_load()}
 
     def _air_and_load(self) -> dict[str, float]:
         return {
@@ -356,13 +356,13 @@ class World:
 
     def _checked(self, scale_mm: Sequence[float]) -> FloatArray:
         values = np.array(scale_mm, dtype=float)
-        if values.shape != (self._mechanism.links,):
+        if values.shape != (self._mechanism.scales,):
             raise CompdError(
                 Problem(
                     where="scale_mm",
-                    what="one value per link is needed",
+                    what="one value per scale is needed",
                     value=str(list(scale_mm)),
-                    allowed=f"{self._mechanism.links} numbers, mm",
+                    allowed=f"{self._mechanism.scales} numbers, mm",
                 )
             )
         if not np.all(np.abs(values) <= self._stroke_mm):

@@ -30,6 +30,7 @@ NUMBERS = {
         "PLACE_NUMBERS": DEFINITION,
         "PLANE_SHARE": CONDITIONING,
     },
+    "comparison/alignment/target_place.py": {"ROUNDS": ITERATION, "_CONVERGED_MM": ITERATION},
     "comparison/alignment/registration.py": {
         "ROUNDS": ITERATION,
         "MIN_POINTS": DEFINITION,

@@ -83,7 +83,6 @@ MISTAKES: dict[str, tuple[Edit, list[str]]] = {
     "no format column": (rename_column("pressure_hPa", "remarks"), ["column remarks (Z): no column of the format"]),
     "scale 0": (rename_column("scale_1_mm", "scale_0_mm"), ["scale_0_mm (D): no column", "missing: scale_1_mm"]),
     "model with a machine": (rename_column("pressure_hPa", "model_x_mm"), ["the sidecar names a machine"]),
-    "missing time": (drop_columns("time_s"), ["missing: time_s"]),
     "missing scale": (drop_columns("scale_2_mm"), ["missing: scale_2_mm"]),
     "no scales": (drop_columns("scale_1_mm", "scale_2_mm", "scale_3_mm"), ["missing: scale_1_mm"]),
     "missing joint": (drop_columns("joint_4_um"), ["missing: joint_4_um"]),

@@ -193,8 +193,9 @@ def test_a_scale_that_is_too_long_and_one_that_grows() -> None:
 def test_a_scale_errs_within_its_period_and_repeats() -> None:
     cyclic = cause("scale_cyclic", 0.3)
     steps = np.arange(64) * 0.020 / 64
-    errors_um = np.array([cyclic.link_extension_mm(SimpleNamespace(scale_mm=np.full(3, g))) for g in steps]) / UM
-    again_um = np.array([cyclic.link_extension_mm(SimpleNamespace(scale_mm=np.full(3, g + 0.060))) for g in steps]) / UM
+    errors_um = np.array([cyclic.scale_extension_mm(SimpleNamespace(scale_mm=np.full(3, g))) for g in steps]) / UM
+    later = [SimpleNamespace(scale_mm=np.full(3, g + 0.060)) for g in steps]
+    again_um = np.array([cyclic.scale_extension_mm(inputs) for inputs in later]) / UM
     assert errors_um == pytest.approx(again_um, abs=1e-9)
     first, second = np.abs(np.fft.rfft(errors_um, axis=0)[1:3]) * 2 / len(steps)
     assert first == pytest.approx([0.3] * 3, rel=0.1)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import compd
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.covariate import covariates
-from compd.errors import CompdError, RecordingError
+from compd.errors import CompdError
 from compd.model.formula import formula_effect
 from compd.recording import read_recording
 
@@ -179,12 +179,6 @@ def test_rows_without_time_count_in_order_and_effects_that_need_it_say_so(tmp_pa
     }
     with pytest.raises(CompdError, match="record a column `time_s`"):
         compd.add_effect(None, lagged, aligned)
-
-
-def test_a_known_machine_needs_its_time(tmp_path: Path) -> None:
-    path = write(tmp_path / "run.csv", TIP.replace("external", "tripod-cmm"), without(stage(), "time_s"))
-    with pytest.raises(RecordingError, match="the column is missing: time_s"):
-        read_recording(path)
 
 
 def test_a_sensitivity_belongs_to_its_effect_and_to_nothing_else(tmp_path: Path) -> None:

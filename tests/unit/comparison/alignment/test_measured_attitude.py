@@ -40,7 +40,7 @@ def test_noise_of_the_attitude_beyond_what_is_declared_is_told(tmp_path: Path) -
 
 def test_an_instruments_frame_and_the_targets_turn_are_fitted_along(tmp_path: Path) -> None:
     comparison = compare(opened(tmp_path, moved=True))
-    assert comparison.aligned.registration_columns.shape == (150, 6, 9)
+    assert comparison.aligned.registration_columns.shape == (150, 6, 12)
     assert comparison.rms_um == pytest.approx(SIGMA_UM, rel=0.12)
     assert comparison.attitude_rms_urad == pytest.approx(SIGMA_URAD, rel=0.12)
     assert comparison.at_floor
