@@ -66,6 +66,7 @@ def external_yaml(folder: Path, geometry: dict[str, Any], **changed: Any) -> Pat
                 "unit": 1,
                 "noise_um": 0.05,
                 "acceleration_mm_per_s2": 1e15,
+                "trust_after_loss": True,
                 "channels": channels,
             }
         },

@@ -1,4 +1,4 @@
-"""`machine: external` live: a daemon, gauges over Modbus TCP and a client; the class is a file with its hash."""
+"""`machine: external` live: a whole daemon, gauges over Modbus TCP and a client; the class is a file with its hash."""
 
 from __future__ import annotations
 
@@ -189,3 +189,20 @@ def test_watch_shows_the_correction_of_the_tip(tmp_path: Path, spindle_file: Pat
     assert re.search(r"tip correction, um +\+0.00 +\+0.00 +\+20.00", text)
     assert re.search(r"spindle_growth, um +\+0.00 +\+0.00 +\+20.00", text)
     assert re.search(r"3 +-20.00", text)
+
+
+HANGING = GANTRY.replace("x, y, z = scale_mm", "x, y, z = scale_mm\n        while x > 50:\n            pass")
+
+
+def test_a_class_that_never_returns_stops_the_setpoints_until_the_loop_starts_anew(tmp_path: Path) -> None:
+    with served(tmp_path, class_geometry(tmp_path, HANGING)) as device, running(device), connected(device) as client:
+        take_zero(client)
+        setpoints = client.watch()
+        assert first(setpoints, is_ok)
+        device.values["x"] = 60.0
+        stopped = first(setpoints, lambda s: s["state"] == "stop")
+        device.values["x"] = 40.0
+        assert "the loop has made no setpoint" in stopped["reason"]
+        assert first(setpoints, lambda s: is_ok(s) and s["tip_M_mm"][0] == pytest.approx(40.0, abs=1e-4))
+        loop = client.status()["processes"]["loop"]
+        assert (loop["starts"], loop["last_end"]) == (2, "it hung, and was killed")
