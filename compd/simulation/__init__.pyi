@@ -15,6 +15,7 @@ from .truth.mechanism import Mechanism as Mechanism
 from .truth.probing import probe_ball as probe_ball
 from .truth.strengths import FULLY_MEASURED as FULLY_MEASURED
 from .truth.strengths import Strengths as Strengths
+from .truth.strengths import seen_by as seen_by
 from .truth.warm_up import Heat as Heat
 from .truth.weather import AirAtZero as AirAtZero
 from .truth.world import World as World

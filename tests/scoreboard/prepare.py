@@ -13,7 +13,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.configuration import Configuration, load, shipped_configuration
 from compd.recording import sidecar_contents, write_recording
-from compd.simulation import FULLY_MEASURED, TRACKER, AirAtZero, Cause, CauseSizer, Mechanism, build_cause
+from compd.simulation import FULLY_MEASURED, TRACKER, AirAtZero, Cause, CauseSizer, Mechanism, build_cause, seen_by
 from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import CampaignPlan, draw_campaign_plan
 from compd.simulation.campaign.simulated_recording import OUTLIER_SHARE
@@ -73,7 +73,7 @@ def prepare(case: Case, campaigns: Path) -> Path:
             configuration.wiring,
             plan,
             case.seed,
-            FULLY_MEASURED,
+            seen_by(FULLY_MEASURED, len(configuration.wiring.joint)),
             [*causes, *disturbances],
             reference=instrument,
         )

@@ -83,6 +83,7 @@ def simulate(
         Simulation,
         World,
         read_plan,
+        seen_by,
         write_answer,
     )
 
@@ -96,7 +97,7 @@ def simulate(
         seed,
         speedup,
         zero_hold,
-        strengths=FULLY_MEASURED if sized else None,
+        strengths=seen_by(FULLY_MEASURED, len(configuration.wiring.joint)) if sized else None,
         causes=[cause.cause for cause in sized],
         rows=rows,
         air_at_zero=AirAtZero(zero_degC),

@@ -28,7 +28,7 @@ from compd.simulation.truth.fixed_places import (
 from compd.simulation.truth.instruments import INSTRUMENTS, TRACKER_SIGMA_UM, Kind, ball_plate_mm
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.planned_row import PlannedRow
-from compd.simulation.truth.strengths import FULLY_MEASURED
+from compd.simulation.truth.strengths import FULLY_MEASURED, seen_by
 from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
 
 OUTLIER_SHARE = 0.01
@@ -89,16 +89,17 @@ def simulate_recording(
     weak = sizer.weak_disturbances([cause.id for cause in hidden])
     causes = [*(cause.cause for cause in sized), *weak]
     instrument = replace(INSTRUMENTS[reference], outlier_share=OUTLIER_SHARE)
+    strengths = seen_by(FULLY_MEASURED, len(wiring.joint))
     campaign: Campaign | PlannedCampaign
     balls_M = None
     if planned_rows:
         campaign = PlannedCampaign(
-            geometry, wiring, planned_rows, seed, other_days, FULLY_MEASURED, causes, instrument, air_at_zero
+            geometry, wiring, planned_rows, seed, other_days, strengths, causes, instrument, air_at_zero
         )
     else:
         balls_M, places, days = _days(sizer.mechanism, reference, seed, other_days, air_at_zero)
         campaign = Campaign(
-            geometry, wiring, days, seed, FULLY_MEASURED, causes, reference=instrument, balls_M=balls_M, places=places
+            geometry, wiring, days, seed, strengths, causes, reference=instrument, balls_M=balls_M, places=places
         )
     reference_block: dict[str, Any] = {"quantity": QUANTITY[reference], "sigma_um": instrument.sigma_um}
     if reference in ("tracker", "pose"):

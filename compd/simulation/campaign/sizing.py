@@ -13,7 +13,7 @@ from compd.simulation.causes.hidden_cause import HiddenCause, SizedCause
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.instruments import TRACKER_SIGMA_UM
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE
+from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE, seen_by
 from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero
 
 # Number of visits and passes of which one is run to measure the size of the error.
@@ -49,7 +49,8 @@ class CauseSizer:
         """
         # a thinned plan has too few rows on the move
         days = self.plan if cause.only_in_motion else self._short
-        campaign = Campaign(self._geometry, self._wiring, days, self._seed, FULLY_MEASURED_WITHOUT_NOISE, [cause])
+        strengths = seen_by(FULLY_MEASURED_WITHOUT_NOISE, len(self._wiring.joint))
+        campaign = Campaign(self._geometry, self._wiring, days, self._seed, strengths, [cause])
         return campaign.run().error_um() / self._floor_um
 
     def size(self, hidden: HiddenCause) -> SizedCause:
