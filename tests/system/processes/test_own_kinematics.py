@@ -90,6 +90,7 @@ def test_a_class_gives_the_pose_and_a_model_corrects_it(tmp_path: Path, spindle_
         # z falls as its scale rises: the scale brings the tip back
         assert grown["correction_mm"] == pytest.approx([0, 0, -0.02], abs=1e-5)
         assert client.status()["loop"]["own_kinematics_largest_us"] > 0
+        assert client.machine()["geometry"] == {"kinematics": "Gantry", "links": 3}
         assert client.budget()["tip_um"]["spindle_growth"] == pytest.approx([0, 0, -20], abs=0.01)
 
 

@@ -55,7 +55,9 @@ class MachineKeys(SentMessage):
     wire_name = "MACHINE"
     machine: str = Field(description="the machine's name in the configuration")
     config_hash: str = Field(description="hash of the whole configuration, hexadecimal; another one: ask again")
-    geometry: dict[str, Any] = Field(description="the section `geometry` of the configuration, with the same keys")
+    geometry: dict[str, Any] = Field(
+        description="the section `geometry` of the configuration, with the same keys; of own kinematics the class alone"
+    )
     limits: MachineLimitKeys = Field(description="what a correction may be")
     loop: MachineLoopKeys = Field(description="how the loop runs")
     wiring: list[WiredChannelKeys] = Field(description="what each channel measures: scales, joints, frame, quantities")
