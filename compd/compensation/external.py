@@ -26,9 +26,7 @@ def compensate_external(
     quantities = {name: np.asarray(value, dtype=np.float64).reshape(1) for name, value in values.quantities.items()}
     time_s = np.array([values.time_s], dtype=np.float64)
     scale_mm = np.asarray(values.scale_mm)
-    rows, poses, motion = external_rows(
-        model, scale_mm[None], quantities, time_s, values.quantities_at_zero or None, memory
-    )
+    rows, poses, motion = external_rows(model, scale_mm[None], quantities, time_s, None, memory)
     pose = poses[0]
     deltas, memories = deltas_by_effect(model.live_effects, rows, memory.memories)
     by_cause_mm = np.zeros((2 + len(deltas), 3))

@@ -184,12 +184,13 @@ def _largest_part(bound: TipBound, snapshot: Snapshot, usable: UsableComparators
     assert by_length is not None, "a bound that is known has them"
     assert bound.u.by_noise_um is not None, "and the noise"
     parts_um = UM_PER_MM * np.sqrt((by_length**2).sum(axis=0)) * bound.lengths_mm
-    k = int(np.argmax(parts_um))
     noise_um = float(bound.u.by_noise_um[-1])
-    if bound.absent_um >= max(noise_um, float(parts_um[k])):
+    largest_um = float(parts_um.max(initial=0.0))  # of a machine without lengths there is none
+    if bound.absent_um >= max(noise_um, largest_um):
         return f"what is not corrected, {bound.absent_um:.4g} um"
-    if noise_um >= parts_um[k]:
+    if noise_um >= largest_um:
         return f"the scatter of the gauges and the errors of fitted numbers, {noise_um:.4g} um; see `noise_um`"
+    k = int(np.argmax(parts_um))
     wire = settings.wires.length_wires[k]
     links, age_s = len(settings.wires.scale.wires), snapshot.time_s - snapshot.readings[wire.slot].time_s
     if usable.held_s is not None and k >= links and usable.held_s[k - links] > 0.0:

@@ -156,9 +156,10 @@ class LiveModel:
             summary["warnings"] = [
                 " ".join(filter(None, (w.what, w.value))) + f": {w.next_step}" for w in self.warnings
             ]
-        if from_20_degC := [
+        from_20_degC = [
             fitted.effect.id for fitted in self.machine.live_effects if fitted.effect.counts_from == "20 degC"
-        ]:
+        ]
+        if from_20_degC and not isinstance(self.machine, ExternalModel):  # its effects count as they are written
             summary["from_20_degC"] = from_20_degC
         return summary
 

@@ -70,17 +70,12 @@ class ExternalModel(MachineModel):
 
     @cached_property
     def program(self) -> EffectProgram:
-        """No effect is computed by the kernel: names of the quantities that are needed, at machine zero too."""
+        """No effect is computed by the kernel: names of the quantities that are needed now. At machine zero none is:
+        effects count as they are written."""
         nothing = build_program((), None, self.links, 0, 0)
         needed = {f.effect.id: needed_quantities(f.effect, self.links) for f in self.live_effects}
-        at_zero = [
-            (name, None)
-            for fitted in self.live_effects
-            if fitted.effect.counts_from == "machine zero"
-            for name in needed[fitted.effect.id]
-        ]
         names = tuple(dict.fromkeys(name for each in needed.values() for name in each))
-        return nothing._replace(quantities=names, references=tuple(dict.fromkeys(at_zero)))
+        return nothing._replace(quantities=names, references=())
 
     @property
     def settings(self) -> tuple[str, ...]:

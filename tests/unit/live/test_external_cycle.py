@@ -12,6 +12,7 @@ import yaml
 
 import compd
 from compd.errors import StateError
+from compd.gauge import Quality
 from compd.live.loop import Target
 from compd.live.loop.limits import limit_pose_correction
 from compd.live.loop.packet_layout import BODY, PACKET_BODY
@@ -229,3 +230,80 @@ def test_a_packet_has_the_correction_of_a_pose_where_no_links_are_corrected(tmp_
     assert found["tip_mm"] == [1, 2, 3]
     assert found["correction_mm"] == pytest.approx([0, 0, -0.03, 0, 0, 0], abs=1e-12)
     assert np.isnan(found["scale_setpoint_mm"]).all()
+
+
+GROWTH = {
+    "id": "growth",
+    "physics": "the spindle grows",
+    "port": "reference",
+    "axis": "z",
+    "formula": "-k * (temperature_spindle_degC - 15)",
+    "parameters": {"k": {"unit": "um/K", "plausible": [-100, 100], "source": "a guess"}},
+}
+SPINDLE = "plc.spindle"
+
+
+def test_an_effect_without_a_number_is_named(tmp_path):
+    endless = {**GROWTH, "formula": "k / (temperature_spindle_degC - 20)"}
+    live = with_effect(gantry(tmp_path, limits=LIMITS), tmp_path, endless, growth=1.0)
+    refused = live.step()
+    assert refused.state is State.REFUSED
+    assert "effect growth" in refused.reason
+
+
+@pytest.mark.parametrize(
+    ("geometry", "target"),
+    [("class", None), ("client", Target((1.0, 2.0, 3.0))), ("client", Target((1.0, 2.0, 3.0), (0.0, 0.1, 0.0)))],
+)
+@pytest.mark.parametrize("on_stale", ["hold", "fade", "degrade", "stop"])
+def test_a_thermometer_that_is_lost_is_treated_as_on_any_machine(tmp_path, geometry, target, on_stale):
+    loop = {"rate_hz": 200, "stale_after_s": 0.5, "on_stale": on_stale, "hold_s": 0.5, "lock_memory": False}
+    described = class_geometry(tmp_path) if geometry == "class" else {"kinematics": "client"}
+    live = Machine(load_whole(external_yaml(tmp_path, described, limits=LIMITS, loop=loop)))
+    with_effect(live, tmp_path, GROWTH, growth=4.0)
+    live.commands.target = target
+    full = live.settle().values.pose_correction[2]
+    assert full == pytest.approx(0.02, abs=1e-12)
+    live.faults[SPINDLE] = Quality.LINE_LOST
+    states, corrections = [], []
+    for _ in range(150):
+        setpoint = live.step()
+        states.append(setpoint.state)
+        if setpoint.values is not None:
+            corrections.append(setpoint.values.pose_correction[2])
+            setpoint.to_json()
+    assert (
+        states[0] is {"hold": State.HOLD, "fade": State.FADE, "degrade": State.FADE, "stop": State.STOP}[on_stale]
+    )
+    assert states[-1] is (State.DEGRADED if on_stale == "degrade" else State.STOP)
+    if on_stale == "hold":
+        assert corrections == pytest.approx([full] * len(corrections), abs=1e-12)
+    elif on_stale != "stop":
+        assert corrections[-1] < 0.1 * full
+        assert np.all(np.diff(corrections) <= 1e-12)
+
+
+def test_a_shadow_runs_beside_the_applied_model_and_a_failing_class_hits_both(tmp_path):
+    live = gantry(tmp_path, BAD_BEYOND_50, limits=LIMITS)
+    grown = live.loader.read(file_with(tmp_path / "a.yaml", GROWTH, name="external", links=3, growth=4.0))
+    other = live.loader.read(file_with(tmp_path / "b.yaml", GROWTH, name="external", links=3, growth=6.0))
+    live.commands.models = Models(grown, other)
+    shadow = live.settle().shadow
+    assert shadow.tip_M_mm == pytest.approx([0, 0, 299.97], abs=1e-9)
+    live.commands.models = Models(other)
+    assert live.settle().values.tip_M_mm == pytest.approx([0, 0, 299.97], abs=1e-9)
+    live.change_mm[X] = 60.0
+    assert live.step().state is State.REFUSED
+    live.change_mm[X] = 1.0
+    assert live.settle().values.tip_M_mm[0] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_bound_of_the_tips_error_limits_a_pose_without_scales(tmp_path):
+    limits = {**LIMITS, "tip_error_um": 5.0, "tip_correction_mm": 0.01}
+    live = Machine(load_whole(external_yaml(tmp_path, {"kinematics": "client"}, limits=limits)))
+    live.commands.target = Target((1.0, 2.0, 3.0))
+    assert live.step().u_tip_um == pytest.approx(0.0, abs=1e-9), "nothing is measured, and nothing is corrected"
+    with_effect(live, tmp_path, GROWTH, growth=4.0)
+    refused = live.step()
+    assert refused.state is State.REFUSED
+    assert "what is not corrected" in refused.reason
