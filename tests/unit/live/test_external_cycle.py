@@ -272,9 +272,7 @@ def test_a_thermometer_that_is_lost_is_treated_as_on_any_machine(tmp_path, geome
         if setpoint.values is not None:
             corrections.append(setpoint.values.pose_correction[2])
             setpoint.to_json()
-    assert (
-        states[0] is {"hold": State.HOLD, "fade": State.FADE, "degrade": State.FADE, "stop": State.STOP}[on_stale]
-    )
+    assert states[0] is {"hold": State.HOLD, "fade": State.FADE, "degrade": State.FADE, "stop": State.STOP}[on_stale]
     assert states[-1] is (State.DEGRADED if on_stale == "degrade" else State.STOP)
     if on_stale == "hold":
         assert corrections == pytest.approx([full] * len(corrections), abs=1e-12)
