@@ -18,7 +18,6 @@ from compd.model.kinematics import (
     Actuators,
     Arrangement,
     Contact,
-    Frame,
     FrameGeometry,
     Mechanism,
     base_pose,
@@ -173,22 +172,26 @@ class MachineModel:
             self.zero.link_length_mm + np.where(self.extended, scale_mm[..., self.actuators.of_link], 0.0)
         )
 
-    def links_on(self, frame: Frame, scale_mm: FloatArray) -> tuple[Mechanism, FloatArray]:
-        """The links on a frame (...) with the scales (..., m) at these readings, and their lengths (..., n) in mm.
+    def links_on(
+        self, rotation_M_B: FloatArray, base_joints_M_mm: FloatArray, scale_mm: FloatArray
+    ) -> tuple[Mechanism, FloatArray]:
+        """The links on a base with the scales (..., m) at these readings, and their lengths (..., n) in mm.
+
+        rotation_M_B : (..., 3, 3), the base's axes.  base_joints_M_mm : (..., n, 3), with the actuators at 0.
 
         The lengths are those of equation (1) before what the joints take from them.
         """
         length_mm = self.lengths_mm(scale_mm)
         if not self.base_turns_parts:
-            return self.mechanism(frame.base_joints_M_mm), length_mm
-        turned = compose(frame.rotation_M_B, self.frame.zero_rotation_M_B.T)[..., None, :, :]
+            return self.mechanism(base_joints_M_mm), length_mm
+        turned = compose(rotation_M_B, self.frame.zero_rotation_M_B.T)[..., None, :, :]
         actuators, nowhere = self.actuators, np.zeros(3)
         joints_M_mm, _ = links_at(
             actuators._replace(
                 cosine_M=to_outer(turned, nowhere, actuators.cosine_M),
                 sine_M=to_outer(turned, nowhere, actuators.sine_M),
             ),
-            frame.base_joints_M_mm,
+            base_joints_M_mm,
             self.zero.actuator_mm + scale_mm,
         )
         axes = self.revolute_axes_P

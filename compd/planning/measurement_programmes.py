@@ -11,6 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording
 from compd.errors import Problem, RecordingError
+from compd.link_count import scale_count
 from compd.model import MachineModel, observe
 from compd.model.effects import Effect, MachineConstants, Observations, needed_quantities
 from compd.model.kernels import Reason
@@ -122,7 +123,7 @@ def _programmes(aligned: AlignedRecording, limits: ProgrammeLimits, names: Seque
 
     names : the quantities that the rivals need; others stay as they are.
     """
-    n = aligned.rows.links
+    n = scale_count(aligned.rows.links)
     edges = [
         np.linspace(low, high, PLACES_PER_EDGE)
         for low, high in zip(limits.tip_low_M_mm, limits.tip_high_M_mm, strict=True)

@@ -13,6 +13,7 @@ from compd.columns import SKEW_COLUMN
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.kernel_versions import versions_text, versions_text_here
+from compd.link_count import scale_count
 from compd.live.loop import (
     CycleInputs,
     CycleSettings,
@@ -169,7 +170,7 @@ def replay_cycles(
     """
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
     # without scales the correction is that of a pose, and has no links
-    corrected = 0 if pipeline.settings.corrects_pose else configuration.geometry.scales
+    corrected = 0 if pipeline.settings.corrects_pose else scale_count(configuration.geometry.links)
     files = [*recording.model_files(), *model_files]
     read = [pipeline.loader.read(file, plausible=False) for file in files]
     models = {"": pipeline.loader.without_effects} | {model.hash: model for model in read}
