@@ -1,10 +1,10 @@
 from .external_model import ExternalModel as ExternalModel
 from .external_model import acts_on_machine as acts_on_machine
 from .external_model import carried_to_pose as carried_to_pose
-from .external_model import new_external_model as new_external_model
 from .external_model import external_rows as external_rows
 from .external_model import known_live as known_live
 from .external_model import moved_pose as moved_pose
+from .external_model import new_external_model as new_external_model
 from .external_model import scales_for as scales_for
 from .own_kinematics import Kinematics as Kinematics
 from .own_kinematics import OwnKinematicsError as OwnKinematicsError
