@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import pytest
-
 from compd.machine_kinds import KINDS
-from docs.pictures.machine_kinds import draw, picture_path
+from docs.pictures.machines import HERE, pictures
 from tests.support.paths import ROOT
 
 PAGE = ROOT / "docs" / "how-to" / "describe-a-machine.md"
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_picture_is_up_to_date_and_shown(kind: str) -> None:
-    path = picture_path(kind)
-    assert path.read_text(encoding="utf-8") == draw(kind), "run `python -m docs.pictures.machine_kinds`"
+def test_pictures_are_up_to_date() -> None:
+    for name, text in pictures().items():
+        assert (HERE / name).read_text(encoding="utf-8") == text, f"{name}: run `python -m docs.pictures.machines`"
+
+
+def test_the_page_shows_every_kind_and_what_its_target_fixes() -> None:
     page = PAGE.read_text(encoding="utf-8")
-    assert f"(../pictures/{path.name})" in page
-    kind_row = next(line for line in page.splitlines() if line.startswith(f"| [`{kind}`]"))
-    assert kind_row.endswith(f"| {' '.join(KINDS[kind].target_fixes)} |")
+    for kind, description in KINDS.items():
+        assert f"(../pictures/machines/{kind}.svg)" in page
+        row = next(line for line in page.splitlines() if line.startswith(f"| [`{kind}`]"))
+        assert row.endswith(f"| {' '.join(description.target_fixes)} |")
