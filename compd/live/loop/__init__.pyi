@@ -17,5 +17,7 @@ from .ring_entries import SentCycle as SentCycle
 from .setpoint import Setpoint as Setpoint
 from .setpoint import setpoint_line as setpoint_line
 from .skew import skew_of as skew_of
+from .own_time import TimedKinematics as TimedKinematics
+from .timing import Histogram as Histogram
 from .timing import LoopTiming as LoopTiming
 from .tip_uncertainty import stated_noise as stated_noise

@@ -18,6 +18,7 @@ from .effect_needs import can_concern as can_concern
 from .effect_needs import external_ports as external_ports
 from .effect_needs import is_measured as is_measured
 from .effect_needs import needed_quantities as needed_quantities
+from .effect_needs import OWN_POSE as OWN_POSE
 from .effect_needs import unmet_needs as unmet_needs
 from .effect_program import EffectProgram as EffectProgram
 from .effect_program import build_program as build_program

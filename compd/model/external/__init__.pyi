@@ -1,7 +1,7 @@
 from .external_model import ExternalModel as ExternalModel
 from .external_model import acts_on_machine as acts_on_machine
 from .external_model import carried_to_pose as carried_to_pose
-from .external_model import external_model as external_model
+from .external_model import new_external_model as new_external_model
 from .external_model import external_rows as external_rows
 from .external_model import known_live as known_live
 from .external_model import moved_pose as moved_pose
@@ -10,4 +10,8 @@ from .own_kinematics import Kinematics as Kinematics
 from .own_kinematics import OwnKinematicsError as OwnKinematicsError
 from .own_kinematics import OwnPose as OwnPose
 from .own_kinematics import given_pose as given_pose
+from .own_kinematics import own_columns as own_columns
+from .own_kinematics import own_pose as own_pose
+from .prediction import ExternalPrediction as ExternalPrediction
+from .prediction import predict_external as predict_external
 from .tip_derivative import external_tip_derivatives as external_tip_derivatives
