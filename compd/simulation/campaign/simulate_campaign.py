@@ -129,7 +129,7 @@ def simulate_campaign(
     planned = () if plan is None else read_plan(Path(plan), mechanism)
     causes = parse_hidden(effects)
     if hidden is not None:
-        causes.append(draw_hidden(hidden, mechanism))
+        causes.append(draw_hidden(hidden, mechanism, configuration.wiring))
     plate = path.with_name(f"{path.stem}.plate.csv")
     recorded = simulate_recording(
         configuration, seed, causes, reference, plate.name, other_days, planned, AirAtZero(zero_degC)

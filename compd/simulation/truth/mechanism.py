@@ -151,6 +151,16 @@ class Mechanism:
         moved_M: FloatArray = joints_M + self._displacements_B(self._zero_mm + scale_mm) @ axes
         return moved_M
 
+    def moves_M(self, scale_mm: FloatArray) -> FloatArray:
+        """(n, 3) by how much the actuators have moved the base joints since machine zero; scale_mm : (m,)."""
+        moved_B = self._displacements_B(self._zero_mm + scale_mm) - self._displacements_B(self._zero_mm)
+        return np.where(self.extended[:, None], 0.0, moved_B @ self.rotation_M_B0.T)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """(m,) what each actuator does: extends, slides or turns."""
+        return tuple(way.kind for way in self._ways)
+
     @property
     def turned(self) -> FloatArray:
         """(3,) 1 for each turn about x, y, z of {M} that a target fixes, else 0."""
@@ -189,6 +199,7 @@ class _Way:
     """Where one actuator takes the base joints of its links, in {B}; a turning one counts mm of arc."""
 
     def __init__(self, actuator: Any) -> None:
+        self.kind: str = actuator.kind
         self.extends = actuator.kind == "extends"
         self._radius_mm = getattr(actuator, "radius_mm", 0.0)
         self._cosine_B = np.array(getattr(actuator, "along_B", getattr(actuator, "cosine_B", np.zeros(3))))
