@@ -139,17 +139,25 @@ class Mechanism:
 
         stretch : relative growth of the offsets.  scale_mm : (m,), where the actuators are.
         """
-        z_M = np.cross(supports_M[1] - supports_M[0], supports_M[2] - supports_M[0])
-        y_M = supports_M[0] - supports_M.mean(axis=0)
-        z_M, y_M = z_M / np.linalg.norm(z_M), y_M / np.linalg.norm(y_M)
-        axes = np.array([np.cross(y_M, z_M), y_M, z_M])
-        if not self.has_frame:
-            axes = self.rotation_M_B0.T
+        axes = self._base_axes(supports_M)
         joints_M: FloatArray = supports_M[self.support_of_joint] + (1 + stretch) * self.joint_offsets_B @ axes
         if scale_mm is None or self.extended.all():
             return joints_M
         moved_M: FloatArray = joints_M + self._displacements_B(self._zero_mm + scale_mm) @ axes
         return moved_M
+
+    def base_turn(self, supports_M: FloatArray) -> FloatArray:
+        """(3, 3) matrix in {M} by which a base on these supports is turned since machine zero."""
+        return self._base_axes(supports_M).T @ self._base_axes(self.supports0_M)
+
+    def _base_axes(self, supports_M: FloatArray) -> FloatArray:
+        """(3, 3) the axes of {B} in {M}, as rows."""
+        if not self.has_frame:
+            return np.asarray(self.rotation_M_B0.T)
+        z_M = np.cross(supports_M[1] - supports_M[0], supports_M[2] - supports_M[0])
+        y_M = supports_M[0] - supports_M.mean(axis=0)
+        z_M, y_M = z_M / np.linalg.norm(z_M), y_M / np.linalg.norm(y_M)
+        return np.array([np.cross(y_M, z_M), y_M, z_M])
 
     def moves_M(self, scale_mm: FloatArray) -> FloatArray:
         """(n, 3) by how much the actuators have moved the base joints since machine zero; scale_mm : (m,)."""
