@@ -138,7 +138,7 @@ def machine_text(name: str, kind_name: str, dimensions: Dimensions, tolerance: s
         "    driver: modbus",
         "    line: cabinet",
         "    unit: 1",
-        "    noise_um: 1                # standard deviation of a reading at rest",
+        "    noise_um: 0.02             # standard deviation of a reading at rest",
         "    acceleration_mm_per_s2: 2000   # the largest of what they measure",
         f"    channels:                  # {what}, counted from anywhere: machine zero is where `compd zero` is done",
         *(
@@ -151,7 +151,7 @@ def machine_text(name: str, kind_name: str, dimensions: Dimensions, tolerance: s
         *(f"    - {{link: {i + 1}, gauge: scales.scale_{i + 1}}}" for i in range(scales)),
         "",
         "loop: {rate_hz: 50, stale_after_s: 0.5, on_stale: fade, hold_s: 5, priority: 40, lock_memory: true}",
-        "limits: {correction_mm: 0.5, slew_mm_per_s: 0.5, on_limit: clamp, tip_error_um: 3000}",
+        "limits: {correction_mm: 0.5, slew_mm_per_s: 0.5, on_limit: clamp}",
         "sockets:",
         "  tcp: {host: 127.0.0.1, port: 7751}",
         f"  unix: {{path: /run/compd/{name}.sock}}",
@@ -188,6 +188,7 @@ def _tool(dimensions: Dimensions, tip: float, tolerance: str) -> list[str]:
         "platform: {weight_N: 20, weight_at_P_mm: [0, 0, 0]}",
         f"tool: {{on: platform, at_P_mm: [0, 0, {_number(beyond)}], zero_tip_M_mm: [0, 0, {_number(tip)}]}}",
         f"tolerance_mm: {tolerance}         # how far the machine as built may be from these numbers",
+        "scale_signal_period_mm: 0.02",
     ]
 
 

@@ -15,6 +15,7 @@ from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.configuration import Configuration
 from compd.errors import Problem
 from compd.gauge import good
+from compd.link_count import scale_count
 from compd.live.loop import Commands, CyclePacker, Directions, Loop, LoopTiming, Setpoint, build_pipeline
 from compd.live.machine import MachineZero, Models, ModelText, try_model
 from compd.model import MachineModel
@@ -96,7 +97,7 @@ def python_effect_times(configuration: Configuration, clock: Clock | None = None
 def _compensation_time(machine: MachineModel, quantities: Sequence[str], clock: Clock) -> float:
     """Median time of a compensation at machine zero, s."""
     values = GaugeValues(
-        np.zeros(machine.links),
+        np.zeros(scale_count(machine.links)),
         np.zeros(machine.joint_weights.shape[1]),
         np.zeros(9),
         dict.fromkeys(quantities, np.array(_QUANTITY)),

@@ -38,7 +38,7 @@ def drift_costs(configuration: Configuration) -> list[DriftCost]:
     """Tip error for every length gauge, scales first, then joints and frame: from the kinematics, at machine zero."""
     model = build_model(configuration.geometry, configuration.wiring)
     gauge_of = {length: gauge for gauge, lengths in measured_lengths(configuration).items() for length in lengths}
-    lengths = [f"scale {link}" for link in range(1, model.links + 1)]
+    lengths = [f"scale {link}" for link in range(1, model.scales + 1)]
     lengths += [f"joint {k}" for k in range(1, len(configuration.wiring.joint) + 1)]
     lengths += [f"frame {distance}" for distance in FRAME_DISTANCES[: len(configuration.wiring.frame)]]
     drift_mm = DRIFT_UM / UM_PER_MM
@@ -55,8 +55,8 @@ def exchange_mm(configuration: Configuration) -> float:
     model = build_model(configuration.geometry, configuration.wiring)
     drift_mm = DRIFT_UM / UM_PER_MM
     errors_um = []
-    for one, other in combinations(range(model.links), 2):
-        change_mm = np.zeros(model.links + len(configuration.wiring.joint) + len(configuration.wiring.frame))
+    for one, other in combinations(range(model.scales), 2):
+        change_mm = np.zeros(model.scales + len(configuration.wiring.joint) + len(configuration.wiring.frame))
         change_mm[one], change_mm[other] = drift_mm, -drift_mm
         errors_um.append(_tip_errors_um(model, change_mm)[0])
     return max(errors_um) / DRIFT_UM
@@ -75,9 +75,9 @@ def _tip_errors_um(model: MachineModel, change_mm: FloatArray) -> tuple[float, f
         command, _ = compensate_machine_tool(model, target_mm, None, _values(model, change_mm), start)
     except KinematicsError:
         return cmm_um, math.nan
-    true_scale_mm = command.scale_setpoint_mm - change_mm[: model.links]
+    true_scale_mm = command.scale_setpoint_mm - change_mm[: model.scales]
     reached, _ = compensate_cmm(
-        model, _values(model, np.concatenate([true_scale_mm, 0 * change_mm[model.links :]])), start
+        model, _values(model, np.concatenate([true_scale_mm, 0 * change_mm[model.scales :]])), start
     )
     return cmm_um, _away_um(model, reached)
 
@@ -95,5 +95,5 @@ def _in_B0(model: MachineModel, tip_M_mm: FloatArray) -> FloatArray:
 
 
 def _values(model: MachineModel, change_mm: FloatArray) -> GaugeValues:
-    n, k = model.links, model.joint_weights.shape[1]
+    n, k = model.scales, model.joint_weights.shape[1]
     return GaugeValues(change_mm[:n], change_mm[n : n + k], change_mm[n + k :], {})

@@ -25,6 +25,7 @@ from compd.fleet.recording_result import (
     FleetEstimate,
     RecordingResult,
 )
+from compd.model.kinematics import ACTUATOR_KINDS
 from compd.model_changes import refit_model, unrefined
 from compd.model_file import ModelFile, read_model_file, read_stored
 from compd.recording import EXTERNAL
@@ -250,4 +251,10 @@ def _compared_by_blocks(long: LongRecording, model: ModelFile | None) -> Compari
 
 def _kinematics(aligned: AlignedRecording) -> str:
     """The machine's kinematics by its configuration; EXTERNAL for a model of one's own."""
-    return EXTERNAL if aligned.model is None else KINEMATICS[aligned.rows.links]
+    model = aligned.model
+    if model is None:
+        return EXTERNAL
+    if not model.by_actuators:
+        return KINEMATICS[aligned.rows.links]
+    kinds = sorted({ACTUATOR_KINDS[kind] for kind in model.actuators.kinds})
+    return f"{model.links} rods, {model.scales} actuators: {', '.join(kinds)}"

@@ -26,7 +26,7 @@ def expected_places_mm(
     """
     model = build_model(configuration.geometry, configuration.wiring)
     assert model.constants is not None
-    scale_mm = np.column_stack([columns[name] for name in scale_columns(model.links)])
+    scale_mm = np.column_stack([columns[name] for name in scale_columns(model.scales)])
     count, comparators = len(scale_mm), model.joint_weights.shape[1]
 
     def comparators_mm(names: tuple[str, ...]) -> FloatArray:

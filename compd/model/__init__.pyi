@@ -21,7 +21,7 @@ from .sensitivity import Sensitivity as Sensitivity
 from .sensitivity import carried_by_distances as carried_by_distances
 from .sensitivity import link_residuals as link_residuals
 from .sensitivity import sensitivities as sensitivities
-from .sensitivity import tip_by_links as tip_by_links
+from .sensitivity import tip_by_scales as tip_by_scales
 from .tip_derivative import tip_derivatives as tip_derivatives
 from .uncertainty import GAUGE_PORTS as GAUGE_PORTS
 from .uncertainty import GaugeNoise as GaugeNoise

@@ -18,19 +18,27 @@ from compd.model.kinematics import (
     Actuators,
     Arrangement,
     Contact,
-    Frame,
     FrameGeometry,
     Mechanism,
+    Pose,
     base_pose,
     distances_mm,
     forward_kinematics,
     inverse_by_actuators,
+    inverse_kinematics,
     link_forces,
     links_at,
     solve_frame,
 )
 from compd.model.structures import MODEL
 from compd.rotation import compose, to_inner, to_outer
+
+
+class Reach(NamedTuple):
+    """A pose, and the scales (..., m) that show it, mm since machine zero."""
+
+    pose: Pose
+    scale_mm: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +165,21 @@ class MachineModel:
         """The links with the base joints (..., n, 3) where they are now; axes that the base carries as at zero."""
         return Mechanism(base_joints_M_mm, self.platform_joints_P_mm, self.revolute_axes_P, self.hinges)
 
+    def reach(self, tip_M_mm: FloatArray) -> Reach:
+        """The machine as drawn with its tip at places (..., 3) in {M}, its frame and its attitude as at machine zero.
+
+        Coordinates that a target does not fix follow. A row fails as `inverse_kinematics` does.
+        """
+        zero, tip_P_mm = self.zero, self.zero.contact.tip_P_mm
+        if not self.by_actuators:
+            pose = inverse_kinematics(self.mechanism(zero.base_joints_M_mm), tip_M_mm, tip_P_mm, zero.rotation_M_P)
+            return Reach(pose, pose.link_length_mm - zero.link_length_mm)
+        mechanism = self.mechanism(self.base_joints_at_0_M_mm)
+        reached = inverse_by_actuators(
+            mechanism, self.actuators, tip_M_mm, tip_P_mm, zero.rotation_M_P, zero.actuator_mm
+        )
+        return Reach(reached.pose, reached.actuator_mm - zero.actuator_mm)
+
     @cached_property
     def extended(self) -> BoolArray:
         """(n,) True for a link that its actuator makes longer."""
@@ -173,22 +196,26 @@ class MachineModel:
             self.zero.link_length_mm + np.where(self.extended, scale_mm[..., self.actuators.of_link], 0.0)
         )
 
-    def links_on(self, frame: Frame, scale_mm: FloatArray) -> tuple[Mechanism, FloatArray]:
-        """The links on a frame (...) with the scales (..., m) at these readings, and their lengths (..., n) in mm.
+    def links_on(
+        self, rotation_M_B: FloatArray, base_joints_M_mm: FloatArray, scale_mm: FloatArray
+    ) -> tuple[Mechanism, FloatArray]:
+        """The links on a base with the scales (..., m) at these readings, and their lengths (..., n) in mm.
+
+        rotation_M_B : (..., 3, 3), the base's axes.  base_joints_M_mm : (..., n, 3), with the actuators at 0.
 
         The lengths are those of equation (1) before what the joints take from them.
         """
         length_mm = self.lengths_mm(scale_mm)
         if not self.base_turns_parts:
-            return self.mechanism(frame.base_joints_M_mm), length_mm
-        turned = compose(frame.rotation_M_B, self.frame.zero_rotation_M_B.T)[..., None, :, :]
+            return self.mechanism(base_joints_M_mm), length_mm
+        turned = compose(rotation_M_B, self.frame.zero_rotation_M_B.T)[..., None, :, :]
         actuators, nowhere = self.actuators, np.zeros(3)
         joints_M_mm, _ = links_at(
             actuators._replace(
                 cosine_M=to_outer(turned, nowhere, actuators.cosine_M),
                 sine_M=to_outer(turned, nowhere, actuators.sine_M),
             ),
-            frame.base_joints_M_mm,
+            base_joints_M_mm,
             self.zero.actuator_mm + scale_mm,
         )
         axes = self.revolute_axes_P

@@ -55,7 +55,7 @@ def observe(
     zero = model.zero
     frame = solve_frame(model.frame, zero.distances_mm + frame_mm)
     shortening_mm, _ = joint_shortening(model.joint_weights, joint_mm)
-    mechanism, length_mm = model.links_on(frame, scale_mm)
+    mechanism, length_mm = model.links_on(frame.rotation_M_B, frame.base_joints_M_mm, scale_mm)
     pose = forward_kinematics(mechanism, length_mm - shortening_mm, zero.platform_origin_M_mm, zero.rotation_M_P)
     inputs = EffectInputs(
         GaugeRows(scale_mm, joint_mm, frame_mm, np.asarray(time_s, dtype=np.float64)),

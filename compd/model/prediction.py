@@ -74,7 +74,7 @@ def perturb_machine(
         if "plate" not in deltas and since_zero_mm.ndim == 2 and (since_zero_mm == since_zero_mm[:1]).all():
             since_zero_mm = since_zero_mm[:1]  # a frame that does not move is solved once
         frame = solve_frame(geometry, model.zero.distances_mm + since_zero_mm)
-        mechanism, length_mm = model.links_on(frame, reading_mm)
+        mechanism, length_mm = model.links_on(frame.rotation_M_B, frame.base_joints_M_mm, reading_mm)
         frame_reason = frame.reason
     shortening_mm, reason = joint_shortening(model.joint_weights, _add(joint_mm, "joint", deltas))
     to_length_mm: FloatArray | float = deltas.get("link", 0.0)

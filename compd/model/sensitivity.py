@@ -85,15 +85,27 @@ def sensitivities(model: MachineModel, rows: Observations, ports: Collection[Por
     return by_port
 
 
-def tip_by_links(model: MachineModel, base_joints_M_mm: FloatArray, pose: Pose, tip_M_mm: FloatArray) -> FloatArray:
-    """Derivatives (N, 3, n), mm per mm, of the tip by the lengths of the links: how far a longer link moves it.
+def tip_by_scales(
+    model: MachineModel, mechanism: Mechanism, pose: Pose, tip_M_mm: FloatArray, scale_mm: FloatArray
+) -> FloatArray:
+    """Derivatives (N, 3, m), mm per mm, of the tip by the scales: how far one that shows more moves it.
 
-    base_joints_M_mm : (N, n, 3).  pose : of N rows.  tip_M_mm : (N, 3), where the tool touches.
+    mechanism : base joints (N, n, 3) where the scales (N, m) have moved them.  pose : of N rows.  tip_M_mm : (N, 3),
+    where the tool touches.
     With the tool on the plate the derivatives are those of the touched place in {P}. Rows without a pose are nan.
     """
-    inverse = _pose_by_closure(model.mechanism(base_joints_M_mm), pose.origin_M_mm, pose.rotation_M_P)
+    inverse = _pose_by_closure(mechanism, pose.origin_M_mm, pose.rotation_M_P)
     tip_by_pose = _tip_by_pose(model, tip_M_mm - pose.origin_M_mm, pose.rotation_M_P)
-    return np.asarray(tip_by_pose @ inverse[:, :, : model.links])
+    demand = np.zeros((len(scale_mm), 6, model.scales))
+    demand[:, : model.links] = _extension(model)
+    if model.actuators.kinds.any():
+        closure = closure_at(mechanism, pose.origin_M_mm, pose.rotation_M_P)
+        along = np.concatenate([closure.length_by_displacement, closure.offset_by_displacement], axis=1)
+        of_row = np.concatenate([np.arange(model.links), model.hinges[:, 0]])
+        by_scale = _joints_by_scale(model, scale_mm).reshape(len(scale_mm), model.links, 3, model.scales)
+        # a base joint that moves on shortens its link as much as the platform going back does
+        demand += np.einsum("nrd,nrdm->nrm", along, by_scale[:, of_row])
+    return np.asarray(tip_by_pose @ inverse @ demand)
 
 
 def link_residuals(link: Sensitivity, tip_residual_mm: FloatArray) -> FloatArray:
@@ -123,7 +135,7 @@ def _carried_by_plate(model: MachineModel, distances_mm: FloatArray, scale_mm: F
 
 
 def _carried(model: MachineModel, stepped: Frame, scale_mm: FloatArray) -> dict[Port, FloatArray]:
-    mechanism, _ = model.links_on(stepped, scale_mm)
+    mechanism, _ = model.links_on(stepped.rotation_M_B, stepped.base_joints_M_mm, scale_mm)
     carried: dict[Port, FloatArray] = {"base_joint": _central_difference(mechanism.base_joints_M_mm, len(scale_mm))}
     if model.hinges[:, 1].any():
         carried["revolute_axis"] = _central_difference(mechanism.revolute_axes, len(scale_mm))

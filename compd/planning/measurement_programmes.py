@@ -11,10 +11,11 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording
 from compd.errors import Problem, RecordingError
+from compd.link_count import scale_count
 from compd.model import MachineModel, observe
 from compd.model.effects import Effect, MachineConstants, Observations, needed_quantities
 from compd.model.kernels import Reason
-from compd.model.kinematics import Movement, inverse_kinematics
+from compd.model.kinematics import Movement
 from compd.plan_file import plan_row
 from compd.planning.programme_rows import ProgrammeRows, programme_starts, reversals_mm, step_times_s
 from compd.reference_conditions import REFERENCE_TEMPERATURE_degC
@@ -122,7 +123,7 @@ def _programmes(aligned: AlignedRecording, limits: ProgrammeLimits, names: Seque
 
     names : the quantities that the rivals need; others stay as they are.
     """
-    n = aligned.rows.links
+    n = scale_count(aligned.rows.links)
     edges = [
         np.linspace(low, high, PLACES_PER_EDGE)
         for low, high in zip(limits.tip_low_M_mm, limits.tip_high_M_mm, strict=True)
@@ -216,8 +217,8 @@ def _observe_programmes(
     Raises RecordingError where a place cannot be reached.
     """
     tip = np.concatenate([programme.tip_M_mm for programme in chosen])
-    count, zero = len(tip), model.zero
-    pose = inverse_kinematics(model.mechanism(zero.base_joints_M_mm), tip, zero.contact.tip_P_mm, zero.rotation_M_P)
+    count = len(tip)
+    pose, scale_mm = model.reach(tip)
     if (pose.reason != Reason.OK).any():
         unreachable = tip[pose.reason != Reason.OK][0]
         raise RecordingError(
@@ -228,7 +229,6 @@ def _observe_programmes(
                 next_step="narrow the workspace with --workspace",
             )
         )
-    scale_mm = pose.link_length_mm - zero.link_length_mm
     starts = programme_starts(np.array([len(programme) for programme in chosen]))
     direction = np.concatenate([programme.direction for programme in chosen])
     travel_mm = np.diff(scale_mm, axis=0, prepend=scale_mm[:1])

@@ -14,6 +14,7 @@ from compd.arrays import FloatArray, IntArray
 from compd.columns import approach_columns, scale_columns
 from compd.comparison import AlignedRecording
 from compd.errors import CompdError, Problem
+from compd.link_count import scale_count
 from compd.model.effects import Effect, Observations, evaluate_basis, needed_quantities
 from compd.plan_file import TIP_COLUMNS, settings_row
 from compd.planning.measurement_settings import MAX_COMBINATIONS, Setting, SettingLimits, settings_of
@@ -58,7 +59,7 @@ def setting_programmes(aligned: AlignedRecording, effects: Sequence[Effect], lim
     settings = settings_of({name: recorded[name][usable] for name in names}, limits)
     programmes = [_grid(settings)] if settings else []
     if any(effect.remembers for effect in effects):
-        programmes += _reversals(settings, aligned.rows.links)
+        programmes += _reversals(settings, scale_count(aligned.rows.links))
     if any(effect.remembers and "time" in effect.needs for effect in effects):
         programmes += _watched_steps(settings)
     if any("time" in effect.needs for effect in effects):
@@ -110,12 +111,12 @@ def _depends_on(effect: Effect, rows: Observations, field: str, k: int) -> bool:
 
 def _motion_names(rows: Observations) -> dict[str, Sequence[str]]:
     """The arrays of observations that say where the machine is and how it moves: field -> name of each column."""
-    links = range(1, rows.links + 1)
+    scales = scale_count(rows.links)
     return {
         "tip_M_mm": TIP_COLUMNS,
-        "scale_mm": scale_columns(rows.links),
-        "direction": approach_columns(rows.links),
-        "velocity_mm_per_s": [f"velocity_{i}_mm_per_s" for i in links],
+        "scale_mm": scale_columns(scales),
+        "direction": approach_columns(scales),
+        "velocity_mm_per_s": [f"velocity_{i}_mm_per_s" for i in range(1, scales + 1)],
     }
 
 

@@ -12,7 +12,6 @@ from compd.arrays import FloatArray
 from compd.instruments import Way
 from compd.model import MachineModel
 from compd.model.kernels import Reason
-from compd.model.kinematics import inverse_kinematics
 from compd.plan_file import SPEED_COLUMN, TIP_COLUMNS
 
 # Travel of the slowest link before the place: an error of reversal has built up after a hand's width at most, and
@@ -72,18 +71,16 @@ class TipWays:
 
     def _as_wanted(self, stations_M_mm: FloatArray, direction: FloatArray) -> bool:
         """Whether the links move in the direction that is wanted from each of the places (k, 3) to the next."""
-        lengths_mm = self._lengths_mm(stations_M_mm)
-        return lengths_mm is not None and bool(((np.diff(lengths_mm, axis=0) * direction > 0) | (direction == 0)).all())
+        scales_mm = self._scales_mm(stations_M_mm)
+        return scales_mm is not None and bool(((np.diff(scales_mm, axis=0) * direction > 0) | (direction == 0)).all())
 
     def _slopes(self, tip_M_mm: FloatArray) -> FloatArray | None:
-        """(n, 3) change of each link's length per mm of the tip along x, y, z."""
+        """(m, 3) change of each scale per mm of the tip along x, y, z."""
         steps = _STEP_MM * np.eye(3)
-        lengths_mm = self._lengths_mm(np.concatenate([tip_M_mm + steps, tip_M_mm - steps]))
-        return None if lengths_mm is None else np.asarray((lengths_mm[:3] - lengths_mm[3:]).T / (2 * _STEP_MM))
+        scales_mm = self._scales_mm(np.concatenate([tip_M_mm + steps, tip_M_mm - steps]))
+        return None if scales_mm is None else np.asarray((scales_mm[:3] - scales_mm[3:]).T / (2 * _STEP_MM))
 
-    def _lengths_mm(self, tip_M_mm: FloatArray) -> FloatArray | None:
-        """(k, n) lengths of the links at places (k, 3); None where one of them cannot be reached."""
-        model = self._model
-        mechanism = model.mechanism(model.zero.base_joints_M_mm)
-        pose = inverse_kinematics(mechanism, tip_M_mm, model.zero.contact.tip_P_mm, model.zero.rotation_M_P)
-        return None if (pose.reason != Reason.OK).any() else pose.link_length_mm
+    def _scales_mm(self, tip_M_mm: FloatArray) -> FloatArray | None:
+        """(k, m) scales at places (k, 3); None where one of them cannot be reached."""
+        pose, scale_mm = self._model.reach(tip_M_mm)
+        return None if (pose.reason != Reason.OK).any() else scale_mm

@@ -21,7 +21,7 @@ from compd.model.effects import (
     needed_quantities,
     unmet_needs,
 )
-from compd.model.kinematics import Movement, inverse_kinematics, update_motion
+from compd.model.kinematics import Movement, update_motion
 from compd.reference_conditions import REFERENCE_PRESSURE_hPa
 from compd.units import UM_PER_MM
 
@@ -139,11 +139,7 @@ class _EffectOnMachine:
     def rows(self, drive: Drive) -> Observations:
         """The rows that a drive makes; gauges show what perfect ones would, but for `joint_mm` and `frame_mm`."""
         model, count = self._model, len(drive.tip_mm)
-        zero = model.zero
-        tip_M_mm = zero.contact.tip_M_mm + drive.tip_mm
-        mechanism = model.mechanism(zero.base_joints_M_mm)
-        pose = inverse_kinematics(mechanism, tip_M_mm, zero.contact.tip_P_mm, zero.rotation_M_P)
-        scale_mm = pose.link_length_mm - zero.link_length_mm
+        scale_mm = model.reach(model.zero.contact.tip_M_mm + drive.tip_mm).scale_mm
         gauges = model.joint_weights.shape[1]
         ones = np.ones((count, 1))
         return observe(

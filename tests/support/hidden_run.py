@@ -184,9 +184,12 @@ def _is_of_this_rest(setpoint: dict[str, Any], since_s: float) -> bool:
 
 
 @contextmanager
-def hidden_run(directory: Path, *options: str) -> Iterator[HiddenRun]:
-    """`compd simulate` with `options`, and `compd run` on its wires; machine zero is taken."""
-    config = write_configuration(directory)
+def hidden_run(directory: Path, *options: str, configuration: Path | None = None) -> Iterator[HiddenRun]:
+    """`compd simulate` with `options`, and `compd run` on its wires; machine zero is taken.
+
+    configuration : of another machine than the tripod of `write_configuration`.
+    """
+    config = configuration or write_configuration(directory)
     machine = directory / "machine"
     simulate = ["simulate", str(config), "--directory", str(machine), "--zero-hold", "600", *options]
     commands = [

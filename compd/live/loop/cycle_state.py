@@ -12,6 +12,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.compensation import WarmStart
 from compd.errors import StateError
+from compd.link_count import scale_count
 from compd.live.loop.commands import Target
 from compd.live.loop.stale_policy import ComparatorSet
 from compd.live.loop.tip_uncertainty import scatter_limits_mm
@@ -73,7 +74,7 @@ class CycleState(NamedTuple):
     @classmethod
     def at_start(cls, model: MachineModel) -> Self:
         """The state before the first cycle: at machine zero, with no correction applied."""
-        return cls(None, WarmStart.at_zero(model), np.zeros(model.links))
+        return cls(None, WarmStart.at_zero(model), np.zeros(scale_count(model.links)))
 
 
 class CycleInputs(NamedTuple):
@@ -144,5 +145,5 @@ class CycleSettings:
 
     @cached_property
     def unread_scales_mm(self) -> FloatArray:
-        """(n,) nan: scales in machine-tool mode, which does not use them."""
-        return np.full(self.model.links, math.nan)
+        """(m,) nan: scales in machine-tool mode, which does not use them."""
+        return np.full(scale_count(self.model.links), math.nan)

@@ -17,6 +17,7 @@ from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensat
 from compd.documents import MAX_BYTES
 from compd.errors import Problem, StateError
 from compd.files import read_small_file
+from compd.link_count import scale_count
 from compd.live.machine.machine_zero import MachineZero
 from compd.live.machine.wiring import Beyond, MachineWires, WiredValues, Wires
 from compd.live.memory import Snapshot
@@ -332,7 +333,7 @@ def try_model(machine: MachineModel, names: tuple[str, ...], where: str) -> None
     names : of the quantities. where : the model file, for the message.
     """
     values = GaugeValues(
-        np.zeros(machine.links),
+        np.zeros(scale_count(machine.links)),
         np.zeros(machine.joint_weights.shape[1]),
         np.zeros(9),
         dict.fromkeys(names, np.array(np.nan)),

@@ -13,6 +13,7 @@ from compd.columns import SKEW_COLUMN
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.kernel_versions import versions_text, versions_text_here
+from compd.link_count import scale_count
 from compd.live.loop import (
     CycleInputs,
     CycleSettings,
@@ -174,7 +175,7 @@ def replay_cycles(
     former = _former_settings(pipeline, configuration)
     here = versions_text_here()
     for where, message in recording.cycles():
-        recorded = _recorded_cycle(where, message, pipeline.latest.channels, configuration.geometry.links)
+        recorded = _recorded_cycle(where, message, pipeline.latest.channels, scale_count(configuration.geometry.links))
         applied = _model(where, message.get("model", ""), models)
         shadow = _model(where, message["shadow"], models) if "shadow" in message else None
         used = Models(applied, shadow)

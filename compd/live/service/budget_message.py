@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.model import MachineModel, tip_by_links
+from compd.model import MachineModel, tip_by_scales
 from compd.model.kernels import Reason
-from compd.model.kinematics import Pose, forward_kinematics
+from compd.model.kinematics import Mechanism, Pose, forward_kinematics
 from compd.rotation import compose, rotation_matrix, rotation_vector, to_inner, to_outer
 from compd.units import UM_PER_MM
 
@@ -47,22 +47,23 @@ class BudgetMessage:
         return message | self._values(setpoint) if setpoint["valid"] else message
 
     def _values(self, setpoint: Mapping[str, Any]) -> dict[str, Any]:
-        supports, base_joints, pose = self._pose(setpoint)
+        scale_mm = _scale_mm(setpoint)
+        supports, mechanism, pose = self._pose(setpoint, scale_mm)
         if pose.reason[0] != Reason.OK:
             return {}
         tip_M_mm = np.array([setpoint["tip_M_mm"]])
-        by_link = tip_by_links(self._machine, base_joints, pose, tip_M_mm)[0]
+        by_scale = tip_by_scales(self._machine, mechanism, pose, tip_M_mm, scale_mm)[0]
         contributions_um = {
-            cause: _um(-by_link @ np.array(links_mm)) for cause, links_mm in setpoint["sources_mm"].items()
+            cause: _um(-by_scale @ np.array(scales_mm)) for cause, scales_mm in setpoint["sources_mm"].items()
         }
         asked_mm = setpoint.get("shadow", {}).get("correction_mm")
-        shadow = {} if asked_mm is None else {"shadow_tip_um": _um(-by_link @ np.array(asked_mm))}
+        shadow = {} if asked_mm is None else {"shadow_tip_um": _um(-by_scale @ np.array(asked_mm))}
         return {
             "tip_um": contributions_um,
             **shadow,
             "supports_M_mm": supports.round(_DECIMALS_MM).tolist(),
             "supports_moved_um": _um(supports - self._machine.frame.zero_supports_M_mm),
-            "base_joints_M_mm": base_joints[0].round(_DECIMALS_MM).tolist(),
+            "base_joints_M_mm": mechanism.base_joints_M_mm[0].round(_DECIMALS_MM).tolist(),
             "platform": {
                 "origin_M_mm": pose.origin_M_mm[0].round(_DECIMALS_MM).tolist(),
                 "rotation_M_rad": rotation_vector(pose.rotation_M_P[0]).round(_DECIMALS_RAD).tolist(),
@@ -72,19 +73,24 @@ class BudgetMessage:
             },
         }
 
-    def _pose(self, setpoint: Mapping[str, Any]) -> tuple[FloatArray, FloatArray, Pose]:
-        """Supports (3, 3) and base joints (1, n, 3) in {M}, carried along by the base platform as a whole, and the
-        moving platform."""
+    def _pose(self, setpoint: Mapping[str, Any], scale_mm: FloatArray) -> tuple[FloatArray, Mechanism, Pose]:
+        """Supports (3, 3) in {M}, and the links, carried along by the base platform as a whole; the moving platform."""
         frame = setpoint["frame"]
         rotation = compose(rotation_matrix(np.array(frame["rotation_M_rad"])), self._machine.frame.zero_rotation_M_B)
         origin_M_mm = np.array(frame["origin_M_mm"])
         supports = to_outer(rotation, origin_M_mm, self._supports_B_mm)
         base_joints = to_outer(rotation, origin_M_mm, self._base_joints_B_mm)[None]
         zero = self._machine.zero
-        mechanism = self._machine.mechanism(base_joints)
+        mechanism, _ = self._machine.links_on(rotation, base_joints, scale_mm)
         lengths = np.array([setpoint["link_length_mm"]])
         pose = forward_kinematics(mechanism, lengths, zero.platform_origin_M_mm, zero.rotation_M_P)
-        return supports, base_joints, pose
+        return supports, mechanism, pose
+
+
+def _scale_mm(setpoint: Mapping[str, Any]) -> FloatArray:
+    """(1, m) where the scales are at the setpoint's pose: as they show in CMM mode, else as they are to show."""
+    wanted, correction = np.array(setpoint["scale_setpoint_mm"]), np.array(setpoint["correction_mm"])
+    return np.asarray((wanted - correction if setpoint["mode"] == "cmm" else wanted)[None])
 
 
 def _um(lengths_mm: FloatArray) -> Any:

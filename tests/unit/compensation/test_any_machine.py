@@ -22,11 +22,12 @@ from compd.model import (
     predict,
     sensitivities,
     sum_deltas,
+    tip_by_scales,
     tip_derivatives,
 )
 from compd.model.effect_memory import EffectMemory
 from compd.model.effects import FittedEffect, MachineDetails, Observations, port_size, unmet_needs
-from compd.model.kinematics import Movement
+from compd.model.kinematics import Movement, Pose
 from compd.model.library import load_library
 from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix, rotation_vector, to_inner
@@ -248,3 +249,15 @@ def test_one_snapshot_has_the_same_derivatives(kind: str) -> None:
     np.testing.assert_allclose(found.by_gauge, by_scale, atol=1e-9)
     assert np.isfinite(found.by_theta).all()
     assert isinstance(warm.effects, EffectMemory)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_tip_by_the_scales_from_a_pose_alone(kind: str) -> None:
+    """As the budget of a setpoint asks it, which has no rows."""
+    model = machine(kind)
+    scale_mm = readings_mm(kind)
+    rows = observed(model, scale_mm)
+    mechanism, lengths = model.links_on(model.frame.zero_rotation_M_B, model.base_joints_at_0_M_mm[None], scale_mm)
+    pose = Pose(rows.origin_M_mm, rows.rotation_M_P, lengths, *[np.zeros(len(rows))] * 3)
+    expected = sensitivities(model, rows, ["scale"])["scale"].tip
+    np.testing.assert_allclose(tip_by_scales(model, mechanism, pose, rows.tip_M_mm, scale_mm), expected, atol=1e-10)

@@ -1,0 +1,94 @@
+"""A machine without frame or joint comparators has a hidden effect: it is found, adopted, and the live error falls.
+
+A linear delta with three scales and four thermometers, and a 3-PRS whose target is z and two tilts; all gauges on
+Modbus TCP, their configurations from `compd machine new`. Nothing here knows what is hidden before the end.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import yaml
+
+from compd.machine_kinds import KINDS, machine_text
+from tests.support.hidden_run import LOOP_HZ, POLL_EVERY_S, hidden_run, parse_output
+from tests.support.hidden_visits import check_visits, survey_visits
+from tests.support.simulated import run_directory
+
+VISITS, CHECKS = 32, 8
+TIMEOUT_S = 600
+SPEEDUP = "200"
+
+
+class Machine(NamedTuple):
+    """kind, own : as of `compd machine new`, and dimensions that are not the usual ones.  thermometers : the places that have one.  hidden : strengths by cause."""
+
+    kind: str
+    own: dict[str, float]
+    thermometers: tuple[str, ...]
+    hidden: tuple[str, ...]
+
+
+MACHINES = {
+    "linear delta": Machine("linear-delta", {}, ("link_1", "base", "platform", "room"), ("scale_gain=40",)),
+    "3-PRS": Machine(
+        "3-prs", {"platform_radius_mm": 200.0}, ("link_1", "link_2", "link_3", "room"), ("link_expansion=11",)
+    ),
+}
+
+
+def written(directory: Path, machine: Machine) -> Path:
+    """The machine's configuration with thermometers, polled and served as many machines side by side are."""
+    text = machine_text("mine", machine.kind, KINDS[machine.kind].usual._replace(**machine.own))
+    data = yaml.safe_load(text.replace("{on: platform", '{"on": platform'))
+    data["gauges"]["thermometers"] = {
+        "driver": "modbus",
+        "line": "cabinet",
+        "unit": 2,
+        "channels": [
+            {"name": place, "function": 4, "address": i, "type": "int16", "scale": 0.01, "unit": "degC"}
+            for i, place in enumerate(machine.thermometers)
+        ],
+    }
+    data["wiring"]["quantities"] = [
+        {"name": f"temperature_{place}_degC", "gauge": f"thermometers.{place}"} for place in machine.thermometers
+    ]
+    del data["sockets"]["tcp"]
+    data["loop"]["rate_hz"] = LOOP_HZ
+    data["lines"]["cabinet"]["poll_every_s"] = POLL_EVERY_S
+    for gauge in data["gauges"].values():
+        gauge["trust_after_loss"] = True
+    path = directory / "mine.yaml"
+    path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+    return path
+
+
+@pytest.mark.long
+@pytest.mark.sample
+@pytest.mark.timeout(TIMEOUT_S)
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_hidden_effect_is_found_and_the_live_error_falls(name: str) -> None:
+    machine = MACHINES[name]
+    options = [word for cause in machine.hidden for word in ("--effect", cause)]
+    with (
+        run_directory() as directory,
+        hidden_run(
+            directory, "--seed", "1", "--speedup", SPEEDUP, *options, configuration=written(directory, machine)
+        ) as run,
+    ):
+        recording, before_um = run.survey(survey_visits(2, VISITS, heaters=False), "survey")
+        own = ("--machine", str(run.configuration))
+        verdict = parse_output(run.compd("diagnose", recording, "--json", *own))
+        named = [step["effect"] for step in verdict["steps"]]
+        assert verdict["verdict"] in ("identified", "ambiguous")
+        model = run.directory / "model.yaml"
+        for effect in named:
+            run.compd("effect", "add", effect, "--recording", recording, "--model", model, *own)
+        run.compd("adopt", model, "--daemon", run.socket)
+        after_um = run.tip_error_um(check_visits(3, CHECKS, heaters=False))
+        floor_um = parse_output(run.compd("compare", recording, "--json", *own))["noise_floor_um"]
+    causes = {cause.partition("=")[0] for cause in machine.hidden}
+    assert causes <= {other for step in verdict["steps"] for other in (step["effect"], *step["rivals"])}
+    assert after_um < floor_um < before_um
