@@ -10,7 +10,9 @@ import pytest
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration, Geometry, load
+from compd.errors import CompdError
 from compd.machine_kinds import KINDS, machine_text
+from compd.simulation.campaign.simulate_campaign import simulate_campaign
 from compd.simulation.causes.catalogue import build_cause, possible_causes
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism
@@ -109,3 +111,12 @@ def test_a_machine_with_joint_comparators_has_their_causes() -> None:
     possible = possible_causes(Mechanism(tripod()), wiring())
     assert {"joint_comparator_gain", "joint_comparator_drift"} <= set(possible)
     assert not {"rail_direction", "crank_radius"} & set(possible)
+
+
+@pytest.mark.parametrize("kind", ["3-spr"])
+def test_a_campaign_keeps_the_configuration_of_its_machine(tmp_path: Path, machine: Configuration) -> None:
+    path = tmp_path / "machine.yaml"
+    before = path.read_bytes()
+    with pytest.raises(CompdError, match="would replace the machine's configuration"):
+        simulate_campaign(path, tmp_path / "machine.csv", overwrite=True)
+    assert path.read_bytes() == before
