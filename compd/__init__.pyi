@@ -14,6 +14,7 @@ from .model.effects.effect import Constant as Constant
 from .model.effects.effect import Effect as Effect
 from .model.effects.effect import Parameter as Parameter
 from .model.effects.effect import memoryless_basis as memoryless_basis
+from .model.external.own_kinematics import Kinematics as Kinematics
 from .model.library.effects_file import load_effects as load_effects
 from .release import __version__ as __version__
 from .simulation.campaign.simulate_campaign import simulate_campaign as simulate_campaign

@@ -188,6 +188,7 @@ class Client:
         tip_P_mm: Sequence[float] | None = None,
         time_s: float | None = None,
         id: int | None = None,
+        tip_by_scale: Sequence[Sequence[float]] | None = None,
     ) -> None:
         """Set the tip's target, as the controller; the next setpoint is computed for it.
 
@@ -209,6 +210,9 @@ class Client:
             for when it comes to the daemon, which is later where the network has stalled.
         id : int, optional
             Any number from 0 to 2**53: setpoints that answer the target have it as `target_id`.
+        tip_by_scale : 3 or 6 rows of one number for each scale, optional
+            With ``machine: external`` and scales: how much each scale moves the tip along x, y, z of {M}, mm per mm,
+            and turns what carries it about them, rad per mm.
 
         Raises
         ------
@@ -218,6 +222,8 @@ class Client:
         vectors = {"tip_B0_mm": tip_B0_mm, "rotation_B0_rad": rotation_B0_rad, "tip_P_mm": tip_P_mm}
         given: Message = {key: list(value) for key, value in vectors.items() if value is not None}
         given |= {key: value for key, value in (("time_s", time_s), ("id", id)) if value is not None}
+        if tip_by_scale is not None:
+            given["tip_by_scale"] = [list(row) for row in tip_by_scale]
         self._connection.send({"class": "TARGET", **given})
 
     def release(self) -> None:

@@ -18,6 +18,7 @@ ID_COLUMNS = ("session", "visit", "point", "ball", "pin")
 DISTANCE_COLUMN = "reference_distance_mm"
 SKEW_COLUMN = "skew_s"
 POSITION_COLUMNS = tuple(f"reference_{axis}_mm" for axis in AXES)
+MODEL_COLUMNS = tuple(f"model_{axis}_mm" for axis in AXES)
 ATTITUDE_COLUMNS = tuple(f"reference_{axis}_rad" for axis in ATTITUDES)
 QUATERNION_COLUMNS = tuple(f"reference_q{part}" for part in "xyzw")
 # Decimals by unit: a picometre, a microsecond, a tenth of a nanoradian. Finer than any gauge, and coarse enough

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -11,15 +12,19 @@ from compd.arrays import FloatArray, IntArray
 from compd.configuration import (
     COORDINATES,
     Actuator,
+    ExternalGeometry,
     Geometry,
     MechanismDescription,
     SlidingActuator,
     ToolOnPlateSettings,
     ToolOnPlatformSettings,
     TurningActuator,
+    external_of,
 )
+from compd.errors import PluginError, Problem
 from compd.model import MachineModel, MachineParts, machine_constants, machine_model
 from compd.model.effects import MachineDetails
+from compd.model.external import ExternalModel, Kinematics, new_external_model
 from compd.model.kinematics import ACTUATOR_KINDS, Actuators, Arrangement, Contact, ToolOnPlate, ToolOnPlatform
 from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix, to_outer
@@ -33,8 +38,11 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
 
     Signs of gauges and machine zero's readings are the wiring's business: the model gets changes since machine zero,
     positive as in equations (1), (6) and (7).
-    Raises KinematicsError where the machine zero that it describes is unreachable or near-singular.
+    Raises KinematicsError where the machine zero that it describes is unreachable or near-singular; PluginError for own
+    kinematics that cannot be used.
     """
+    if (external := external_of(geometry)) is not None:
+        return build_external(external, wiring)
     model = machine_model(machine_parts(geometry, wiring))
     return replace(model, constants=machine_constants(model, machine_details(geometry)))
 
@@ -64,6 +72,49 @@ def machine_parts(geometry: Geometry, wiring: Wiring) -> MachineParts:
         weight_N=geometry.platform.weight_N,
         weight_at_P_mm=geometry.platform.weight_at_P_mm,
     )
+
+
+def build_external(geometry: ExternalGeometry, wiring: Wiring) -> ExternalModel:
+    """The model of `machine: external`. Raises PluginError where its class cannot be used."""
+    own = own_kinematics(geometry)
+    model = new_external_model(own, geometry.links, geometry.scale_signal_period_mm or math.nan)
+    wired = [quantity.name for quantity in wiring.quantities]
+    if missing := [name for name in model.settings if name not in wired]:
+        raise PluginError(
+            Problem(
+                where="geometry.kinematics",
+                what=f"the class needs {', '.join(missing)}, which no gauge measures",
+                value=geometry.kinematics,
+                allowed=", ".join(wired) or "nothing is wired",
+                next_step="wire it under `wiring: quantities:`, or take it out of `settings`",
+            )
+        )
+    return model
+
+
+def own_kinematics(geometry: ExternalGeometry) -> Kinematics | None:
+    """An object of the class that a configuration names, whose file is executed; None where a client gives the pose.
+
+    Raises PluginError where the file's hash is another one, or it holds no such class.
+    """
+    if geometry.own_class is None:
+        return None
+    file, name = geometry.own_class
+    where = "geometry.kinematics"
+    kind = getattr(geometry.code.module(file, where, "class"), name, None)
+    what = ""
+    if not (isinstance(kind, type) and issubclass(kind, Kinematics)):
+        what = "the file has no such subclass of `compd.Kinematics`"
+    else:
+        try:
+            own = kind()
+        except (Exception, SystemExit) as error:  # noqa: BLE001  a person's own code may raise anything
+            what = f"the class cannot be made without arguments: {type(error).__name__}: {error}"
+    if what:
+        raise PluginError(
+            Problem(where=where, what=what, value=f"{file}:{name}", next_step="mend the file or the name")
+        )
+    return own
 
 
 def _hinges(mechanism: MechanismDescription) -> IntArray:

@@ -24,11 +24,12 @@ from compd.configuration import (
     place_warnings,
 )
 from compd.documents import Document, Location, Section, readable
-from compd.errors import ConfigurationError, KinematicsError, Problem
+from compd.errors import ConfigurationError, KinematicsError, PluginError, Problem
 from compd.machine_builder import build_model, machine_parts
 from compd.machine_reach import dependences_as_drawn
 from compd.machine_slips import axes_along_links, slips
 from compd.model import MachineModel
+from compd.model.external import ExternalModel, OwnKinematicsError, own_pose
 from compd.operation_settings import SocketSettings, StateSettings, Wiring
 
 SectionT = TypeVar("SectionT", bound=Section)
@@ -60,15 +61,20 @@ def examine_whole(path: Path) -> Examined:
         with np.errstate(all="ignore"):
             try:
                 model = build_model(examined.geometry, examined.wiring)
+            except PluginError as error:
+                problems += [replace(p, where=document.where(tuple(p.where.split(".")))) for p in error.problems]
             except (KinematicsError, ValueError) as error:
                 along = list(axes_along_links(document, examined.geometry))
                 problems += _at_machine_zero(error, document, warnings, along)
                 problems += _dependences(document, examined.geometry, examined.wiring)
             else:
-                warnings += [
-                    *_stroke_warnings(document, examined.geometry, model),
-                    *slips(document, examined.geometry, model),
-                ]
+                if isinstance(model, ExternalModel):
+                    problems += _faults_at_zero(document, model)
+                else:
+                    warnings += [
+                        *_stroke_warnings(document, examined.geometry, model),
+                        *slips(document, examined.geometry, model),
+                    ]
     sockets, state = _section(SocketSettings, document, "sockets"), _section(StateSettings, document, "state")
     effects = readable(SECTIONS["effects"], document.value(("effects",))) or ()
     problems = in_order(
@@ -79,6 +85,17 @@ def examine_whole(path: Path) -> Examined:
     if configuration is not None:
         configuration = None if problems else replace(configuration, warnings=tuple(warnings))
     return examined._replace(configuration=configuration, problems=problems, warnings=warnings)
+
+
+def _faults_at_zero(document: Document, model: ExternalModel) -> Iterator[Problem]:
+    """What own kinematics does wrong at machine zero, where it needs no settings, whose values only gauges know."""
+    if model.own is None or model.settings:
+        return
+    try:
+        own_pose(model.own, np.zeros(model.links), {})
+    except OwnKinematicsError as error:
+        where = document.where(("geometry", "kinematics"))
+        yield from (replace(problem, where=where, what=f"{problem.where} {problem.what}") for problem in error.problems)
 
 
 def _dependences(document: Document, geometry: Geometry, wiring: Wiring) -> Iterator[Problem]:

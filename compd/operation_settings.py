@@ -86,7 +86,7 @@ class QuantityWire(Section):
 class Wiring(Section):
     """Assignment of gauges to the quantities of the machine."""
 
-    scale: tuple[ScaleWire, ...] = Field(description="one entry for the linear scale of every link")
+    scale: tuple[ScaleWire, ...] = Field(default=(), description="one entry for the linear scale of every link")
     joint: tuple[JointWire, ...] = Field(default=(), description="one entry for every joint comparator")
     frame: tuple[FrameWire, ...] = Field(
         default=(),
@@ -155,6 +155,16 @@ class LimitSettings(Section):
     slew_mm_per_s: Positive = Field(description="fastest change of a correction")
     on_limit: Literal["clamp", "refuse"] = Field(
         description="clamp: apply the limit and say so; refuse: the setpoint becomes invalid and says so"
+    )
+    tip_correction_mm: Positive | None = Field(
+        default=None,
+        description="machines without scales: largest correction of the tip along each axis, to either side; left out: "
+        "`correction_mm`",
+    )
+    rotation_correction_rad: Positive | None = Field(
+        default=None,
+        description="machines without scales: largest correction of the attitude about each axis, to either side; left "
+        "out: as much as moves a point at a distance of 100 mm by the largest correction of the tip",
     )
     tip_error_um: Positive | None = Field(
         default=None,

@@ -166,9 +166,11 @@ class ListedCode:
     A file that is not listed is not opened. What is executed are the bytes whose hash was computed.
     """
 
-    def __init__(self, files: Mapping[str, str]) -> None:
-        """`files`: absolute path -> SHA-256 of the content, 64 small hexadecimal digits."""
+    def __init__(self, files: Mapping[str, str], key: str = "`effects:`") -> None:
+        """`files`: absolute path -> SHA-256 of the content, 64 small hexadecimal digits. `key`: of the configuration,
+        under which they are listed."""
         self._files = dict(files)
+        self._key = key
 
     def module(self, file: Path, where: str, kind: str) -> ModuleType:
         listed = self._files.get(str(file))
@@ -201,7 +203,7 @@ class ListedCode:
                     what=f"the {kind}'s file has another content than the configuration lists",
                     value=f"{file}: sha256 {found}",
                     allowed=listed,
-                    next_step="look at what has changed, then write the new hash under `effects:` of the "
+                    next_step=f"look at what has changed, then write the new hash under {self._key} of the "
                     "configuration, or restore the file",
                 )
             )

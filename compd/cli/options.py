@@ -33,6 +33,15 @@ RangesOption = Annotated[
         "library's or of what geometry.tolerance_mm gives. May be repeated.",
     ),
 ]
+HoldOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--hold",
+        metavar="PART",
+        help="What of an instrument's registration is not fitted along: frame, target, target.place, target.attitude, "
+        "or a single number, frame.x to target.c. May be repeated.",
+    ),
+]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Overwrite a file of another kind.")]
 
 

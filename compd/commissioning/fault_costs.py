@@ -10,6 +10,7 @@ from compd.commissioning.drift_costs import DRIFT_UM, DriftCost, drift_costs, ex
 from compd.commissioning.jump_trials import FeignedJump, feigned_jumps
 from compd.commissioning.line_budget import LineBudget, line_budgets
 from compd.configuration import Configuration
+from compd.errors import CompdError, Problem
 from compd.live.acquisition import MIN_MOTION, MIN_WAY_MM, UNIT_LIMITS, WAY_SHARE
 from compd.machine_builder import build_model
 from compd.stated_noise import SCATTER_RATIO, tolerance_mm
@@ -48,6 +49,15 @@ class Figures:
 
 def figures_of(configuration: Configuration) -> Figures:
     """All input of the numbers. Raises KinematicsError for an impossible machine zero."""
+    if configuration.external is not None:
+        raise CompdError(
+            Problem(
+                where=configuration.where("geometry"),
+                what="is of a machine whose lengths compd does not know: what a fault costs at its tip is not known",
+                value="machine: external",
+                next_step="`compd check` without --what-cannot-be-seen says how far each gauge may jump unseen",
+            )
+        )
     budgets = line_budgets(configuration)
     return Figures(
         configuration,

@@ -95,8 +95,14 @@ class Compensation(NamedTuple):
     nominal_scale_mm : (..., m), the command without compensation.
     scale_setpoint_mm : (..., m), what the scales must show for the tip to be on the target.
     correction_mm : (..., m) = scale_setpoint_mm - nominal_scale_mm.
-    contributions : the correction by cause, (..., m) each.
+    contributions : the correction by cause, (..., m) each; of a machine without scales, and of an external one, that
+        of the tip, (3) each.
     reason : (...), a Reason, of the step that failed first.
+    rotation_M_rad : (3,), attitude of what carries the tip, as a rotation vector in {M}; None where it is not told.
+    pose_correction : (6,), what is added to the commanded tip, mm, and to the commanded attitude, rad, in {B0}: the
+        rotation is about the axes of {B0} and follows that of the command; nan where the attitude is not known. None
+        where links are corrected and no pose.
+    own_columns : what own kinematics gives for effects to read, by name; None of any other machine.
     """
 
     tip_M_mm: FloatArray
@@ -111,6 +117,9 @@ class Compensation(NamedTuple):
     correction_mm: FloatArray
     contributions: Contributions
     reason: IntArray
+    rotation_M_rad: FloatArray | None = None
+    pose_correction: FloatArray | None = None
+    own_columns: Mapping[str, float] | None = None
 
 
 class Wanted(NamedTuple):

@@ -1,6 +1,9 @@
 from .crosscheck import resolve_channel as resolve_channel
 from .effect_files import effect_file_problems as effect_file_problems
 from .effect_files import listed_code as listed_code
+from .external_geometry import EXTERNAL as EXTERNAL
+from .external_geometry import ExternalGeometry as ExternalGeometry
+from .external_geometry import external_of as external_of
 from .geometry import LINKS as LINKS
 from .geometry import Geometry as Geometry
 from .geometry import ToolOnPlateSettings as ToolOnPlateSettings

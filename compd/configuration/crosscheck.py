@@ -246,7 +246,7 @@ def _no_such_link(sections: Sections, kind: str, links: int) -> Iterator[Problem
                 where=sections.document.where(("wiring", kind, i, "link")),
                 what="there is no such link",
                 value=str(wire.link),
-                allowed=f"1..{links}",
+                allowed=f"1..{links}" if links else "none: compd knows no links of this machine",
             )
 
 

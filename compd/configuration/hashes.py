@@ -14,7 +14,7 @@ from compd.operation_settings import TargetSettings, VoteSettings
 # Keys about the trust in a gauge, not its value.
 NOT_IN_ZERO = (
     *("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss"),
-    *("plausible", "fastest_change", "apart", "tolerance_mm"),
+    *("plausible", "fastest_change", "apart", "tolerance_mm", "sha256"),
 )
 # Options of later releases, with their neutral values.
 _LATER_OPTIONS: Mapping[str, Any] = {
@@ -57,6 +57,8 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "apart": None,
     "standing_temperature_K": VoteSettings().standing_temperature_K,
     "tip_error_um": None,
+    "tip_correction_mm": None,
+    "rotation_correction_rad": None,
     "frame_drift_um": None,
     "tolerance_mm": None,
     "actuators": [],

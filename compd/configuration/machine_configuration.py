@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from compd.configuration import crosscheck
 from compd.configuration.effect_files import EffectFile, EffectFiles
+from compd.configuration.external_geometry import EXTERNAL, ExternalGeometry, external_of
 from compd.configuration.geometry import LINKS, Geometry
 from compd.configuration.geometry_checks import contradictions
 from compd.configuration.hashes import NOT_IN_ZERO, hash_of
@@ -50,22 +51,13 @@ from compd.stated_noise import StatedNoise, stated_noise
 if TYPE_CHECKING:
     import pandas as pd
 
-# Name in sidecars for any machine unknown to compd.
-_EXTERNAL = "external"
-
-
-def _own_name(machine: str) -> str:
-    """The name itself; ValueError for a name with another meaning in sidecars."""
-    if machine == _EXTERNAL:
-        raise ValueError("recordings of machines without a configuration have this name: choose another one")
-    return machine
-
-
 SECTIONS: Mapping[str, Any] = {
     "machine": Annotated[
         Text,
-        AfterValidator(_own_name),
-        Field(description="the machine's name, which recordings and model files repeat"),
+        Field(
+            description="the machine's name, which recordings and model files repeat; `external`: own kinematics or a "
+            "client gives the pose, and `geometry` has other keys"
+        ),
     ],
     "geometry": Geometry,
     "lines": Annotated[
@@ -80,6 +72,8 @@ SECTIONS: Mapping[str, Any] = {
     "state": StateSettings,
     "effects": EffectFiles,
 }
+# Sections that have other keys with `machine: external`.
+EXTERNAL_SECTIONS: Mapping[str, Any] = {"geometry": ExternalGeometry}
 # Defaults of omitted sections.
 OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings(), "votes": VoteSettings(), "effects": ()}
 
@@ -95,7 +89,8 @@ class Configuration:
     machine : str
         Name of the machine.
     geometry : Geometry
-        Joints, tool and plate; lengths in mm, angles in rad, the frame in every name.
+        Joints, tool and plate; lengths in mm, angles in rad, the frame in every name. With ``machine: external``
+        an `ExternalGeometry`.
     lines : dict
         Settings of each line (serial port, Modbus), by name.
     gauges : dict
@@ -141,6 +136,11 @@ class Configuration:
     warnings: tuple[Problem, ...] = ()
     document: Document | None = field(default=None, compare=False)
 
+    @property
+    def external(self) -> ExternalGeometry | None:
+        """Who gives the pose with ``machine: external``; None for any other machine."""
+        return external_of(self.geometry)
+
     def where(self, *location: str | int) -> str:
         """`file:line key.path` of a key, for a problem: where("limits", "correction_mm")."""
         document = self.document or Document(self.path, {}, {})
@@ -178,9 +178,14 @@ class Configuration:
 
     def __str__(self) -> str:
         return (
-            f"{self.machine}: {self.geometry.kinematics or 'parallel'}, {self.geometry.links} links, "
+            f"{self.machine}: {self._kind}, {self.geometry.links} links, "
             f"{len(self.gauges)} gauges on {len(self.lines)} lines"
         )
+
+    @property
+    def _kind(self) -> str:
+        external = self.external
+        return self.geometry.kinematics or "parallel" if external is None else external.kinematics
 
     def __repr__(self) -> str:
         return f"<Configuration {self}>"
@@ -241,6 +246,16 @@ class Examined(NamedTuple):
     wiring: Wiring | None
 
 
+def is_external(document: Document) -> bool:
+    """Whether a document is of `machine: external`."""
+    return bool(document.data.get("machine") == EXTERNAL)
+
+
+def sections_of(document: Document) -> Mapping[str, Any]:
+    """What each section of a document is read as."""
+    return {**SECTIONS, **EXTERNAL_SECTIONS} if is_external(document) else SECTIONS
+
+
 def load(path: Path) -> Configuration:
     """Read and check a configuration.
 
@@ -267,7 +282,8 @@ def examine(path: Path) -> Examined:
     section_names = [*SECTIONS, "gauges"]
     problems += [unknown_key(document, (key,), section_names) for key in document.data if key not in section_names]
     sections: dict[str, Any] = {}
-    for name, kind in SECTIONS.items():
+    kinds = sections_of(document)
+    for name, kind in kinds.items():
         if name in document.data:
             sections[name] = validate(kind, document, (name,), problems)
         elif name in OPTIONAL_SECTIONS:
@@ -278,16 +294,16 @@ def examine(path: Path) -> Examined:
     gauges, drivers = gauges_of(document, problems)
     part = {
         name: sections[name] if sections[name] is not None else readable(kind, document.value((name,)))
-        for name, kind in SECTIONS.items()
+        for name, kind in kinds.items()
     }
     problems += [
         Problem(where=document.where(("geometry", *location)), what=what, value=value, allowed=allowed, next_step=step)
-        for location, what, value, allowed, step in contradictions(part["geometry"])
+        for location, what, value, allowed, step in (() if is_external(document) else contradictions(part["geometry"]))
     ]
     checked = Sections(
         document,
-        _count(part["geometry"], "rods"),
-        _count(part["geometry"], "actuators"),
+        0 if is_external(document) else _count(part["geometry"], "rods"),
+        getattr(part["geometry"], "links", None) if is_external(document) else _count(part["geometry"], "actuators"),
         _framed(document, part["geometry"]),
         part["lines"] or {},
         gauges,

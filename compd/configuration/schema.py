@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from compd.configuration.machine_configuration import OPTIONAL_SECTIONS, SECTIONS
+from compd.configuration.machine_configuration import EXTERNAL_SECTIONS, OPTIONAL_SECTIONS, SECTIONS
 from compd.plugins import GAUGES, load, names
 
 
@@ -16,6 +16,9 @@ def json_schema() -> dict[str, Any]:
     properties: dict[str, Any] = {}
     for name, kind in SECTIONS.items():
         properties[name] = _collect(kind, definitions)
+    for name, kind in EXTERNAL_SECTIONS.items():
+        forms = [properties[name], _collect(kind, definitions)]
+        properties[name] = {"description": forms[0]["description"], "anyOf": forms}
     gauges = []
     for driver in names(GAUGES):
         options = _collect(load(GAUGES, driver, driver).Options, definitions)

@@ -20,12 +20,21 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock, MonotonicClock
+from compd.columns import MODEL_COLUMNS
 from compd.configuration import Configuration, listed_code
 from compd.errors import DaemonError, StateError
 from compd.kernel_versions import kernel_versions
 from compd.line_settings import PushedLineSettings, powered
 from compd.live.acquisition import Acquisition, Votes
-from compd.live.loop import AdoptedModels, Commands, LoopTiming, Setpoint, build_pipeline
+from compd.live.loop import (
+    AdoptedModels,
+    Commands,
+    Histogram,
+    LoopTiming,
+    Setpoint,
+    TimedKinematics,
+    build_pipeline,
+)
 from compd.live.machine import MachineZero, ModelLoader, Models, load_zero, try_model, warn_of_datum
 from compd.live.memory import Control, PollRequests, SharedRing, TrustMemory
 from compd.live.processes import AcquisitionProcess, LoopProcess, ServiceProcess, StateLog
@@ -54,6 +63,7 @@ from compd.live.service import (
 from compd.live.system import changed_ports, port_names
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.model import MachineModel
+from compd.model.external import ExternalModel
 from compd.release import __version__
 
 _log = structlog.get_logger()
@@ -83,12 +93,18 @@ class Daemon:
         clock = clock or MonotonicClock()
         self.configuration = configuration
         gauges = configuration.gauge_objects()
-        pipeline = build_pipeline(configuration, gauges, listed_code(configuration.effects))
+        own_time = Histogram()
+        pipeline = build_pipeline(
+            configuration,
+            gauges,
+            listed_code(configuration.effects),
+            partial(TimedKinematics, cost=own_time, clock=clock),
+        )
         self.period_s = pipeline.settings.period_s
         self.latest, self._wires = pipeline.latest, pipeline.wires
         models = _first_models(configuration, pipeline.loader)
         # compiles what the loop calls, so that its processes have it from their first cycle
-        try_model(pipeline.settings.model, (), str(configuration.path))
+        try_model(pipeline.settings.model, pipeline.loader.without_effects.quantities, str(configuration.path))
         sockets = configuration.sockets
         access = TcpAccess.of(sockets.tcp)
         packets = UdpSender(sockets.udp) if sockets.udp is not None else None
@@ -179,6 +195,7 @@ class Daemon:
             commands=self.commands,
             adopted=adopted,
             timing=timing,
+            own_time=own_time if configuration.external is not None else None,
             control=self.control,
             publisher=publisher,
             packets=packets,
@@ -186,10 +203,6 @@ class Daemon:
             trust=self.trust,
             clock=clock,
             ports=self.ports,
-        )
-        keys = TargetKeys(
-            tip="tip_B0_mm" if configuration.geometry.tool.on == "platform" else "tip_P_mm",
-            rotation=not set(configuration.geometry.mechanism.target_fixes).isdisjoint("abc"),
         )
         requests = Requests(
             RequestContext(
@@ -199,7 +212,7 @@ class Daemon:
                     status=report.message,
                     budget=BudgetMessage(pipeline.settings.model, self._newest_setpoint).message,
                     models=lambda: {**adopted.summary, **keeping(adopted.summary)},
-                    readings=ReadingsMessage(self._wires, self.latest.channels),
+                    readings=ReadingsMessage(self._wires, self.latest.channels, model_columns(pipeline.settings.model)),
                 ),
                 errands=Errands(
                     take_zero=zero_capture.start,
@@ -209,7 +222,7 @@ class Daemon:
                     tell_order=publisher.tell_order,
                 ),
                 commands=self.commands,
-                target_keys=keys,
+                target_keys=_target_keys(configuration),
                 targets=sockets.target,
                 access=access,
                 clock=clock,
@@ -350,6 +363,22 @@ class Daemon:
             return error
         _log.info("machine zero", taken_at=zero.taken_at)
         return zero
+
+
+def model_columns(model: MachineModel) -> tuple[str, ...]:
+    """Columns of a recording that are made of the setpoints: those of `machine: external`."""
+    return (*MODEL_COLUMNS, *model.columns) if isinstance(model, ExternalModel) else ()
+
+
+def _target_keys(configuration: Configuration) -> TargetKeys:
+    """Which keys TARGET has on this machine."""
+    if (external := configuration.external) is not None:
+        gives = external.own_class is None
+        return TargetKeys(tip="tip_B0_mm" if gives else "", rotation=gives, scales=external.links if gives else 0)
+    return TargetKeys(
+        tip="tip_P_mm" if configuration.geometry.tool.on == "plate" else "tip_B0_mm",
+        rotation=not set(configuration.geometry.mechanism.target_fixes).isdisjoint("abc"),
+    )
 
 
 def _first_models(configuration: Configuration, loader: ModelLoader) -> Models:

@@ -55,9 +55,7 @@ def tip_derivatives(
     cent of the noise itself.
     """
     if isinstance(model, ExternalModel):
-        return TipDerivatives(
-            *external_tip_derivatives(model, scale_mm, quantities, quantities_at_zero, sigmas, time_s, effects)
-        )
+        return TipDerivatives(*external_tip_derivatives(model, scale_mm, quantities, sigmas, time_s, effects))
     program = model.program
     packed = effects.pack(model, len(joint_mm))
     values = np.array([quantities[name] for name in program.quantities], dtype=np.float64)

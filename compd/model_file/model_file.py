@@ -7,14 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
-from compd.errors import Problem
+from compd.errors import CompdError, Problem
 from compd.model.effects import FittedEffect, is_measured
+from compd.model.external import ExternalPrediction, Kinematics, new_external_model, predict_external
 from compd.model_file.model_document import (
     Declaration,
     ModelStep,
@@ -22,6 +25,7 @@ from compd.model_file.model_document import (
     StoredModel,
     write_stored,
 )
+from compd.recording import EXTERNAL
 from compd.result_tables import Columns, data_frame, html_table
 
 if TYPE_CHECKING:
@@ -116,6 +120,57 @@ class ModelFile:
     fitted_range: Mapping[str, Range] = field(default_factory=dict)
     plausible: Mapping[str, Mapping[str, Range]] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
+
+    def predict(
+        self, rows: Mapping[str, ArrayLike] | pd.DataFrame, kinematics: Kinematics | None = None
+    ) -> ExternalPrediction:
+        """Where the tip is in rows of a machine with kinematics of your own, as the daemon computes it live.
+
+        Parameters
+        ----------
+        rows : dict of arrays, or pandas.DataFrame
+            Columns as of a recording: ``scale_1_mm`` ... (with `kinematics`), or the pose that was given,
+            ``model_x_mm``, ``model_y_mm``, ``model_z_mm``; the quantities that the class and the effects need; and
+            ``time_s``, without which rows count as one second apart.
+        kinematics : Kinematics, optional
+            An object of your class.
+
+        Returns
+        -------
+        ExternalPrediction
+            `tip_M_mm` and `rotation_M_rad`, with the effects; `tip_correction_mm` and `rotation_correction_rad`, what
+            to add to a command; (N, 3) each, nan where it is not known.
+
+        Raises
+        ------
+        CompdError
+            Where a column is missing, the class gives no pose, or the model is of a machine that compd knows.
+        """
+        if self.machine != EXTERNAL:
+            raise CompdError(
+                Problem(
+                    where="predict",
+                    what="is of a machine that compd knows",
+                    value=self.machine,
+                    allowed=f"a model of `machine: {EXTERNAL}`",
+                    next_step="`compare` predicts the rows of its recordings",
+                )
+            )
+        names = list(map(str, rows))
+        columns = {name: np.asarray(rows[name], dtype=np.float64) for name in names}
+        links = next(i for i in count() if f"scale_{i + 1}_mm" not in columns)
+        for fitted in self.fitted:
+            if len(fitted.theta) != len(fitted.effect.columns(links)):
+                raise CompdError(
+                    Problem(
+                        where=f"effect {fitted.effect.id}",
+                        what="has numbers for another number of scales",
+                        value=f"{links} columns scale_<i>_mm",
+                        next_step="give the scales of the machine on which it was fitted",
+                    )
+                )
+        model = new_external_model(kinematics, links)
+        return predict_external(replace(model, effects=self.fitted, covariance=self.covariance), columns)
 
     def write(self, path: str | Path) -> None:
         """Write the model file (YAML), whole or not at all; an existing file is replaced.

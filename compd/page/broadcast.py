@@ -26,6 +26,13 @@ HOUR_S = 3600.0
 KEPT_EVERY_S = 60.0
 
 
+def of_links(setpoint: Message) -> Message:
+    """The setpoint as the strips of the links show it: causes of a correction of the tip are in the budget alone."""
+    if "tip_correction_mm" not in setpoint:
+        return setpoint
+    return {**setpoint, "correction_mm": setpoint.get("correction_mm", []), "sources_mm": {}}
+
+
 class FaultCounts:
     """Counts of one daemon since the page has seen them; reset when a count falls, which shows a new start."""
 
@@ -160,7 +167,7 @@ class Broadcast:
         event |= {"connected": link.connected, "reason": link.reason}
         if link.connected and link.readings is not None and self._machine is not None:
             setpoint = link.readings["setpoint"]
-            event["setpoint"] = setpoint
+            event["setpoint"] = of_links(setpoint)
             event["gauges"] = gauges(link.readings, link.columns, link.status)
             event["budget"] = (link.budget or {}).get("tip_um")
             event["shadow_budget"] = (link.budget or {}).get("shadow_tip_um")

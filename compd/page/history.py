@@ -87,7 +87,7 @@ class History:
         state = state_named(setpoint["state"])
         row[0] = UNKNOWN_STATE if state is None else float(state.code)
         if setpoint["valid"]:
-            row[1:-6] = [value * 1e3 for value in setpoint["correction_mm"]]
+            row[1:-6] = [value * 1e3 for value in setpoint.get("correction_mm", ())]
             row[-6:-3] = setpoint["tip_M_mm"]
             if budget is not None and "tip_um" in budget:
                 row[-3:] = moved_um(budget)

@@ -164,8 +164,9 @@ class Orders:
             return Consequence(False, why, command)
         setpoint = (self._link.readings or {}).get("setpoint", {})
         shadow = setpoint.get("shadow", {})
-        if "correction_mm" not in shadow or "sources_mm" not in setpoint:
-            why = shadow.get("reason") or "there is no valid setpoint to compare it with"
+        if "correction_mm" not in shadow or "sources_mm" not in setpoint or "tip_correction_mm" in setpoint:
+            of_tip = "the tip of this machine is corrected" if "tip_correction_mm" in setpoint else ""
+            why = shadow.get("reason") or of_tip or "there is no valid setpoint to compare it with"
             return Consequence(False, f"What it would change is not known: {why}.", command)
         asked_mm = [sum(parts) for parts in zip(*setpoint["sources_mm"].values(), strict=True)]
         text = f"{file} ({hash_}): {self._change(asked_mm, shadow['correction_mm'])}"
@@ -202,13 +203,16 @@ class Orders:
             )
         asked_mm = [sum(parts) for parts in zip(*contributions.values(), strict=True)]
         bare_mm = [sum(parts) for parts in zip(contributions["joints"], contributions["frame"], strict=True)]
-        return Consequence(True, self._change(asked_mm, bare_mm), command)
+        of_tip = "tip_correction_mm" in (self._link.readings or {}).get("setpoint", {})
+        return Consequence(True, self._change(asked_mm, bare_mm, "xyz" if of_tip else ""), command)
 
-    def _change(self, before_mm: list[float], after_mm: list[float]) -> str:
+    def _change(self, before_mm: list[float], after_mm: list[float], axes: str = "") -> str:
+        """axes : names of the numbers where they are the tip's; "" for links."""
         changes_um = [UM_PER_MM * (after - before) for before, after in zip(before_mm, after_mm, strict=True)]
         link = max(range(len(changes_um)), key=lambda k: abs(changes_um[k]))
         limits = (self._link.machine or {}).get("limits", {})
-        text = f"The correction changes by {changes_um[link]:+.1f} µm at link {link + 1}, and by less at the others."
+        where = f"along {axes[link]}" if axes else f"at link {link + 1}"
+        text = f"The correction changes by {changes_um[link]:+.1f} µm {where}, and by less at the others."
         if slew := limits.get("slew_mm_per_s"):
             text += f" It slews for {abs(changes_um[link]) / UM_PER_MM / slew:.1f} s."
         return text

@@ -7,6 +7,7 @@ from collections import Counter
 from pydantic import TypeAdapter
 
 from compd.configuration import SECTIONS
+from compd.configuration.machine_configuration import EXTERNAL_SECTIONS
 from compd.configuration.plausible import PLAUSIBLE, PlausibleRange
 from compd.gauge import GaugeOptions
 from docs.generate.markdown import code, escape, heading, join, link, sentence, table, target, term
@@ -47,6 +48,7 @@ def page() -> str:
             [[link(code(name), target("configuration", name)), escape(_meaning(name))] for name in sections],
         ),
         *(_section(name) for name in SECTIONS),
+        *(_external_section(name) for name in EXTERNAL_SECTIONS),
         heading(2, "`gauges`", target("configuration", "gauges")),
         GAUGES,
         keys_table(ModelSchema(GaugeOptions).keys()),
@@ -101,6 +103,16 @@ def _section(name: str) -> str:
             keys_table(schema.keys(model)),
         ]
     return join(*blocks)
+
+
+def _external_section(name: str) -> str:
+    """The section as `machine: external` has it."""
+    schema = ModelSchema(EXTERNAL_SECTIONS[name])
+    return join(
+        heading(2, f"{code(name)} of {code('machine: external')}", target("configuration", f"external.{name}")),
+        escape(sentence(schema.description(schema.schema))),
+        keys_table(schema.keys()),
+    )
 
 
 def _paths(section: str) -> dict[str, str]:

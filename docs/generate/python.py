@@ -20,6 +20,7 @@ from compd.errors import (
     StateError,
 )
 from compd.model.effects import FittedEffect
+from compd.model.external import ExternalPrediction
 from compd.model_file import EffectNumber, ModelFile, ModelStep
 from compd.planning import MeasurementPlan
 from compd.simulation.campaign.simulate_campaign import CampaignFiles
@@ -40,6 +41,7 @@ RESULTS: tuple[type, ...] = (
     EffectNumber,
     ModelStep,
     FittedEffect,
+    ExternalPrediction,
     MeasurementPlan,
     CampaignFiles,
     Client,
@@ -102,6 +104,7 @@ ORDER = (
     "Parameter",
     "Constant",
     "memoryless_basis",
+    "Kinematics",
     "CompdError",
 )
 

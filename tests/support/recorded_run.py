@@ -13,6 +13,7 @@ import numpy as np
 from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.kernel_versions import kernel_versions
+from compd.live.daemon import model_columns
 from compd.live.loop import CyclePacker, CycleUnpacker, Directions, Target
 from compd.live.record import Recorder, RecordingLimits
 from compd.live.service import ReadingsMessage
@@ -31,7 +32,8 @@ class Run:
         self.random = np.random.default_rng(seed)
         self.packer = CyclePacker(Directions(machine.wires.scale.wires))
         self.unpacker = CycleUnpacker()
-        self.transcript = ReadingsMessage(machine.wires, machine.latest.channels)
+        model = machine.settings.model
+        self.transcript = ReadingsMessage(machine.wires, machine.latest.channels, model_columns(model))
         self.version = {
             "class": "VERSION",
             "protocol": 1,
@@ -42,6 +44,8 @@ class Run:
             "computed_by": dict(kernel_versions()),
         }
         self.watch = {"class": "WATCH", "what": "readings", "columns": self.transcript.columns}
+        if self.transcript.model_columns:
+            self.watch["model_columns"] = self.transcript.model_columns
 
     def quiet(self, cycles):
         """Nothing but noise: (line, message, setpoint) of each cycle."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -191,8 +191,11 @@ def view(
     if setpoint["reason"]:
         parts.append(Text(setpoint["reason"], style=state_colour(setpoint["state"])))
     if setpoint["valid"] and state_named(setpoint["state"]) is not None:
-        parts += [_position(setpoint), _corrections(setpoint)]
-        if any(name not in _OWN_COLUMN for name in setpoint["sources_mm"]):
+        of_pose = "tip_correction_mm" in setpoint
+        parts += [_position(setpoint), *([_pose_correction(setpoint)] if of_pose else [])]
+        if "correction_mm" in setpoint:
+            parts.append(_corrections(setpoint, {} if of_pose else setpoint["sources_mm"]))
+        if not of_pose and any(name not in _OWN_COLUMN for name in setpoint["sources_mm"]):
             parts.append(_effects(setpoint))
     parts.append(_loop(status))
     if ended := _ended_processes(status):
@@ -234,12 +237,29 @@ def _position(setpoint: dict[str, Any]) -> Table:
     return table
 
 
-def _corrections(setpoint: dict[str, Any]) -> Table:
-    """One row per link, with the contributions that every machine may have."""
-    contributions = {name: values for name, values in setpoint["sources_mm"].items() if name in _OWN_COLUMN}
+def _pose_correction(setpoint: dict[str, Any]) -> Table:
+    """What is added to the commanded tip, and each cause's part of it."""
+    table = Table("", "x", "y", "z", box=None, pad_edge=False)
+    table.add_row("tip correction, um", *map(_signed_um, setpoint["tip_correction_mm"]))
+    for name, values in setpoint["sources_mm"].items():
+        if any(values) or name not in _OWN_COLUMN:
+            table.add_row(f"{name}, um", *map(_signed_um, values))
+    return table
+
+
+def _corrections(setpoint: dict[str, Any], sources_mm: Mapping[str, Any]) -> Table:
+    """One row per link, with the contributions that every machine may have. sources_mm : of the links."""
+    contributions = {name: values for name, values in sources_mm.items() if name in _OWN_COLUMN}
     corrections = setpoint["correction_mm"]
+    lengths = setpoint.get("link_length_mm")  # of machines that compd knows
     table = Table(
-        "link", "length, mm", "correction, um", "", *(f"{name}, um" for name in contributions), box=None, pad_edge=False
+        "link",
+        "length, mm" if lengths else "",
+        "correction, um",
+        "",
+        *(f"{name}, um" for name in contributions),
+        box=None,
+        pad_edge=False,
     )
     for column in table.columns[:3] + table.columns[4:]:
         column.justify = "right"
@@ -247,7 +267,7 @@ def _corrections(setpoint: dict[str, Any]) -> Table:
     for i, correction in enumerate(corrections):
         table.add_row(
             str(i + 1),
-            f"{setpoint['link_length_mm'][i]:.5f}",
+            f"{lengths[i]:.5f}" if lengths else "",
             _signed_um(correction),
             bar(correction, largest_mm),
             *(_signed_um(values[i]) for values in contributions.values()),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.cli.options import MachineOption, OverwriteOption
+from compd.cli.options import HoldOption, MachineOption, OverwriteOption
 
 if TYPE_CHECKING:
     from compd.comparison import Comparison
@@ -29,6 +29,7 @@ def compare(
     model: Annotated[
         Path | None, typer.Option("--model", help="The model file with fitted effects; default: no effects.")
     ] = None,
+    hold: HoldOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
     html: Annotated[
         Path | None, typer.Option("--html", help="Write the page with the pictures; works offline.")
@@ -50,7 +51,7 @@ def compare(
     comparisons: list[Comparison] = []
     for path in recordings:
         try:
-            comparisons.append(_compare(path, machine, model))
+            comparisons.append(_compare(path, machine, model, hold))
         except CompdError as error:
             problems += error.problems
     if problems:
@@ -68,7 +69,7 @@ def compare(
         typer.echo(f"The same as pictures: {html}")
 
 
-def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison:
+def _compare(path: Path, machine: Path | None, model: Path | None, hold: list[str] | None) -> Comparison:
     """The comparison in memory, or block by block for a long recording."""
     from compd.comparison import is_long
 
@@ -76,7 +77,9 @@ def _compare(path: Path, machine: Path | None, model: Path | None) -> Comparison
         from compd.api import compare as compare_recording
         from compd.comparison import open_recording
 
-        return compare_recording(open_recording(path, machine), model)
+        return compare_recording(open_recording(path, machine, hold=hold or ()), model)
+    if hold:
+        raise typer.BadParameter(f"{path.name} is too long for the memory: --hold takes shorter recordings")
     from compd.api import compare_stream
     from compd.cli.progress import count_shown
     from compd.table_file import row_count

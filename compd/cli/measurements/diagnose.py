@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from compd.cli.options import EffectsOption, MachineOption, OverwriteOption, RangesOption
+from compd.cli.options import EffectsOption, HoldOption, MachineOption, OverwriteOption, RangesOption
 
 if TYPE_CHECKING:
     from compd.comparison import AlignedRecording
@@ -30,6 +30,7 @@ def diagnose(
     ] = None,
     effects: EffectsOption = None,
     ranges: RangesOption = None,
+    hold: HoldOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
     html: Annotated[Path | None, typer.Option("--html", help="Write the page with pictures; works offline.")] = None,
     overwrite: OverwriteOption = False,
@@ -50,8 +51,8 @@ def diagnose(
         from compd.report import check_page_path
 
         check_page_path(html, overwrite)
-    sealed = [_open(path, machine)[0] for path in recordings[1:]]
-    aligned, all_rows = _open(recordings[0], machine)
+    sealed = [_open(path, machine, hold)[0] for path in recordings[1:]]
+    aligned, all_rows = _open(recordings[0], machine, hold)
     aligned = replace(aligned, ranges=tuple(map(read_range, ranges or ())))
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
@@ -73,12 +74,14 @@ def diagnose(
         typer.echo(f"The same as pictures: {html}")
 
 
-def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, int]:
+def _open(path: Path, machine: Path | None, hold: list[str] | None) -> tuple[AlignedRecording, int]:
     """The recording and 0; for one too long for the memory a sample, and the number of its rows."""
     from compd.comparison import is_long, open_recording
 
     if not is_long(path):
-        return open_recording(path, machine), 0
+        return open_recording(path, machine, hold=hold or ()), 0
+    if hold:
+        raise typer.BadParameter(f"{path.name} is too long for the memory: --hold takes shorter recordings")
     from compd.api import open_sample
     from compd.cli.progress import count_shown
     from compd.table_file import row_count

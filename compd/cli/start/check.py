@@ -61,9 +61,10 @@ def check(
     ]
     print_problems(warnings, "warning: ", sys.stdout)
     print_zero(configuration)
-    print_reach(configuration)
+    if configuration.external is None:
+        print_reach(configuration)
     wiring = configuration.wiring
-    if not wiring.frame:
+    if not wiring.frame and configuration.external is None:
         typer.echo(f"Not measured: the frame, which is taken to stand still; {_frame_drift(wiring.frame_drift_um)}.")
     own_process = configuration.acquisition.own_process
     processes = f" (polled in processes of their own: {', '.join(own_process)})" if own_process else ""
@@ -88,6 +89,10 @@ def print_zero(configuration: Configuration) -> None:
     from compd.machine_builder import build_model
     from compd.operation_settings import FRAME_DISTANCES
 
+    if (external := configuration.external) is not None:
+        who = "a client" if external.own_class is None else external.kinematics
+        typer.echo(f"The pose is given by {who}; compd knows no lengths at machine zero.")
+        return
     zero = build_model(configuration.geometry, configuration.wiring).zero
     links = ", ".join(f"{number} {mm:.1f}" for number, mm in enumerate(zero.link_length_mm, start=1))
     rods = ", ".join(f"{name} {mm:.1f}" for name, mm in zip(FRAME_DISTANCES, zero.distances_mm, strict=True))

@@ -107,6 +107,8 @@ def draw(
     if out.exists() and not overwrite and not out.read_text(encoding="utf-8", errors="replace").startswith("<svg"):
         raise typer.BadParameter(f"{out} exists and is no picture: give --overwrite to replace it")
     configuration = load(config)
+    if configuration.external is not None:
+        raise typer.BadParameter(f"{config}: compd knows no joints of `machine: external`, so there is nothing to draw")
     model = build_model(configuration.geometry, configuration.wiring)
     out.write_text(machine_svg(model, configuration.machine), encoding="utf-8")
     typer.echo(f"{out}: {configuration.machine} at machine zero")

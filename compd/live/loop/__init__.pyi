@@ -9,6 +9,7 @@ from .cycle_state import CycleSettings as CycleSettings
 from .cycle_state import CycleState as CycleState
 from .directions import Directions as Directions
 from .loop import Loop as Loop
+from .own_time import TimedKinematics as TimedKinematics
 from .pipeline import Pipeline as Pipeline
 from .pipeline import build_pipeline as build_pipeline
 from .ring_entries import CyclePacker as CyclePacker
@@ -17,5 +18,6 @@ from .ring_entries import SentCycle as SentCycle
 from .setpoint import Setpoint as Setpoint
 from .setpoint import setpoint_line as setpoint_line
 from .skew import skew_of as skew_of
+from .timing import Histogram as Histogram
 from .timing import LoopTiming as LoopTiming
 from .tip_uncertainty import stated_noise as stated_noise

@@ -9,7 +9,7 @@ from compd.errors import StateError
 from compd.live.machine import MachineZero, Models
 from compd.live.memory import SharedMessage
 
-_TARGET_BYTES = 1024
+_TARGET_BYTES = 2048
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,8 @@ class Target:
     time_s : monotonic time (s) at which it was made or, where the controller does not say, came; nan where it was
         recorded before targets had times.
     id : what the controller calls it; None for nothing.
+    tip_by_scale : with `machine: external`, 3 or 6 rows of n numbers, by how much each scale moves the tip, mm per mm,
+        and turns what carries it, rad per mm.
     """
 
     tip_mm: tuple[float, ...]
@@ -30,6 +32,7 @@ class Target:
     valid_until_s: float = math.inf
     time_s: float = math.nan
     id: int | None = None
+    tip_by_scale: tuple[tuple[float, ...], ...] | None = None
 
 
 class Commands:

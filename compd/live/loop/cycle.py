@@ -14,13 +14,19 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm
+from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, external_as_applied
 from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_readings import judge_scales, read_comparators, read_scales
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState, ZeroVectors
-from compd.live.loop.limits import LimitedCorrection, limit_correction, slewed, stroke_problem
-from compd.live.loop.models import adopt_models, compensate, evaluate_shadow
+from compd.live.loop.limits import (
+    LimitedCorrection,
+    limit_correction,
+    limit_pose_correction,
+    slewed,
+    stroke_problem,
+)
+from compd.live.loop.models import adopt_models, at_target, compensate, evaluate_shadow
 from compd.live.loop.refusal_cause import refusal_cause
 from compd.live.loop.setpoint import Setpoint, ShadowResult
 from compd.live.loop.skew import skew_between, skew_reason
@@ -30,6 +36,7 @@ from compd.live.loop.tip_uncertainty import TipUncertainty, has_grown, noise_now
 from compd.live.machine import MachineWires, MachineZero, Models, shortened
 from compd.live.memory import Snapshot
 from compd.model import MachineModel
+from compd.model.external import ExternalModel, OwnKinematicsError
 from compd.model.kernels import Reason
 from compd.setpoint_states import Mode, State
 
@@ -86,7 +93,10 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
     if now_s > target_until_s:
         outcome, next_state = _Outcome(State.STOP, TARGET_TOO_OLD), state
     else:
-        outcome, next_state = _compute(state, inputs, models, settings)
+        try:
+            outcome, next_state = _compute(state, inputs, models, settings)
+        except OwnKinematicsError as error:  # a person's own code must not end the loop
+            outcome, next_state = _Outcome(State.REFUSED, str(error)), state
     if outcome.values is None and next_state.tip_correction_mm is not None:
         next_state = next_state._replace(tip_correction_mm=None)
     expires_s = min(now_s + settings.valid_for_s, outcome.expires_s, target_until_s)
@@ -133,7 +143,8 @@ def _compute(
         return _Outcome(usable.state, usable.reason), state
 
     scales = read_scales(snapshot, zero_vectors.scale_mm, target, settings)
-    scales_state, scales_reason = judge_scales(scales.lost, target, state.scales_seen)
+    compares = target is not None and not settings.has_own_pose
+    scales_state, scales_reason = judge_scales(scales.lost, compares, state.scales_seen)
     if not scales_state.valid:
         reason = "; ".join(filter(None, (scales_reason, usable.reason)))
         return _Outcome(scales_state, reason), state if live is None else state._replace(last_good=live)
@@ -157,7 +168,7 @@ def _compute(
         state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
         return _Outcome(State.REFUSED, _refusal(code, machine, values, target, started, wires)), state
 
-    limited = limit_correction(compensation.correction_mm, state.correction_mm, settings.period_s, settings.limits)
+    limited = _limited(compensation, state, settings)
     refusal = limited.reason if limited.state is State.REFUSED else ""
     if target is not None and (problem := stroke_problem(compensation.link_length_mm, settings.stroke_mm)):
         refusal = f"this target is out of reach: {problem}"
@@ -167,7 +178,7 @@ def _compute(
 
     u_tip = _uncertainty(tick, state, settings, snapshot) or _not_below_held(
         tip_uncertainty(
-            machine,
+            at_target(machine, target),
             noise_now(settings.noise, wires, snapshot, usable.beyond),
             values,
             compensation.scale_setpoint_mm,
@@ -184,7 +195,9 @@ def _compute(
 
     adopting = state.adopting and limited.state is not State.OK
     tip_correction_mm = (
-        None if target is not None else _tip_correction(compensation.correction_mm, limited, state, settings)
+        None
+        if target is not None or settings.corrects_pose
+        else _tip_correction(compensation.correction_mm, limited, state, settings)
     )
     reached_mm = limited.applied_mm if tip_correction_mm is None else tip_correction_mm
     bound = tip_bound(u_tip, snapshot, usable, compensation, reached_mm, target, settings)
@@ -206,12 +219,11 @@ def _compute(
         # what is not published changes no correction
         kept = next_state._replace(correction_mm=state.correction_mm, adopting=state.adopting)
         return _Outcome(State.REFUSED, "; ".join(filter(None, (refusal, usable.reason, limited.reason)))), kept
-    if tip_correction_mm is not None and tip_correction_mm is not compensation.correction_mm:
-        compensation = _with_tip_as_applied(compensation, scale_mm, tip_correction_mm, warm_start, settings)
-        if code := int(compensation.reason):
-            return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {Reason(code).meaning}"), next_state
+    compensation = _as_applied(compensation, machine, values, target, started, reached_mm, settings)
+    if code := int(compensation.reason):
+        return _Outcome(State.REFUSED, f"the clamped tip cannot be computed: {Reason(code).meaning}"), next_state
     reported, reason = _reported(usable, scales_state, scales_reason, limited)
-    compensation = _with_applied(compensation, limited.applied_mm)
+    compensation = _with_applied(compensation, limited.applied_mm, settings)
     return (
         _Outcome(
             reported,
@@ -227,8 +239,21 @@ def _compute(
     )
 
 
-def _with_applied(compensation: Compensation, applied_mm: FloatArray) -> Compensation:
+def _limited(compensation: Compensation, state: CycleState, settings: CycleSettings) -> LimitedCorrection:
+    """What of the correction may be applied: of each scale's, or of the pose's where there are no scales."""
+    if not settings.corrects_pose:
+        return limit_correction(compensation.correction_mm, state.correction_mm, settings.period_s, settings.limits)
+    wanted, previous = compensation.pose_correction, state.correction_mm
+    assert wanted is not None, "without scales the pose is corrected"
+    if len(previous) != len(wanted):  # before the first
+        previous = np.zeros(len(wanted))
+    return limit_pose_correction(wanted, previous, settings.period_s, settings.limits)
+
+
+def _with_applied(compensation: Compensation, applied_mm: FloatArray, settings: CycleSettings) -> Compensation:
     """The compensation with the correction (n) that is applied, and the scale setpoint that belongs to it."""
+    if settings.corrects_pose:
+        return compensation._replace(pose_correction=applied_mm)
     setpoint_mm = compensation.nominal_scale_mm + applied_mm
     # in the order of the fields: `_replace` takes three times as long
     return Compensation._make((*compensation[:8], setpoint_mm, applied_mm, *compensation[10:]))
@@ -320,6 +345,26 @@ def _tip_correction(
     if state.tip_correction_mm is None:
         return wanted_mm
     return slewed(wanted_mm, state.tip_correction_mm, settings.period_s, settings.limits)
+
+
+def _as_applied(
+    compensation: Compensation,
+    machine: MachineModel,
+    values: GaugeValues,
+    target: Target | None,
+    warm_start: WarmStart,
+    reached_mm: FloatArray,
+    settings: CycleSettings,
+) -> Compensation:
+    """The compensation with the tip that belongs to the correction (n) with which it is reached, not to the one asked
+    for: in CMM mode, and where a client gives the pose. `reason` says whether it could be computed."""
+    if settings.corrects_pose or reached_mm is compensation.correction_mm:
+        return compensation
+    if isinstance(machine, ExternalModel):
+        return external_as_applied(at_target(machine, target), compensation, values, warm_start, reached_mm)
+    if target is not None:
+        return compensation
+    return _with_tip_as_applied(compensation, values.scale_mm, reached_mm, warm_start, settings)
 
 
 def _with_tip_as_applied(

@@ -60,19 +60,22 @@ def read_comparators(
 
 def read_scales(snapshot: Snapshot, zero_mm: FloatArray, target: Target | None, settings: CycleSettings) -> WiredValues:
     """The scales (n). In machine-tool mode they are nan, since they are not used; what is lost of them is known where
-    they are compared with the setpoints."""
+    they are compared with the setpoints. Where a client gives the pose, effects are computed at the scales."""
     wires = settings.wires.scale
-    if target is None:
+    if target is None or settings.has_own_pose:
         return wires.read(snapshot, zero_mm, settings.loop.extrapolate)
     lost = wires.lost(snapshot) if settings.scales_checked else ALL_GOOD
     return WiredValues(settings.unread_scales_mm, math.inf, -math.inf, lost)
 
 
-def judge_scales(lost: Lost, target: Target | None, seen: bool) -> tuple[State, str]:
-    """State and reason of a setpoint by what is lost of the scales. seen : whether they have ever been good."""
+def judge_scales(lost: Lost, compared: bool, seen: bool) -> tuple[State, str]:
+    """State and reason of a setpoint by what is lost of the scales.
+
+    compared : whether they are only compared with the setpoints. seen : whether they have ever been good.
+    """
     if not lost:
         return State.OK, ""
-    if target is not None:
+    if compared:
         return State.FAULT if lost.distrusted else State.DEGRADED, f"not compared with the setpoint: {lost}"
     # no policy replaces a scale: without it the tip is not known
     state = State.FAULT if lost.distrusted else State.STOP if seen else State.STARTING

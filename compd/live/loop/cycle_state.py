@@ -19,6 +19,7 @@ from compd.live.loop.tip_uncertainty import scatter_limits_mm
 from compd.live.machine import MachineWires, MachineZero, Models
 from compd.live.memory import Snapshot
 from compd.model import EffectMemory, GaugeNoise, MachineModel
+from compd.model.external import ExternalModel
 from compd.operation_settings import LimitSettings, LoopSettings
 
 # The uncertainty of the tip changes over seconds, as the machine warms up or crosses its workspace.
@@ -44,7 +45,8 @@ class CycleState(NamedTuple):
     zero : the machine zero that was used last; None before the first. With another one, the cycle forgets what was
         measured from it.
     warm_start : where Newton's iterations start, with the memory of the applied model's effects.
-    correction_mm : (n), the correction that is applied; the next one slews from it. An invalid cycle keeps it.
+    correction_mm : (n), the correction that is applied; the next one slews from it. An invalid cycle keeps it. Of a
+        machine without scales the correction of its pose (6), mm and rad, after the first valid cycle.
     last_good : the newest complete set of comparators; None before the first.
     scales_seen : whether the scales have ever been good. Scales that are lost afterwards are `stop`, not `starting`.
     shadow_memory : memory of the shadow model's effects.
@@ -117,6 +119,16 @@ class CycleSettings:
     def model(self) -> MachineModel:
         """The machine without effects."""
         return self.without_effects.applied.machine
+
+    @cached_property
+    def corrects_pose(self) -> bool:
+        """Whether the pose is corrected that a controller commands, since there are no scales."""
+        return not self.wires.scale.wires
+
+    @cached_property
+    def has_own_pose(self) -> bool:
+        """Whether own kinematics or a client gives the pose."""
+        return isinstance(self.model, ExternalModel)
 
     @cached_property
     def period_s(self) -> float:

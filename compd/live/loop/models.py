@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 
 from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
@@ -11,7 +13,10 @@ from compd.live.loop.setpoint import ShadowResult
 from compd.live.machine import LiveModel, Models
 from compd.live.memory import Snapshot
 from compd.model import EffectMemory, MachineModel, carry_over
+from compd.model.external import ExternalModel, OwnKinematicsError, given_pose
 from compd.model.kernels import Reason
+
+ModelT = TypeVar("ModelT", bound=MachineModel)
 
 
 def adopt_models(state: CycleState, models: Models) -> CycleState:
@@ -47,7 +52,18 @@ def compensate(
     """The compensation in CMM mode, or in machine-tool mode where there is a target, and the next warm start."""
     if target is None:
         return compensate_cmm(machine, values, warm_start)
+    machine = at_target(machine, target)
     return compensate_machine_tool(machine, np.array(target.tip_mm), target.rotation_B0_rad, values, warm_start)
+
+
+def at_target(machine: ModelT, target: Target | None) -> ModelT:
+    """The machine; one whose pose a client gives, at the pose of its target.
+
+    Raises OwnKinematicsError where the target lacks the derivatives that the machine needs.
+    """
+    if target is None or not isinstance(machine, ExternalModel):
+        return machine
+    return machine.with_pose(given_pose(target.tip_mm, target.rotation_B0_rad, target.tip_by_scale, machine.links))
 
 
 def evaluate_shadow(
@@ -71,7 +87,10 @@ def evaluate_shadow(
         missing = ", ".join(sorted(shadow.needed_at_zero - values.quantities_at_zero.keys()))
         return ShadowResult(shadow.hash, f"machine zero has no {missing}"), memory
     values = values._replace(quantities=shadow.by_name(quantities))
-    compensation, after = compensate(shadow.machine, values, target, warm_start._replace(effects=memory))
+    try:
+        compensation, after = compensate(shadow.machine, values, target, warm_start._replace(effects=memory))
+    except OwnKinematicsError as error:
+        return ShadowResult(shadow.hash, str(error)), memory
     if code := int(compensation.reason):
         return ShadowResult(shadow.hash, Reason(code).meaning), after.effects
     tip_P_mm = compensation.tip_P_mm if tool_on_plate else None

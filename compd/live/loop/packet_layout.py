@@ -52,14 +52,18 @@ PACKET_BODY: tuple[PacketField, ...] = (
     ),
     PacketField("state", "B", "code of the `state`"),
     PacketField("mode", "B", "code of the `mode`: " + ", ".join(f"{mode.code} {mode}" for mode in Mode)),
-    PacketField("links", "B", "number of links; 0 when invalid"),
+    PacketField("links", "B", "number of links that are corrected; 0 when invalid, and where the pose is corrected"),
     PacketField("spare", "3x", "0"),
     PacketField("tip_mm", "3d", "the tip, mm: `tip_M_mm`, or with the tool on the plate `tip_P_mm`"),
     PacketField("displacement_M_mm", "3d", "`frame.displacement_M_mm`, mm"),
     PacketField("rotation_M_rad", "3d", "`frame.rotation_M_rad`, rad"),
     PacketField("link_length_mm", f"{PACKET_LINKS}d", "`link_length_mm` of each link, mm"),
     PacketField("scale_setpoint_mm", f"{PACKET_LINKS}d", "`scale_setpoint_mm` of each link, mm"),
-    PacketField("correction_mm", f"{PACKET_LINKS}d", "`correction_mm` of each link, mm"),
+    PacketField(
+        "correction_mm",
+        f"{PACKET_LINKS}d",
+        "`correction_mm` of each link, mm; with 0 links `tip_correction_mm` and `rotation_correction_rad`",
+    ),
     PacketField("config_hash", "8s", "`config_hash`: its 16 hexadecimal digits as 8 bytes"),
 )
 PACKET_CHECKSUM = PacketField("crc32", "I", "CRC-32 of all bytes before it (zlib, IEEE 802.3)")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ from compd.live.loop.tip_uncertainty import stated_noise
 from compd.live.machine import MachineWires, ModelLoader, Models
 from compd.live.memory import Latest
 from compd.machine_builder import build_model
+from compd.model.external import ExternalModel, Kinematics
 from compd.plugins import OWN_CODE, Code
 
 
@@ -32,8 +34,14 @@ class Pipeline(NamedTuple):
         return self.settings.wires
 
 
-def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]], code: Code = OWN_CODE) -> Pipeline:
-    """`gauges`: those of the configuration, by name; `code`: which Python files effects may be in.
+def build_pipeline(
+    configuration: Configuration,
+    gauges: Mapping[str, Gauge[Any]],
+    code: Code = OWN_CODE,
+    watch: Callable[[Kinematics], Kinematics] | None = None,
+) -> Pipeline:
+    """`gauges`: those of the configuration, by name; `code`: which Python files effects may be in. `watch` makes of
+    own kinematics what is called in its place.
 
     Raises KinematicsError for a geometry that is impossible.
     """
@@ -46,6 +54,8 @@ def build_pipeline(configuration: Configuration, gauges: Mapping[str, Gauge[Any]
     latest = Latest(list(chain.from_iterable(channels.values())), latched)
     wires = MachineWires(configuration, latest)
     model = build_model(configuration.geometry, configuration.wiring)
+    if watch is not None and isinstance(model, ExternalModel) and model.own is not None:
+        model = replace(model, own=watch(model.own))
     loader = ModelLoader(model, configuration.machine, configuration.geometry_hash, wires, code)
     settings = CycleSettings(
         without_effects=Models(loader.without_effects),

@@ -32,6 +32,8 @@ _DECIMALS_MM = 7
 # 0.1 nrad: 0.1 nm at the end of a lever of 1 m.
 _DECIMALS_RAD = 10
 _DECIMALS_S = 6
+# As columns of a recording.
+_DECIMALS_OWN = 9
 # 0.1 nm, as lengths: an uncertainty is not known better.
 _DECIMALS_UM = 4
 
@@ -176,13 +178,11 @@ class Setpoint(NamedTuple):
             vectors.append(values.tip_P_mm)
         # rounding one long array costs as much as rounding one of three elements
         lengths = _rounded(np.concatenate(vectors), _DECIMALS_MM, moved_mm)
-        n = len(values.correction_mm)
+        n, links = len(values.correction_mm), len(values.link_length_mm)
         message: dict[str, Any] = {
             "tip_M_mm": lengths[:3],
             "tip_B0_mm": lengths[3:6],
-            "link_length_mm": lengths[12 : 12 + n],
-            "scale_setpoint_mm": lengths[12 + n : 12 + 2 * n],
-            "correction_mm": lengths[12 + 2 * n : 12 + 3 * n],
+            **_json_links(lengths[12:], links, n),
             "frame": {
                 "origin_M_mm": lengths[6:9],
                 "displacement_M_mm": lengths[9:12],
@@ -193,7 +193,9 @@ class Setpoint(NamedTuple):
             ),
         }
         if self.tool_on_plate:
-            message["tip_P_mm"] = lengths[12 + 3 * n :]
+            message["tip_P_mm"] = lengths[12 + links + 2 * n :]
+        if values.rotation_M_rad is not None or values.pose_correction is not None:
+            message |= _json_pose(values, moved_mm)
         u_tip_um = self.u_tip_um
         if isinstance(u_tip_um, float):
             moved_um = u_tip_um + moved_mm * UM_PER_MM
@@ -204,7 +206,7 @@ class Setpoint(NamedTuple):
             message["shadow"] = {
                 name: field if isinstance(field, str) else _rounded(field, _DECIMALS_MM, moved_mm)
                 for name, field in self.shadow._asdict().items()
-                if field is not None
+                if field is not None and (isinstance(field, str) or len(field))
             }
         return message
 
@@ -221,16 +223,20 @@ class Setpoint(NamedTuple):
             links = len(values.correction_mm)
             flags = FLAG_VALID | FLAG_TOOL_ON_PLATE if self.tool_on_plate else FLAG_VALID
             unused = (math.nan,) * (PACKET_LINKS - links)
+            unknown = (math.nan,) * (PACKET_LINKS - len(values.link_length_mm))
+            of_pose = links == 0 and values.pose_correction is not None
+            correction = values.pose_correction if of_pose else values.correction_mm
+            assert correction is not None, "checked above"
             vectors = (
                 *tip_mm.tolist(),
                 *values.frame.displacement_M_mm.tolist(),
                 *values.frame.rotation_M_rad.tolist(),
                 *values.link_length_mm.tolist(),
-                *unused,
+                *unknown,
                 *values.scale_setpoint_mm.tolist(),
                 *unused,
-                *values.correction_mm.tolist(),
-                *unused,
+                *correction.tolist(),
+                *((math.nan,) * (PACKET_LINKS - len(correction))),
             )
         body = BODY.pack(
             MAGIC,
@@ -253,6 +259,36 @@ class Setpoint(NamedTuple):
 def setpoint_line(message: Mapping[str, Any]) -> bytes:
     """A SETPOINT message as it is sent; orjson takes a tenth of the time of the standard library."""
     return orjson.dumps(message) + b"\n"
+
+
+def _json_links(numbers: list[float], links: int, scales: int) -> dict[str, list[float]]:
+    """What is known of links and scales, by key. numbers : first the links' lengths, setpoints, corrections."""
+    parts = {
+        "link_length_mm": numbers[:links],
+        "scale_setpoint_mm": numbers[links : links + scales],
+        "correction_mm": numbers[links + scales : links + 2 * scales],
+    }
+    return {name: part for name, part in parts.items() if part}
+
+
+def _json_pose(values: Compensation, moved_mm: float) -> dict[str, Any]:
+    """Attitude and correction of the pose, as far as they are known."""
+    correction = values.pose_correction
+    rotation_correction_rad = None if correction is None or np.isnan(correction[3:]).any() else correction[3:]
+    known = {
+        "rotation_M_rad": (values.rotation_M_rad, _DECIMALS_RAD),
+        "tip_correction_mm": (None if correction is None else correction[:3], _DECIMALS_MM),
+        "rotation_correction_rad": (rotation_correction_rad, _DECIMALS_RAD),
+    }
+    message: dict[str, Any] = {
+        name: _rounded(numbers, decimals, moved_mm)
+        for name, (numbers, decimals) in known.items()
+        if numbers is not None
+    }
+    if values.own_columns:
+        columns = np.array(list(values.own_columns.values()))
+        message["own_columns"] = dict(zip(values.own_columns, _rounded(columns, _DECIMALS_OWN, moved_mm), strict=True))
+    return message
 
 
 def _target_named(target: Target) -> dict[str, Any]:

@@ -67,14 +67,14 @@ def tip_bound(
     by_noise_um, tip_by_gauge = u
     if by_noise_um is None or tip_by_gauge is None:
         return None
-    links = len(reached_mm)
+    links = len(settings.wires.scale.wires)
     lengths_mm = length_bounds_mm(snapshot, usable, wanted.nominal_scale_mm, settings)
     if target is not None:
         lengths_mm[:links] = 0.0  # the tip is where the target is
     um = tip_bound_um(float(by_noise_um[-1]), tip_by_gauge, lengths_mm, links)
     absent_um = 0.0
-    if (absent_mm := _absent_link_mm(wanted, reached_mm, usable.weight)) is not None:
-        absent_um += UM_PER_MM * _norm(tip_by_gauge[:, :links] @ absent_mm)
+    if (absent_mm := _absent_tip_mm(wanted, reached_mm, usable.weight, tip_by_gauge[:, :links], settings)) is not None:
+        absent_um += UM_PER_MM * _norm(absent_mm)
     if usable.absent_mm is not None:
         absent_um += UM_PER_MM * _norm(tip_by_gauge[:, links:] @ usable.absent_mm)
     um += absent_um
@@ -86,19 +86,31 @@ def with_place(live: ComparatorSet, nominal_scale_mm: FloatArray, settings: Cycl
     return live if settings.noise is None or live.scale_mm else live._replace(scale_mm=tuple(nominal_scale_mm.tolist()))
 
 
-def _absent_link_mm(wanted: Compensation, reached_mm: FloatArray, weight: float) -> FloatArray | None:
-    """Correction (n) that is wanted and not reached, by limits and by effects that count less; None for none, nan where
-    it is not known.
+def _absent_tip_mm(
+    wanted: Compensation, reached_mm: FloatArray, weight: float, tip_by_scale: FloatArray, settings: CycleSettings
+) -> FloatArray | None:
+    """By how much the tip (3) is off since a correction is not reached, by limits and by effects that count less; None
+    for none, nan where it is not known.
 
-    weight : by which the corrections of the effects have been multiplied.
+    weight : by which the corrections of the effects have been multiplied. tip_by_scale : (3, n).
     """
+    asked = wanted.pose_correction if settings.corrects_pose else wanted.correction_mm
+    assert asked is not None, "without scales the pose is corrected"
     effects_mm = wanted.contributions.by_cause_mm[_GAUGED:]
-    if weight == 1.0 or not len(effects_mm):
-        return None if reached_mm is wanted.correction_mm else wanted.correction_mm - reached_mm
-    if weight == 0.0:
-        return np.full(len(reached_mm), math.nan)
+    less = weight != 1.0 and len(effects_mm) > 0
+    if not less and reached_mm is asked:
+        return None
+    if less and weight == 0.0:
+        return np.full(3, math.nan)
+    missing_mm = asked - reached_mm
+    tip_mm: FloatArray = missing_mm[:3] if settings.corrects_pose else tip_by_scale @ missing_mm
+    if not less:
+        return tip_mm
     by_effects: FloatArray = effects_mm.sum(axis=0) * ((1.0 - weight) / weight)
-    return wanted.correction_mm - reached_mm + by_effects
+    if not (settings.corrects_pose or settings.has_own_pose):
+        by_effects = tip_by_scale @ by_effects
+    tip_mm += by_effects
+    return tip_mm
 
 
 def length_bounds_mm(
@@ -113,7 +125,7 @@ def length_bounds_mm(
     held_s, held = usable.held_s, usable.comparators
     travel_mm = math.inf
     if held.scale_mm and len(held.scale_mm) == links:
-        travel_mm = float(np.abs(scale_mm - held.scale_mm).max()) + machine_mm_per_s * float(held_s.max())
+        travel_mm = float(np.abs(scale_mm - held.scale_mm).max()) + machine_mm_per_s * float(held_s.max(initial=0.0))
     drift = np.array(held.drift_mm_per_s) if held.drift_mm_per_s else np.full(len(held_s), math.nan)
     since_mm = np.minimum(0.5 * wires.comparators.acceleration_mm_per_s2 * held_s**2, travel_mm)
     bounds_mm[links:] = np.where(held_s > 0.0, np.minimum(drift * held_s + since_mm, largest_mm), bounds_mm[links:])
@@ -174,12 +186,13 @@ def _largest_part(bound: TipBound, snapshot: Snapshot, usable: UsableComparators
     assert by_length is not None, "a bound that is known has them"
     assert bound.u.by_noise_um is not None, "and the noise"
     parts_um = UM_PER_MM * np.sqrt((by_length**2).sum(axis=0)) * bound.lengths_mm
-    k = int(np.argmax(parts_um))
     noise_um = float(bound.u.by_noise_um[-1])
-    if bound.absent_um >= max(noise_um, float(parts_um[k])):
+    largest_um = float(parts_um.max(initial=0.0))  # of a machine without lengths there is none
+    if bound.absent_um >= max(noise_um, largest_um):
         return f"what is not corrected, {bound.absent_um:.4g} um"
-    if noise_um >= parts_um[k]:
+    if noise_um >= largest_um:
         return f"the scatter of the gauges and the errors of fitted numbers, {noise_um:.4g} um; see `noise_um`"
+    k = int(np.argmax(parts_um))
     wire = settings.wires.length_wires[k]
     links, age_s = len(settings.wires.scale.wires), snapshot.time_s - snapshot.readings[wire.slot].time_s
     if usable.held_s is not None and k >= links and usable.held_s[k - links] > 0.0:

@@ -22,7 +22,8 @@ from compd.live.machine.machine_zero import MachineZero
 from compd.live.machine.wiring import Beyond, MachineWires, WiredValues, Wires
 from compd.live.memory import Snapshot
 from compd.model import MachineModel
-from compd.model.effects import FittedEffect, available_settings, needed_quantities, unmet_needs
+from compd.model.effects import OWN_POSE, FittedEffect, available_settings, needed_quantities, unmet_needs
+from compd.model.external import ExternalModel, OwnPose, known_live
 from compd.model_file import ModelFile, Range, read_model_file
 from compd.plugins import OWN_CODE, Code
 from compd.recording import limit_of
@@ -149,15 +150,17 @@ class LiveModel:
         summary: dict[str, Any] = {"effects": [fitted.effect.id for fitted in self.machine.live_effects]}
         if self.file:
             summary |= {"model": self.hash, "file": self.file}
-        if not_live := [fitted.effect.id for fitted in self.machine.effects if not fitted.effect.live]:
+        live = set(summary["effects"])
+        if not_live := [fitted.effect.id for fitted in self.machine.effects if fitted.effect.id not in live]:
             summary["not_live"] = not_live
         if self.warnings:
             summary["warnings"] = [
                 " ".join(filter(None, (w.what, w.value))) + f": {w.next_step}" for w in self.warnings
             ]
-        if from_20_degC := [
+        from_20_degC = [
             fitted.effect.id for fitted in self.machine.live_effects if fitted.effect.counts_from == "20 degC"
-        ]:
+        ]
+        if from_20_degC and not isinstance(self.machine, ExternalModel):  # its effects count as they are written
             summary["from_20_degC"] = from_20_degC
         return summary
 
@@ -208,7 +211,9 @@ class ModelLoader:
     ) -> None:
         """`model`: without effects; `machine`: the name in its configuration; `geometry`: the hash of its geometry;
         `code`: which Python files effects may be in."""
-        self.without_effects = LiveModel(model, (), wires.quantity_wires(()))
+        # own kinematics needs its settings without effects, too
+        settings = model.settings if isinstance(model, ExternalModel) else ()
+        self.without_effects = LiveModel(model, settings, wires.quantity_wires(settings))
         self._machine = machine
         self._geometry = geometry
         self._wires = wires
@@ -238,9 +243,15 @@ class ModelLoader:
             raise StateError(problems)
         machine = replace(model, effects=file.fitted, covariance=file.covariance)
         needed = (needed_quantities(fitted.effect, model.links) for fitted in machine.live_effects)
-        names = tuple(dict.fromkeys(chain.from_iterable(needed)))
+        names = tuple(dict.fromkeys(chain(self.without_effects.quantities, *needed)))
         try_model(machine, names, text.file)
-        ranges = FittedRanges.of(names, file.fitted_range)
+        if isinstance(model, ExternalModel):  # its own kinematics gives the others, or an axis that stays still
+            names = tuple(name for name in names if name in self._wires.quantity_names)
+        # a setting is commanded, and has no range but its own
+        fitted_range = {
+            name: range_ for name, range_ in file.fitted_range.items() if name not in self.without_effects.quantities
+        }
+        ranges = FittedRanges.of(names, fitted_range)
         return LiveModel(machine, names, self._wires.quantity_wires(names), text, ranges, file.warnings)
 
     def _unmet_needs(self, effects: tuple[FittedEffect, ...]) -> list[Problem]:
@@ -248,7 +259,9 @@ class ModelLoader:
         model = self.without_effects.machine
         assert model.constants is not None
         available = {*self._wires.quantity_names, *available_settings(model.constants)}
-        live = [fitted for fitted in effects if fitted.effect.live]
+        if isinstance(model, ExternalModel):
+            available |= {OWN_POSE, *model.columns, *known_live(model.links)}
+        live = replace(model, effects=effects).live_effects
         problems = [problem for fitted in live for problem in unmet_needs(fitted.effect, available, model.links)]
         return problems + [
             Problem(
@@ -340,7 +353,11 @@ def try_model(machine: MachineModel, names: tuple[str, ...], where: str) -> None
         0.0,
         dict.fromkeys(names, np.nan),
     )
-    target_mm = machine.arrangement.measured_tip_mm(machine.zero.contact)
+    target_mm: FloatArray = np.zeros(3)
+    if isinstance(machine, ExternalModel):  # at a pose that is given, since the class may need real settings
+        machine = replace(machine, own=None, given=OwnPose(np.zeros(3), np.zeros(3), np.zeros((6, machine.links))))
+    else:
+        target_mm = machine.arrangement.measured_tip_mm(machine.zero.contact)
     try:
         _, warm = compensate_cmm(machine, values, WarmStart.at_zero(machine))
         compensate_machine_tool(machine, target_mm, None, values._replace(time_s=1.0), warm)

@@ -194,7 +194,7 @@ class MachineWires:
         self.joints = len(wiring.joint)
         self.joint = self.comparators.part(0, self.joints)
         self.frame = self.comparators.part(self.joints, len(self.comparators.wires))
-        self.tool_on_plate = configuration.geometry.tool.on == "plate"
+        self.tool_on_plate = configuration.external is None and configuration.geometry.tool.on == "plate"
         self._quantities = {q.name: wire(q.gauge, q.name) for q in wiring.quantities}
         self.lengths = Wires([*self.scale.wires, *self.comparators.wires])
 

@@ -11,7 +11,7 @@ from compd.files import read_small_file, sync_directory, write_new_file
 from compd.live.record.appended_file import AppendedFile
 from compd.live.record.part_table import part_table
 from compd.live.record.table_rows import Message, TableRows
-from compd.recording import sidecar_contents, sidecar_text
+from compd.recording import EXTERNAL, sidecar_contents, sidecar_text
 from compd.tables import TableFormat
 from compd.text import encode_compact
 
@@ -174,6 +174,7 @@ class RecordingPart:
                     if "sign" in column
                 },
             },
-            quantities_at_zero=self.zero.get("quantities"),
+            # effects of an external machine count as they are written
+            quantities_at_zero=None if version["machine"] == EXTERNAL else self.zero.get("quantities"),
             notes="Raw readings less machine zero, before any correction: raw in mm = zero_mm + sign * column.",
         )

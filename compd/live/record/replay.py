@@ -169,13 +169,15 @@ def replay_cycles(
         A model file that cannot be used.
     """
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
+    # without scales the correction is that of a pose, and has no links
+    corrected = 0 if pipeline.settings.corrects_pose else scale_count(configuration.geometry.links)
     files = [*recording.model_files(), *model_files]
     read = [pipeline.loader.read(file, plausible=False) for file in files]
     models = {"": pipeline.loader.without_effects} | {model.hash: model for model in read}
     former = _former_settings(pipeline, configuration)
     here = versions_text_here()
     for where, message in recording.cycles():
-        recorded = _recorded_cycle(where, message, pipeline.latest.channels, scale_count(configuration.geometry.links))
+        recorded = _recorded_cycle(where, message, pipeline.latest.channels, corrected)
         applied = _model(where, message.get("model", ""), models)
         shadow = _model(where, message["shadow"], models) if "shadow" in message else None
         used = Models(applied, shadow)
@@ -221,7 +223,7 @@ def _recorded_cycle(where: str, message: Message, channels: Sequence[str], links
                 )
             )
         recorded = parse_readings(message, channels)
-        if len(recorded.state.correction_mm) != links:
+        if links and len(recorded.state.correction_mm) != links:
             raise _damaged(where, f"is of a machine without {links} links")
     except (KeyError, TypeError, ValueError) as error:
         raise _damaged(where, f"{type(error).__name__}: {error}") from error

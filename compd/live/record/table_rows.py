@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compd.columns import SKEW_COLUMN, approach_columns, decimals
+from compd.columns import MODEL_COLUMNS, SKEW_COLUMN, approach_columns, decimals
 from compd.live.record.part_table import Row
+from compd.setpoint_states import Mode
 from compd.units import UM_PER_MM
 
 Message = Mapping[str, Any]
@@ -29,7 +30,9 @@ class TableRows:
         self._links = len(first_readings.get("approach", ()))
         of_gauges = ["time_s", *(column["column"] for column in self._columns), SKEW_COLUMN]
         self._decimals = {name: decimals(name) for name in of_gauges}
-        self.names = [*of_gauges, *approach_columns(self._links)]
+        self._model: Sequence[str] = watch.get("model_columns", ())
+        self._decimals |= {name: decimals(name) for name in self._model}
+        self.names = [*of_gauges, *approach_columns(self._links), *self._model]
         self.in_full = {column["column"] for column in self._columns if "sign" not in column}
 
     def row(self, message: Message) -> Row:
@@ -40,7 +43,19 @@ class TableRows:
         row += [self._number(SKEW_COLUMN, message["setpoint"]["skew_s"]) if "skew_s" in message["setpoint"] else None]
         # None until a link has moved
         row += [float(direction) if direction else None for direction in message.get("approach", ())[: self._links]]
+        if self._model:
+            row += self._pose(message["setpoint"])
         return row
+
+    def _pose(self, setpoint: Message) -> list[float | None]:
+        """The tip before any correction, and what the class gives; None where the setpoint is not valid."""
+        if not setpoint["valid"]:
+            return [None] * len(self._model)
+        tip_mm = setpoint["tip_M_mm"]
+        if setpoint["mode"] == Mode.CMM:
+            tip_mm = [tip + undone for tip, undone in zip(tip_mm, setpoint["tip_correction_mm"], strict=True)]
+        known = {**dict(zip(MODEL_COLUMNS, tip_mm, strict=True)), **setpoint.get("own_columns", {})}
+        return [self._number(name, known[name]) if name in known else None for name in self._model]
 
     def _value(self, column: Message, reading: Message, now_s: float) -> float | None:
         """None where the reading is not good, or too old for the daemon to use."""

@@ -15,9 +15,11 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.model import MachineModel, tip_by_scales
+from compd.model.external import ExternalModel
 from compd.model.kernels import Reason
 from compd.model.kinematics import Mechanism, Pose, forward_kinematics
 from compd.rotation import compose, rotation_matrix, rotation_vector, to_inner, to_outer
+from compd.setpoint_states import Mode
 from compd.units import UM_PER_MM
 
 # 0.1 nm, as uncertainties in a SETPOINT.
@@ -33,6 +35,8 @@ class BudgetMessage:
         """`newest`: the SETPOINT line of the last cycle; None before the first."""
         self._machine = machine
         self._newest = newest
+        if isinstance(machine, ExternalModel):
+            return
         frame = machine.frame
         self._supports_B_mm = to_inner(frame.zero_rotation_M_B, frame.zero_origin_M_mm, frame.zero_supports_M_mm)
         self._base_joints_B_mm = self._supports_B_mm[frame.support_of_joint] + frame.joint_offsets_B_mm
@@ -46,7 +50,18 @@ class BudgetMessage:
         message = {"class": "BUDGET", **{key: setpoint[key] for key in ("seq", "time_s", "valid", "state", "reason")}}
         return message | self._values(setpoint) if setpoint["valid"] else message
 
+    def _external_values(self, setpoint: Mapping[str, Any]) -> dict[str, Any]:
+        """Of a machine whose pose own kinematics or a client gives: its sources are those of the tip."""
+        values = {"tip_um": {cause: _um(-np.array(mm)) for cause, mm in setpoint["sources_mm"].items()}}
+        shadow_M_mm = setpoint.get("shadow", {}).get("tip_M_mm")
+        if shadow_M_mm is not None and setpoint["mode"] == Mode.CMM:
+            uncorrected = np.array(setpoint["tip_M_mm"]) + setpoint["tip_correction_mm"]
+            values["shadow_tip_um"] = _um(np.array(shadow_M_mm) - uncorrected)
+        return values
+
     def _values(self, setpoint: Mapping[str, Any]) -> dict[str, Any]:
+        if isinstance(self._machine, ExternalModel):
+            return self._external_values(setpoint)
         scale_mm = _scale_mm(setpoint)
         supports, mechanism, pose = self._pose(setpoint, scale_mm)
         if pose.reason[0] != Reason.OK:

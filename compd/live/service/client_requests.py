@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from compd.live.loop import Target
 from compd.live.service.client_session import ClientSession, Place, Stream
 from compd.live.service.message_keys.budget import BudgetKeys
 from compd.live.service.message_keys.machine import MachineKeys
@@ -21,6 +22,9 @@ from compd.live.service.request_context import RequestContext, SendLater
 MAX_ID = 2**53
 Coordinate = Annotated[float, Field(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 Vector = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+TipByScale = Annotated[
+    list[Annotated[list[Coordinate], Field(min_length=1, max_length=6)]], Field(min_length=3, max_length=6)
+]
 
 
 class ColumnKeys(Keys):
@@ -39,6 +43,9 @@ class WatchKeys(SentMessage):
     what: Literal["setpoints", "readings"] | None = Field(default=None, description="as in the request")
     rate_hz: float | None = Field(default=None, description="as in the request, Hz")
     columns: list[ColumnKeys] | None = Field(default=None, description="of readings: which channel is which column")
+    model_columns: list[str] | None = Field(
+        default=None, description="of readings, with `machine: external`: columns that are made of the setpoints"
+    )
 
 
 class WatchRequest(Request):
@@ -66,7 +73,9 @@ class WatchRequest(Request):
             # READINGS are several times a SETPOINT's size, and their times are those of this computer's clock.
             raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
         client.watch(self.rate_hz, Stream.READINGS)
-        return line(message | {"columns": context.messages.readings.columns})
+        readings = context.messages.readings
+        model_columns = {"model_columns": readings.model_columns} if readings.model_columns else {}
+        return line(message | {"columns": readings.columns} | model_columns)
 
 
 class TargetRequest(Request):
@@ -88,6 +97,11 @@ class TargetRequest(Request):
         default=None,
         description="hexapod: rotation vector of {P} in {B0}, rad; left out: the attitude at machine zero",
     )
+    tip_by_scale: TipByScale | None = Field(
+        default=None,
+        description="`machine: external` with scales: how much each scale moves the tip, in {M}, mm per mm: 3 rows, x "
+        "y z, of one number for each scale; 3 more rows turn what carries the tip about x y z, rad per mm",
+    )
     time_s: Coordinate | None = Field(
         default=None,
         description="when it was made, s on the daemon's monotonic clock, as in SETPOINT; left out, or later than it "
@@ -103,6 +117,10 @@ class TargetRequest(Request):
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         keys = context.target_keys
+        if not keys.tip:
+            raise ProtocolError(
+                ErrorCode.BAD_MESSAGE, "this machine's own kinematics gives the pose: it takes no target"
+            )
         if foreign := sorted(self.model_fields_set.difference(keys.names)):
             raise unknown_key(self.wire_name, foreign[0], keys.names)
         made_s = client.arrived_s if self.time_s is None else min(self.time_s, client.arrived_s)
@@ -110,8 +128,28 @@ class TargetRequest(Request):
         if tip_mm is None:
             raise ProtocolError(ErrorCode.BAD_MESSAGE, f"needs {keys.tip}, three numbers")
         rotation = self.rotation_B0_rad
-        context.set_target(client, tuple(tip_mm), None if rotation is None else tuple(rotation), made_s, self.id)
+        rows = self.tip_by_scale
+        if keys.scales and (rows is None or any(len(row) != keys.scales for row in rows)):
+            raise ProtocolError(
+                ErrorCode.BAD_MESSAGE, f"needs tip_by_scale, 3 or 6 rows of {keys.scales} numbers, one for each scale"
+            )
+        context.set_target(
+            client,
+            Target(
+                tuple(tip_mm),
+                None if rotation is None else tuple(rotation),
+                time_s=made_s,
+                id=self.id,
+                tip_by_scale=None if rows is None else tuple(map(tuple, rows)),
+            ),
+        )
         return b""
+
+    @model_validator(mode="after")
+    def _has_rows(self) -> Self:
+        if self.tip_by_scale is not None and len(self.tip_by_scale) not in {3, 6}:
+            raise ValueError("tip_by_scale has 3 or 6 rows")
+        return self
 
 
 class ReleaseKeys(SentMessage):

@@ -15,11 +15,19 @@ def machine_message(configuration: Configuration, wires: MachineWires) -> dict[s
         "class": "MACHINE",
         "machine": configuration.machine,
         "config_hash": configuration.config_hash,
-        "geometry": configuration.geometry.model_dump(mode="json", exclude_none=True),
+        "geometry": _geometry(configuration),
         "limits": configuration.limits.model_dump(mode="json"),
         "loop": configuration.loop.model_dump(mode="json", include={"rate_hz", "stale_after_s", "on_stale", "hold_s"}),
         "wiring": _wiring(configuration, wires),
     }
+
+
+def _geometry(configuration: Configuration) -> dict[str, Any]:
+    """The section; of own kinematics its class, without the path, which no remote client needs."""
+    geometry: dict[str, Any] = configuration.geometry.model_dump(mode="json", exclude_none=True, exclude={"sha256"})
+    if (external := configuration.external) is not None and external.own_class is not None:
+        geometry["kinematics"] = external.own_class[1]
+    return geometry
 
 
 def _wiring(configuration: Configuration, wires: MachineWires) -> list[dict[str, Any]]:

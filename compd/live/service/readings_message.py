@@ -42,8 +42,10 @@ class RecordedCycle(NamedTuple):
 class ReadingsMessage:
     """Makes the READINGS messages of a machine, and the `columns` that describe them in the answer to WATCH."""
 
-    def __init__(self, wires: MachineWires, channels: Sequence[str]) -> None:
-        """`channels`: names of a snapshot's readings, in order."""
+    def __init__(self, wires: MachineWires, channels: Sequence[str], model_columns: Sequence[str] = ()) -> None:
+        """`channels`: names of a snapshot's readings, in order. `model_columns`: of a recording, that are made of
+        setpoints: the pose that own kinematics or a client gives, and what its class gives beside it."""
+        self.model_columns = list(model_columns)
         self.columns = columns(wires)
         self._channels = tuple(channels)
 
@@ -142,16 +144,19 @@ def _target(target: Target) -> dict[str, Any]:
         message["time_s"] = target.time_s
     if target.id is not None:
         message["id"] = target.id
+    if target.tip_by_scale is not None:
+        message["tip_by_scale"] = target.tip_by_scale
     return message
 
 
 def _parsed_target(data: Mapping[str, Any]) -> Target:
     """The target; one that was recorded before targets grew old is never too old."""
-    rotation = data.get("rotation_B0_rad")
+    rotation, rows = data.get("rotation_B0_rad"), data.get("tip_by_scale")
     return Target(
         tuple(data["tip_mm"]),
         None if rotation is None else tuple(rotation),
         data.get("valid_until_s", math.inf),
         data.get("time_s", math.nan),
         data.get("id"),
+        None if rows is None else tuple(map(tuple, rows)),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import structlog
@@ -27,16 +27,19 @@ _log = structlog.get_logger()
 class TargetKeys:
     """Which keys TARGET has on this machine.
 
-    tip : "tip_B0_mm", or "tip_P_mm" with the tool on the plate.
+    tip : "tip_B0_mm", or "tip_P_mm" with the tool on the plate; "" where the machine takes no target.
     rotation : whether "rotation_B0_rad" is allowed: a hexapod's attitude is free, a tripod's follows from its tip.
+    scales : number of scales by which "tip_by_scale" says how the tip moves; 0 where that key is not allowed.
     """
 
-    tip: Literal["tip_B0_mm", "tip_P_mm"]
+    tip: Literal["tip_B0_mm", "tip_P_mm", ""]
     rotation: bool
+    scales: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
-        return (self.tip, *(("rotation_B0_rad",) if self.rotation else ()), "time_s", "id")
+        optional = {"rotation_B0_rad": self.rotation, "tip_by_scale": bool(self.scales)}
+        return (*filter(None, [self.tip]), *(name for name, allowed in optional.items() if allowed), "time_s", "id")
 
 
 def _accept_nothing(gauge: str, send_later: SendLater) -> None:
@@ -127,15 +130,8 @@ class RequestContext:
             raise ProtocolError(ErrorCode.NOT_AUTHORIZED, "this is not the token")
         client.authorized = True
 
-    def set_target(
-        self,
-        client: ClientSession,
-        tip_mm: tuple[float, ...],
-        rotation_B0_rad: tuple[float, ...] | None,
-        made_s: float,
-        target_id: int | None,
-    ) -> None:
-        """Take a target that was made at `made_s`, and with it `client` as the controller.
+    def set_target(self, client: ClientSession, target: Target) -> None:
+        """Take a target, which says when it was made, and with it `client` as the controller.
 
         Raises ProtocolError where it may not be.
         """
@@ -152,8 +148,7 @@ class RequestContext:
         if self.controller is None:
             _log.info("controller", client=client.name)
         self.controller = client
-        valid_until_s = made_s + self._targets.valid_for_s
-        self.commands.target = Target(tip_mm, rotation_B0_rad, valid_until_s, made_s, target_id)
+        self.commands.target = replace(target, valid_until_s=target.time_s + self._targets.valid_for_s)
 
     def end_role(self, client: ClientSession) -> None:
         """End the controller's role, which `client` has or, over the Unix socket, takes from whoever has it.

@@ -10,7 +10,7 @@ from typing import Any
 from compd.clock import Clock
 from compd.errors import StateError
 from compd.gauge import Quality
-from compd.live.loop import AdoptedModels, Commands, LoopTiming, skew_of
+from compd.live.loop import AdoptedModels, Commands, Histogram, LoopTiming, skew_of
 from compd.live.machine import MachineWires, waiting_text
 from compd.live.memory import Control, Latest, TrustMemory
 from compd.live.service.publisher import Publisher
@@ -28,6 +28,7 @@ class StatusReport:
     ----------
     version : the VERSION message, whose keys STATUS repeats.
     latest, wires, commands, adopted, timing, control, publisher : the daemon's own.
+    own_time : how long own kinematics takes; None for machines that compd knows.
     packets : the UDP sender, where one is configured.
     lines : makes the state of every line, by name.
     trust : what is known of the length channels.
@@ -47,6 +48,7 @@ class StatusReport:
     trust: TrustMemory
     clock: Clock
     ports: Mapping[str, str]
+    own_time: Histogram | None = None
 
     def message(self) -> dict[str, Any]:
         """The message as plain data; what is unknown is left out."""
@@ -62,7 +64,7 @@ class StatusReport:
             "mode": "cmm" if self.commands.target is None else "machine_tool",
             "zero": self._zero(),
             "model": self._model(),
-            "loop": self.timing.summary(),
+            "loop": self._loop(),
             "realtime": self.control.realtime.read() or {},
             "processes": self.control.processes.read() or {},
             "publisher": published,
@@ -73,6 +75,11 @@ class StatusReport:
         }
         known: dict[str, Any] = omit_unknown(message)
         return known
+
+    def _loop(self) -> dict[str, Any]:
+        summary = self.timing.summary()
+        own = {} if self.own_time is None else self.own_time.summary()
+        return summary | {f"own_kinematics_{name}": value for name, value in own.items()}
 
     def _zero(self) -> dict[str, Any]:
         zero = self.commands.zero

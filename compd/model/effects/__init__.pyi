@@ -14,6 +14,7 @@ from .effect_basis import counted_from as counted_from
 from .effect_basis import evaluate_basis as evaluate_basis
 from .effect_basis import port_size as port_size
 from .effect_basis import recounted as recounted
+from .effect_needs import OWN_POSE as OWN_POSE
 from .effect_needs import can_concern as can_concern
 from .effect_needs import external_ports as external_ports
 from .effect_needs import is_measured as is_measured

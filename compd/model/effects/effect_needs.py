@@ -153,7 +153,8 @@ def unmet_needs(
             Problem(
                 where=f"effect {effect.id}",
                 what=f"acts at the port {effect.port}, which an external model has not",
-                allowed="effects at the ports " + ", ".join(external_ports(links)),
+                allowed="effects at the ports "
+                + ", ".join(dict.fromkeys([*(["reference"] if OWN_POSE in available else []), *external_ports(links)])),
                 next_step="write a machine configuration",
             )
         )
@@ -178,7 +179,13 @@ def _reaches_prediction(effect: Effect, available: Collection[str], links: int) 
     Without known kinematics only what acts on the predicted coordinates themselves: on link lengths what their scales
     and the links add, on the tip what the reference adds.
     """
+    if OWN_POSE in available:
+        return set(effect.ports) <= {"reference", *(external_ports(links) if links else ())}
     return "kinematics" in available or any(port in effect.ports for port in external_ports(links))
+
+
+# Among what is available: the pose is known with its derivatives, so that what acts on links is carried to it.
+OWN_POSE = "own pose"
 
 
 def external_ports(links: int) -> tuple[Port, ...]:

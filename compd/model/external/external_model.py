@@ -32,7 +32,7 @@ _LINKS_THAT_TURN = 4
 
 @dataclass(frozen=True, eq=False)
 class ExternalModel(MachineModel):
-    """The model of such a machine. Build it with `external_model`.
+    """The model of such a machine. Build it with `new_external_model`.
 
     Its scales since machine zero are its links; it has no joints and no frame of which anything is known. What effects
     add at `reference` is added to the pose, what they add at `scale` and `link` is carried there by the derivatives.
@@ -50,24 +50,32 @@ class ExternalModel(MachineModel):
         """Number of scales."""
         return self.link_count
 
+    @property
+    def scales(self) -> int:
+        """Number of scales."""
+        return self.link_count
+
     @cached_property
     def live_effects(self) -> tuple[FittedEffect, ...]:
         """All effects but those of the library at the reference, which are the reference instrument's."""
         return tuple(fitted for fitted in self.effects if acts_on_machine(fitted.effect))
 
     @cached_property
+    def live_covariance(self) -> FloatArray:
+        """(P, P) of the fitted numbers of `live_effects`; nan where the model does not give it."""
+        live = [acts_on_machine(fitted.effect) for fitted in self.effects for _ in fitted.theta]
+        if not len(self.covariance):
+            return np.full((sum(live),) * 2, np.nan)
+        return self.covariance[np.ix_(live, live)]
+
+    @cached_property
     def program(self) -> EffectProgram:
-        """No effect is computed by the kernel: names of the quantities that are needed, at machine zero too."""
+        """No effect is computed by the kernel: names of the quantities that are needed now. At machine zero none is:
+        effects count as they are written."""
         nothing = build_program((), None, self.links, 0, 0)
         needed = {f.effect.id: needed_quantities(f.effect, self.links) for f in self.live_effects}
-        at_zero = [
-            (name, None)
-            for fitted in self.live_effects
-            if fitted.effect.counts_from == "machine zero"
-            for name in needed[fitted.effect.id]
-        ]
         names = tuple(dict.fromkeys(name for each in needed.values() for name in each))
-        return nothing._replace(quantities=names, references=tuple(dict.fromkeys(at_zero)))
+        return nothing._replace(quantities=names, references=())
 
     @property
     def settings(self) -> tuple[str, ...]:
@@ -93,7 +101,7 @@ def acts_on_machine(effect: Effect) -> bool:
     return effect.live or bool(effect.declared)
 
 
-def external_model(own: Kinematics | None, links: int, scale_signal_period_mm: float = np.nan) -> ExternalModel:
+def new_external_model(own: Kinematics | None, links: int, scale_signal_period_mm: float = np.nan) -> ExternalModel:
     """A machine with so many scales. own : None where clients give the pose."""
     nowhere, no_points, unknown = np.zeros(3), np.zeros((0, 3)), np.full(3, np.nan)
     frame = FrameGeometry(
@@ -147,17 +155,19 @@ def external_rows(
     time_s: FloatArray,
     quantities_at_zero: Mapping[str, float] | None,
     memory: EffectMemory,
+    given: Sequence[OwnPose] | None = None,
 ) -> ExternalRows:
     """Rows that follow each other in time.
 
     scale_mm : (N, n) since machine zero.  quantities : (N,) each, those of the settings and of the effects.
+    given : the pose of each row; None where the model has it.
     Raises OwnKinematicsError where the own kinematics gives no pose, and none was given.
     """
     poses: list[OwnPose] = []
     columns: dict[str, list[FloatArray]] = {name: [] for name in model.columns}
     for row, scales in enumerate(scale_mm):
         settings = {name: float(quantities[name][row]) for name in model.settings}
-        poses.append(_pose(model, scales, settings))
+        poses.append(_pose(model, scales, settings) if given is None else given[row])
         if model.own is not None:
             for name, value in own_columns(model.own, scales, settings).items():
                 columns[name].append(value)

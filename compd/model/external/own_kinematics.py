@@ -41,6 +41,11 @@ class Kinematics(ABC):
     settings: ClassVar[tuple[str, ...]] = ()
     gives: ClassVar[tuple[str, ...]] = ()
 
+    @property
+    def name(self) -> str:
+        """What messages call it: the name of the class."""
+        return type(self).__name__
+
     @abstractmethod
     def pose(self, scale_mm: FloatArray, settings: Mapping[str, float]) -> ArrayLike:
         """Where the tip is.
@@ -137,9 +142,12 @@ def own_columns(kinematics: Kinematics, scale_mm: FloatArray, settings: Mapping[
         return {}
     try:
         found = kinematics.columns(scale_mm.copy(), settings)
-        return {name: np.array(float(found[name])) for name in kinematics.gives}
+        columns = {name: np.array(float(found[name])) for name in kinematics.gives}
     except (Exception, SystemExit) as error:
         raise _failed(kinematics, "columns", error) from error
+    if not all(map(np.isfinite, columns.values())):
+        raise _wrong(kinematics, "columns", np.array(list(columns.values())), "finite numbers")
+    return columns
 
 
 def _asked(
@@ -170,7 +178,7 @@ def _wrong(kinematics: Kinematics, what: str, found: FloatArray, allowed: str) -
 
 
 def _name(kinematics: Kinematics, what: str) -> str:
-    return f"kinematics {type(kinematics).__name__}.{what}"
+    return f"kinematics {kinematics.name}.{what}"
 
 
 def _completed(numbers: FloatArray) -> FloatArray:

@@ -18,7 +18,6 @@ def external_tip_derivatives(
     model: ExternalModel,
     scale_mm: FloatArray,
     quantities: Mapping[str, FloatArray],
-    quantities_at_zero: Mapping[str, float],
     sigmas: Mapping[str, float],
     time_s: float,
     effects: EffectMemory,
@@ -29,7 +28,7 @@ def external_tip_derivatives(
     commanded.
     """
     one_row = {name: np.asarray(value, dtype=np.float64).reshape(1) for name, value in quantities.items()}
-    found = external_rows(model, scale_mm[None], one_row, np.array([time_s]), quantities_at_zero, effects)
+    found = external_rows(model, scale_mm[None], one_row, np.array([time_s]), None, effects)
     if effects.motion is not None:
         moving = Movement.from_motions([effects.motion])
         rows = replace(found.rows, direction=moving.direction, velocity_mm_per_s=moving.velocity_mm_per_s)

@@ -10,7 +10,7 @@ import pytest
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool, external_as_applied
 from compd.model import tip_derivatives
 from compd.model.effects import FittedEffect
-from compd.model.external import Kinematics, OwnKinematicsError, external_model, given_pose
+from compd.model.external import Kinematics, OwnKinematicsError, given_pose, new_external_model
 from compd.model.library import find_effect
 
 UPPER_MM, FOREARM_MM = 400.0, 300.0
@@ -57,7 +57,7 @@ def at_reference(theta=0.06):
 
 def machine(*fitted, own=None):
     size = sum(len(each.theta) for each in fitted)
-    return replace(external_model(own or Arm(), 2), effects=fitted, covariance=np.full((size, size), 1e-6))
+    return replace(new_external_model(own or Arm(), 2), effects=fitted, covariance=np.full((size, size), 1e-6))
 
 
 def values(forearm_mm=FOREARM_MM):
@@ -110,7 +110,7 @@ def test_what_links_add_is_carried_by_the_derivatives(port):
 
 
 def test_a_client_gives_pose_and_derivatives_in_place_of_the_class():
-    model = external_model(None, 2)
+    model = new_external_model(None, 2)
     with pytest.raises(OwnKinematicsError, match="no client has given the pose"):
         computed(model)
     with pytest.raises(OwnKinematicsError, match="has no derivatives"):

@@ -211,7 +211,10 @@ PROBLEMS: dict[str, tuple[Edit, list[tuple[str, str]]]] = {
         swap(("host: 127.0.0.1, port", "host: 0.0.0.0, port")),
         [("sockets.tcp", "allow and token_file are missing")],
     ),
-    "a machine called external": (swap(("machine: tripod-cmm", "machine: external")), [("machine", "another one")]),
+    "a machine called external": (
+        swap(("machine: tripod-cmm", "machine: external")),
+        [("geometry.platform", "unknown key")],
+    ),
     "a machine without a name": (swap(("machine: tripod-cmm", 'machine: ""')), [("machine", "must not be empty")]),
     "a name with a colour": (swap(("machine: tripod-cmm", 'machine: "\\e[31m"')), [("machine", "printable")]),
     "a huge number": (swap(("[0, 0, 700]", "[0, 0, 1e300]")), [("geometry", "NOT_FINITE")]),

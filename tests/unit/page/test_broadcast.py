@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from compd.page.broadcast import gauges
+from compd.page.broadcast import gauges, of_links
 
 COLUMNS = [
     {"column": "scale_1_mm", "channel": "scale_1.position", "sign": -1, "stale_after_s": 0.5},
@@ -44,3 +44,11 @@ def test_a_warning_of_status_stands_beside_its_gauge() -> None:
     first, second = gauges(readings, columns, status)
     assert "warning" not in first
     assert second["warning"] == "hum"
+
+
+def test_the_strips_of_links_show_no_causes_of_a_correction_of_the_tip():
+    pose = {"valid": True, "tip_correction_mm": [0.0, 0.0, 0.1], "sources_mm": {"growth": [0.0, 0.0, 0.1]}}
+    assert of_links(pose) == pose | {"correction_mm": [], "sources_mm": {}}
+    assert of_links(pose | {"correction_mm": [0.1]})["correction_mm"] == [0.1]
+    links = {"valid": True, "correction_mm": [0.1] * 3, "sources_mm": {"growth": [0.1] * 3}}
+    assert of_links(links) is links

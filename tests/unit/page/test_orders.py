@@ -148,3 +148,13 @@ def test_without_the_daemon_nothing_is_possible(link):
         consequence = Orders(link).consequence(name, "all")
         assert not consequence.possible
         assert "closed" in consequence.text
+
+
+def test_a_correction_of_the_tip_is_told_along_an_axis(link):
+    sources = {"joints": [0.0] * 3, "frame": [0.0] * 3, "growth": [0.0, 0.002, -0.02]}
+    pose = {"valid": True, "tip_correction_mm": [0.0, 0.002, -0.02], "sources_mm": sources}
+    link.readings = {"setpoint": pose}
+    assert "+20.0 µm along z" in Orders(link).consequence("no-model", "").text
+    link.models = {"applied": {"effects": []}, "shadow": {"effects": ["backlash"], "file": "/a.yaml", "model": HASH}}
+    link.readings = {"setpoint": pose | {"shadow": {"tip_M_mm": [0.0] * 3}}}
+    assert "the tip of this machine is corrected" in Orders(link).consequence("adopt", "").text

@@ -130,4 +130,5 @@ def _setpoint_mm(view: MachineView) -> FloatArray | None:
     setpoint = view.setpoint
     if setpoint is None or setpoint["mode"] != "machine_tool" or not setpoint["valid"]:
         return None
-    return np.array(setpoint["scale_setpoint_mm"], dtype=float)
+    scales_mm = setpoint.get("scale_setpoint_mm")
+    return None if scales_mm is None else np.array(scales_mm, dtype=float)

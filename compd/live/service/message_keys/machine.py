@@ -37,6 +37,13 @@ class MachineLimitKeys(Keys):
     correction_mm: float = Field(description="largest, to either side, mm")
     slew_mm_per_s: float = Field(description="fastest change, mm/s")
     on_limit: Literal["clamp", "refuse"] = Field(description="what happens beyond them")
+    tip_correction_mm: float | None = Field(
+        default=None, description="machines without scales: largest of the tip, mm; absent: `correction_mm`"
+    )
+    rotation_correction_rad: float | None = Field(
+        default=None,
+        description="machines without scales: largest of the attitude, rad; absent: as the tip's at 100 mm",
+    )
     tip_error_um: float | None = Field(
         default=None, description="largest bound of the tip's error that is valid, um; absent: none"
     )
@@ -48,7 +55,9 @@ class MachineKeys(SentMessage):
     wire_name = "MACHINE"
     machine: str = Field(description="the machine's name in the configuration")
     config_hash: str = Field(description="hash of the whole configuration, hexadecimal; another one: ask again")
-    geometry: dict[str, Any] = Field(description="the section `geometry` of the configuration, with the same keys")
+    geometry: dict[str, Any] = Field(
+        description="the section `geometry` of the configuration, with the same keys; of own kinematics the class alone"
+    )
     limits: MachineLimitKeys = Field(description="what a correction may be")
     loop: MachineLoopKeys = Field(description="how the loop runs")
     wiring: list[WiredChannelKeys] = Field(description="what each channel measures: scales, joints, frame, quantities")

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from compd.live.service.messages import ErrorCode
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-Links = Annotated[list[float], Field(min_length=3, max_length=6)]
+Links = Annotated[list[float], Field(min_length=1, max_length=6)]
 
 
 class Keys(BaseModel):

@@ -70,6 +70,27 @@ class SetpointKeys(SentMessage):
     )
     tip_B0_mm: Vector | None = Field(default=None, description="the tip in {B0}, the base platform at machine zero, mm")
     tip_P_mm: Vector | None = Field(default=None, description="tool on the plate: the touched place in {P}, mm")
+    rotation_M_rad: Vector | None = Field(
+        default=None,
+        description="machines without scales, and `machine: external`: attitude of what carries the tip, as a rotation "
+        "vector in {M}, rad; it belongs to `tip_M_mm`, and is absent where it is not known",
+    )
+    tip_correction_mm: Vector | None = Field(
+        default=None,
+        description="machines without scales, and `machine: external`: what to add to the tip that is commanded, in "
+        "{B0}, mm, within its limits: `tip_B0_mm` of the target plus this, sent to the drives, brings the tip to the "
+        "target",
+    )
+    rotation_correction_rad: Vector | None = Field(
+        default=None,
+        description="the same for the attitude that is commanded: a small turn about the axes of {B0} that follows "
+        "it, as a rotation vector, rad; absent where the attitude is not known",
+    )
+    own_columns: dict[str, float] | None = Field(
+        default=None,
+        description="`machine: external` with a class: what its method `columns` gives, by name, for effects and "
+        "recordings",
+    )
     frame: FrameKeys | None = Field(default=None, description="where the base platform is, and how it has moved")
     link_length_mm: Links | None = Field(
         default=None, description="length of each link, mm: measured (cmm) or needed (machine_tool)"
@@ -85,7 +106,8 @@ class SetpointKeys(SentMessage):
     sources_mm: dict[str, Links] | None = Field(
         default=None,
         description="how much each cause asks for, for each link, mm: `joints`, `frame`, then by its id what each "
-        "effect adds to those before it; their sum is the correction before its limits",
+        "effect adds to those before it; their sum is the correction before its limits. Machines without scales, "
+        "and `machine: external`: how much of `tip_correction_mm`, along each axis, before limits",
     )
     u_tip_um: float | None = Field(
         default=None,

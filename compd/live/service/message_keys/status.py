@@ -35,6 +35,13 @@ class LoopStatusKeys(Keys):
     lateness_median_us: float | None = Field(default=None, description="start of a cycle after its time, us")
     lateness_p99_us: float | None = Field(default=None, description="likewise, 99th percentile, us")
     lateness_largest_us: float | None = Field(default=None, description="likewise, largest, us")
+    own_kinematics_median_us: float | None = Field(
+        default=None,
+        description="`machine: external` with a class: time of one call of its methods, us; what takes longer than a "
+        "period makes cycles late",
+    )
+    own_kinematics_p99_us: float | None = Field(default=None, description="likewise, 99th percentile, us")
+    own_kinematics_largest_us: float | None = Field(default=None, description="likewise, largest, us")
     cycle_median_us: float | None = Field(default=None, description="duration of a cycle, us")
     cycle_p99_us: float | None = Field(default=None, description="likewise, 99th percentile, us")
     cycle_largest_us: float | None = Field(default=None, description="likewise, largest, us")

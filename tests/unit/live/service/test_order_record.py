@@ -25,7 +25,9 @@ def log():
 def recorder(service):
     """A client that watches READINGS; of these only the orders come here."""
     context = service.requests.context
-    context.messages = replace(context.messages, readings=type("Readings", (), {"columns": [], "line": None}))
+    context.messages = replace(
+        context.messages, readings=type("Readings", (), {"columns": [], "model_columns": [], "line": None})
+    )
     peer = service.unix()
     assert peer.ask({"class": "WATCH", "what": "readings"})["class"] == "WATCH"
     return peer
