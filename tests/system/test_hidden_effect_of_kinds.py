@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from compd.configuration import Configuration, load
 from compd.machine_kinds import KINDS
 from compd.simulation import Mechanism, draw_hidden
 from compd.simulation.causes.catalogue import CAUSES
+from compd.simulation.truth.workspace import draw_points_mm
 from tests.scoreboard.cases import CONSTANT_CAUSES
 from tests.support.hidden_run import hidden_run, parse_output
-from tests.support.hidden_visits import check_visits, survey_visits
+from tests.support.hidden_visits import visits_to
 from tests.support.simulated import run_directory
 from tests.system.test_hidden_effect import FALLS_SHORT, LEFT_OUT, NOT_LIVE, PLAIN_FLOORS
 from tests.system.test_hidden_effect_any_machine import CHECKS, MACHINES, SPEEDUP, TIMEOUT_S, VISITS, Machine, written
@@ -47,17 +49,23 @@ def test_what_a_number_hides_is_found_and_the_live_error_falls(kind: str) -> Non
         links = "123456" if KINDS[kind].legs != "three" else "123"
         places = (*(f"link_{i}" for i in links), *THERMOMETERS[3:])
         path = written(directory, Machine(kind, {}, places, ()))
-        number = plain_number(kind, load(path))
+        configuration = load(path)
+        number = plain_number(kind, configuration)
+        mechanism = Mechanism(configuration.geometry)
+        survey_mm, check_mm = (
+            draw_points_mm(mechanism, np.random.default_rng(seed), count // 2)
+            for seed, count in ((2, VISITS), (3, CHECKS))
+        )
         hide = ("--seed", "1", "--speedup", SPEEDUP, "--hidden", str(number))
         with hidden_run(directory, *hide, configuration=path) as run:
-            recording, before_um = run.survey(survey_visits(2, VISITS, heaters=False), "survey")
+            recording, before_um = run.survey(visits_to(survey_mm, 2), "survey")
             own = ("--machine", str(run.configuration))
             verdict = parse_output(run.compd("diagnose", recording, "--json", *own))
             model = run.directory / "model.yaml"
             for step in verdict["steps"]:
                 run.compd("effect", "add", step["effect"], "--recording", recording, "--model", model, *own)
             run.compd("adopt", model, "--daemon", run.socket)
-            after_um = run.tip_error_um(check_visits(3, CHECKS, heaters=False))
+            after_um = run.tip_error_um(visits_to(check_mm, 3))
             (answer,) = run.directory.glob("**/*answer.json")
             (hidden,) = json.loads(answer.read_text(encoding="utf-8"))["answers"]
     named = {other for step in verdict["steps"] for other in (step["effect"], *step["rivals"])}
