@@ -52,9 +52,11 @@ def test_what_a_number_hides_is_found_and_the_live_error_falls(kind: str) -> Non
         configuration = load(path)
         number = plain_number(kind, configuration)
         mechanism = Mechanism(configuration.geometry)
+        # `compd join` needs the more places to find the clocks, the more scales there are
+        visits = VISITS * (mechanism.scales - 1) // 2
         survey_mm, check_mm = (
             draw_points_mm(mechanism, np.random.default_rng(seed), count // 2)
-            for seed, count in ((2, VISITS), (3, CHECKS))
+            for seed, count in ((2, visits), (3, CHECKS))
         )
         hide = ("--seed", "1", "--speedup", SPEEDUP, "--hidden", str(number))
         with hidden_run(directory, *hide, configuration=path) as run:
