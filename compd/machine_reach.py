@@ -61,7 +61,7 @@ class MachineReach(NamedTuple):
 
 
 def machine_reach(model: MachineModel, stroke_mm: tuple[float, float] | None = None) -> MachineReach:
-    """From machine zero along each coordinate that a target fixes, both ways, in small steps.
+    """From machine zero along each coordinate that a target fixes, both ways, in steps of a sixtieth of a rod.
 
     stroke_mm : shortest and longest length of an extending link, or None.
     """
@@ -169,9 +169,10 @@ def reach_lines(reach: MachineReach) -> list[str]:
     for name in reach.fixes:
         up, down = (next(way for way in reach.ways if (way.coordinate, way.sign) == (name, sign)) for sign in (1, -1))
         parts.append(f"{name} {_amount(down)} to {_amount(up)}")
-    lines.append(f"From machine zero, along one coordinate at a time, it reaches {', '.join(parts)}.")
+    stated = "" if any(way.ends == "stroke" for way in reach.ways) else "; no stroke ends a way"
+    lines.append(f"From machine zero, along one coordinate at a time, it reaches {', '.join(parts)}{stated}.")
     nearest = reach.nearest_singularity
-    where = "none within twice the longest link"
+    where = "none is met before the ways end"
     if nearest is not None:
         where = f"at {nearest.coordinate} {_amount(nearest)}"
     lines.append(
@@ -182,6 +183,7 @@ def reach_lines(reach: MachineReach) -> list[str]:
 
 
 def _amount(way: Way) -> str:
+    beyond = "" if way.ends else " or more"
     if way.coordinate in "abc":
-        return f"{np.rad2deg(way.sign * way.reach):+.0f} deg"
-    return f"{way.sign * way.reach:+.0f} mm"
+        return f"{np.rad2deg(way.sign * way.reach):+.0f} deg{beyond}"
+    return f"{way.sign * way.reach:+.0f} mm{beyond}"

@@ -120,10 +120,11 @@ def shown_directions(
     By the singular values of the place's columns, less what the frame's columns explain.
     nominal_M_P : (N, 3, A), of attitudes those of their axes that are not held.  rows : (N,) those that count.
     """
+    axes = nominal_M_P.shape[2]
+    if not (axes and rows.any()):
+        return np.zeros((axes, 0))
     frame = registration_columns(tip_M_mm, (0, 1, 2), tip_M_mm[rows])[rows].reshape(3 * int(rows.sum()), -1)
-    place = nominal_M_P[rows].reshape(-1, nominal_M_P.shape[2])
-    if not place.size:
-        return np.zeros((place.shape[1], 0))
+    place = nominal_M_P[rows].reshape(-1, axes)
     explained, *_ = np.linalg.lstsq(frame, place, rcond=None)
     _, sizes, directions = np.linalg.svd(place - frame @ explained, full_matrices=False)
     shown: FloatArray = directions[sizes / np.sqrt(len(place)) >= criteria.min_target_motion].T
