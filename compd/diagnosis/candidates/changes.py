@@ -26,6 +26,8 @@ def moments_s(aligned: AlignedRecording, criteria: CandidateCriteria = Candidate
     time_s = aligned.rows.time_s
     starts = time_s[aligned.rows.session_start][1:]
     starts = starts[:: max(1, -(-len(starts) // criteria.max_session_starts))]
+    if not aligned.in_order:
+        return []
     quantiles = np.quantile(time_s, np.linspace(0, 1, criteria.moments + 2)[1:-1])
     return sorted({*starts.tolist(), *quantiles.tolist()})
 

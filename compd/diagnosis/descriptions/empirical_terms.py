@@ -200,7 +200,7 @@ def empirical_terms(
     for covariate in search_covariates(aligned, rows):
         yield from _terms_of(covariate, ports, grid_of, timed=timed, known=aligned.model is not None)
     time = SearchCovariate("time_s", "other", aligned.rows.time_s[rows])
-    grids = {"step": step_times_s(time.values, criteria)}
+    grids = {"step": step_times_s(time.values, criteria)} if aligned.in_order else {}
     if timed:
         grids |= {"linear": (), "periodic": grid_of("periodic", time)}
     for form, grid in grids.items():
