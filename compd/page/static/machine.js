@@ -73,7 +73,7 @@ export class Machine {
   draw() {
     const { context, width, height } = prepared(this.canvas);
     this.parts = [];
-    if (!this.scene) {
+    if (!this.scene || !this.machine?.mechanism) {
       context.fillStyle = ink("--soft");
       context.font = "13px system-ui";
       const own = this.machine && !this.machine.mechanism;

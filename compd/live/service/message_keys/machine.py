@@ -60,8 +60,8 @@ class MachineKeys(SentMessage):
     )
     mechanism: dict[str, Any] | None = Field(
         default=None,
-        description="`actuators`, `rods`, `hinges` and `target_fixes` of the machine, also where `geometry` has the keys "
-        "of `kinematics`; absent with own kinematics",
+        description="`actuators`, `rods`, `hinges` and `target_fixes` of the machine, also where `geometry` has the "
+        "keys of `kinematics`; absent with own kinematics",
     )
     limits: MachineLimitKeys = Field(description="what a correction may be")
     loop: MachineLoopKeys = Field(description="how the loop runs")
