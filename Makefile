@@ -65,7 +65,8 @@ demo-linuxcnc: $(STAMP)
 
 # A hidden cause is found on wires, in real time: two minutes each, so they have a target of their own. Each takes a
 # third of a processor: four at a time leave two processors enough for everything to be in time.
-HIDDEN := tests/system/test_tutorial.py tests/system/test_hidden_effect.py tests/system/test_hidden_effect_any_machine.py
+HIDDEN := tests/system/test_tutorial.py tests/system/test_hidden_effect.py \
+	tests/system/test_hidden_effect_any_machine.py tests/system/test_hidden_effect_of_kinds.py
 SIDE_BY_SIDE ?= 4
 # Likewise the commands of the documentation's pages and the examples of CONTRIBUTING.md.
 DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py

@@ -251,16 +251,16 @@ def _no_such_link(sections: Sections, kind: str, links: int) -> Iterator[Problem
 
 
 def _scale_problems(sections: Sections, count: int) -> Iterator[Problem]:
-    """Each actuator has one scale; where it extends one rod, its number is that of the link."""
+    """Each actuator has one scale, or none has one; where it extends one rod, its number is that of the link."""
     yield from _no_such_link(sections, "scale", count)
     scales = Counter(wire.link for _, wire in _entries(sections.wiring, "scale"))
-    least = 1 if _is_whole(sections.wiring, "scale", "link") else 0
+    least = 1 if scales and _is_whole(sections.wiring, "scale", "link") else 0
     for link in range(1, count + 1):
         if not least <= scales[link] <= 1:
             yield Problem(
                 where=sections.document.where(("wiring", "scale")),
                 what=f"link {link} has {scales[link]} scales",
-                allowed=f"links 1..{count}, each exactly one",
+                allowed=f"links 1..{count}, each exactly one; or none of them",
             )
 
 

@@ -64,6 +64,7 @@ from compd.live.system import changed_ports, port_names
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.model import MachineModel
 from compd.model.external import ExternalModel
+from compd.not_measured import not_measured
 from compd.release import __version__
 
 _log = structlog.get_logger()
@@ -186,6 +187,7 @@ class Daemon:
             "machine": configuration.machine,
             "config_hash": configuration.config_hash,
             "links": configuration.geometry.links,
+            "not_measured": not_measured(configuration),
             "computed_by": dict(kernel_versions()),
         }
         report = StatusReport(

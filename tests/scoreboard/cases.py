@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from compd.machine_kinds import KINDS
 from compd.simulation.causes.catalogue import CAUSES, shuffle_causes
 
 # Sizes of the tip's error in units of the reference's noise.
@@ -38,6 +39,10 @@ THERMOMETERS: Mapping[str, str] = {
     "frame_rod_expansion": "temperature_frame_degC",
     "plate_bending": r"temperature_plate_(top|bottom)_degC",
 }
+# The family of machines as `compd machine new` writes them, without comparators.
+KINDS_FAMILY = "kinds"
+# Causes outside the library that only a machine with rails or cranks can have.
+OF_ACTUATORS = ("rail_direction", "crank_radius")
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,11 @@ class Case:
     causes: tuple[str, ...]
     floors: tuple[float, ...]
     seed: int
+
+    @property
+    def kind(self) -> str:
+        """The kind of machine, of the family of kinds: one after the other as the seeds go."""
+        return tuple(KINDS)[self.seed % len(KINDS)]
 
     @property
     def name(self) -> str:
@@ -125,11 +135,20 @@ def _varying() -> list[str]:
 
 
 def _outside() -> list[str]:
-    return [name for name, cause in CAUSES.items() if not cause.in_library]
+    return [name for name, cause in CAUSES.items() if not cause.in_library and name not in OF_ACTUATORS]
 
 
 def _on_every_machine() -> list[str]:
     return [name for name in _library() if name != "revolute_axis_tilt"]
+
+
+def _without_comparators() -> list[str]:
+    """Causes that every kind of machine has, with neither joint nor frame comparators."""
+    return [
+        name
+        for name in _on_every_machine()
+        if not CAUSES[name].acts_on_frame and not CAUSES[name].acts_on_joint_comparators
+    ]
 
 
 def _counts(prepared: int, full: int) -> dict[str, int]:
@@ -214,6 +233,13 @@ FAMILIES: Mapping[str, Family] = {
         ),
         Family("shifted", "a constant on all rows besides", 95, _random("shifted", _varying), _counts(8, 40)),
         Family("drift", "noise that wanders, and no cause", 95, _nothing("drift"), _counts(8, 40)),
+        Family(
+            KINDS_FAMILY,
+            "the eight kinds of machine, with scales and thermometers and no comparator",
+            90,
+            _random(KINDS_FAMILY, _without_comparators),
+            _counts(16, 64),
+        ),
     )
 }
 

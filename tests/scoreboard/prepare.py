@@ -12,6 +12,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration, load, shipped_configuration
+from compd.machine_kinds import KINDS, Dimensions, machine_text
 from compd.recording import sidecar_contents, write_recording
 from compd.simulation import FULLY_MEASURED, TRACKER, AirAtZero, Cause, CauseSizer, Mechanism, build_cause, seen_by
 from compd.simulation.campaign.campaign import Campaign
@@ -20,7 +21,7 @@ from compd.simulation.campaign.simulated_recording import OUTLIER_SHARE
 from compd.simulation.causes.hidden_cause import HiddenCause, answer
 from compd.simulation.causes.sudden_change import NoCause, SuddenChange
 from tests.scoreboard import recording_faults as faults
-from tests.scoreboard.cases import THERMOMETERS, Case
+from tests.scoreboard.cases import KINDS_FAMILY, THERMOMETERS, Case
 from tests.scoreboard.expectation import expectation
 
 SHORT_ROWS = 90
@@ -31,6 +32,8 @@ PERIOD_MM = (0.7, 6.0)
 PLAY_BEFORE = 0.4
 # Part of the visits between which a change lies.
 CHANGE_WITHIN = (0.25, 0.75)
+# Dimensions of a machine of a kind, over the usual ones.
+DIMENSION_SHARES = (0.9, 1.1)
 RECORDINGS = ("train", "other")
 # Temperatures of machine and room when machine zero is taken: of a cold hall, a laboratory, two shops in summer.
 ZERO_degC = (15.0, 20.0, 23.0, 27.0)
@@ -94,12 +97,23 @@ def prepare(case: Case, campaigns: Path) -> Path:
 
 def _configuration(case: Case, directory: Path) -> Configuration:
     """The machine's configuration, the shipped one or the case's own."""
+    if case.family == KINDS_FAMILY:
+        path = directory / "machine.yaml"
+        path.write_text(machine_text(case.kind, case.kind, _dimensions(case)), encoding="utf-8")
+        return load(path)
     if case.family != "period":
         return load(shipped_configuration("hexapod.yaml" if case.family == "hexapod" else "tripod-cmm.yaml"))
     text = shipped_configuration("tripod-cmm.yaml").read_text(encoding="utf-8")
     path = directory / "machine.yaml"
     path.write_text(re.sub(r"(?m)^ *scale_signal_period_mm:.*\n", "", text), encoding="utf-8")
     return load(path)
+
+
+def _dimensions(case: Case) -> Dimensions:
+    """Of a machine like the usual one of its kind, and of no other size by much."""
+    usual = KINDS[case.kind].usual
+    shares = case.rng("dimensions").uniform(*DIMENSION_SHARES, len(usual)).tolist()
+    return Dimensions(*(round(value * share, 1) for value, share in zip(usual, shares, strict=True)))
 
 
 def _period_mm(case: Case) -> float:

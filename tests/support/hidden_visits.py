@@ -29,7 +29,7 @@ HEATERS_W = {
 
 
 class Visit(NamedTuple):
-    """scale_mm, force_M_N: three each. heat: what the simulated machine's HEAT takes; None: as it was."""
+    """scale_mm: one each. force_M_N: three. heat: what the simulated machine's HEAT takes; None: as it was."""
 
     scale_mm: list[float]
     force_M_N: list[float]
@@ -50,6 +50,11 @@ def check_visits(seed: int, count: int, *, heaters: bool) -> list[Visit]:
     return list(_visits(rng.uniform(-REACH_MM, REACH_MM, ((count + 1) // 2, 3)), count, rng, heaters))
 
 
+def visits_to(points_mm: NDArray[np.float64], seed: int) -> list[Visit]:
+    """Two visits to each of these points (k, m), without heaters."""
+    return list(_visits(points_mm, 2 * len(points_mm), np.random.default_rng(seed), False))
+
+
 def _visits(points: NDArray[np.float64], count: int, rng: np.random.Generator, heaters: bool) -> Iterator[Visit]:
     """Visits to the points, in an order with short ways, each followed by one a short way off."""
     heat = None
@@ -59,7 +64,7 @@ def _visits(points: NDArray[np.float64], count: int, rng: np.random.Generator, h
             heat = _heat(rng)
         point = points[number // 2]
         if number % 2:
-            way = rng.uniform(*SHORT_WAY_MM, 3) * rng.choice([-1.0, 1.0], 3)
+            way = rng.uniform(*SHORT_WAY_MM, len(point)) * rng.choice([-1.0, 1.0], len(point))
             point = np.where(np.abs(point + way) <= REACH_MM, point + way, point - way)
         loaded = rng.uniform() < LOADED_SHARE
         force_M_N = rng.uniform(LOAD_LOW_N, LOAD_HIGH_N).tolist() if loaded else [0.0] * 3

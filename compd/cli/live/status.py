@@ -35,4 +35,6 @@ def status(
         typer.echo(found.text)
         for gauge in found.gauges:
             typer.echo(f"    {gauge}")
+        for clause in found.status.get("not_measured") or ():
+            typer.echo(f"    not measured: {clause}")
     raise typer.Exit(int(found.health))

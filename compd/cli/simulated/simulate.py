@@ -144,8 +144,10 @@ def _hidden(configuration: Configuration, seed: int, numbers: Sequence[int], tex
     """The causes to be hidden: drawn from numbers, or stated."""
     from compd.simulation import CauseSizer, draw_hidden, parse_hidden
 
-    sizer = CauseSizer(configuration.geometry, configuration.wiring, seed)
-    return [sizer.size(cause) for cause in (*(draw_hidden(n, sizer.mechanism) for n in numbers), *parse_hidden(texts))]
+    wiring = configuration.wiring
+    sizer = CauseSizer(configuration.geometry, wiring, seed)
+    drawn = [draw_hidden(number, sizer.mechanism, wiring) for number in numbers]
+    return [sizer.size(cause) for cause in (*drawn, *parse_hidden(texts))]
 
 
 def _lines(simulation: Simulation) -> Table:

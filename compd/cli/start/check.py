@@ -44,6 +44,7 @@ def check(
     from compd.cli.problems import print_problems
     from compd.errors import ConfigurationError
     from compd.machine_check import examine_whole
+    from compd.not_measured import not_measured
 
     examined = examine_whole(config)
     configuration = examined.configuration
@@ -52,6 +53,8 @@ def check(
         raise ConfigurationError(examined.problems)
     if what_cannot_be_seen:
         print_blind_spots(configuration)
+        for clause in not_measured(configuration):
+            typer.echo(f"Not measured: {clause}.")
         return
     warnings = [
         *configuration.warnings,
@@ -64,8 +67,8 @@ def check(
     if configuration.external is None:
         print_reach(configuration)
     wiring = configuration.wiring
-    if not wiring.frame and configuration.external is None:
-        typer.echo(f"Not measured: the frame, which is taken to stand still; {_frame_drift(wiring.frame_drift_um)}.")
+    for clause in not_measured(configuration):
+        typer.echo(f"Not measured: {clause}.")
     own_process = configuration.acquisition.own_process
     processes = f" (polled in processes of their own: {', '.join(own_process)})" if own_process else ""
     typer.echo(
@@ -75,13 +78,6 @@ def check(
         f"{len(configuration.gauges)} gauges on {len(configuration.lines)} lines{processes}; "
         f"hash {configuration.config_hash}"
     )
-
-
-def _frame_drift(drift_um: float | None) -> str:
-    """What a frame that is not measured does to the tip's uncertainty."""
-    if drift_um is None:
-        return "the tip's uncertainty is unknown until `wiring: frame_drift_um` states how far that moves the tip"
-    return f"by that the tip is uncertain by {drift_um:g} um along each axis"
 
 
 def print_zero(configuration: Configuration) -> None:

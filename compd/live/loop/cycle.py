@@ -14,7 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation import Compensation, GaugeValues, WarmStart, compensate_cmm, external_as_applied
+from compd.compensation import (
+    Compensation,
+    GaugeValues,
+    WarmStart,
+    command_pose,
+    compensate_cmm,
+    external_as_applied,
+)
 from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_readings import judge_scales, read_comparators, read_scales
@@ -40,6 +47,7 @@ from compd.model.external import ExternalModel, OwnKinematicsError
 from compd.model.kernels import Reason
 from compd.setpoint_states import Mode, State
 
+NO_SCALES = "there are no scales: what a TARGET commands is corrected, and there is none"
 TARGET_TOO_OLD = (
     "the controller's target is too old (sockets.target.valid_for_s): it sends one again, or its role ends by "
     "`compd release`"
@@ -92,6 +100,8 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
         mode, target_until_s = Mode.MACHINE_TOOL, inputs.target.valid_until_s
     if now_s > target_until_s:
         outcome, next_state = _Outcome(State.STOP, TARGET_TOO_OLD), state
+    elif inputs.target is None and settings.commands_pose:
+        outcome, next_state = _Outcome(State.REFUSED, NO_SCALES), state
     else:
         try:
             outcome, next_state = _compute(state, inputs, models, settings)
@@ -160,7 +170,7 @@ def _compute(
     )
     machine = applied.machine if usable.weight == 1.0 else applied.machine.with_effect_weight(usable.weight)
     started = state.warm_start
-    compensation, warm_start = compensate(machine, values, target, started)
+    compensation, warm_start, at_scale_mm = _compensated(machine, values, target, started, settings)
     scales_seen = state.scales_seen or target is None
     if code := int(compensation.reason):
         # a warm start that failed once may fail for ever: the next cycle starts from machine zero
@@ -181,7 +191,7 @@ def _compute(
             at_target(machine, target),
             noise_now(settings.noise, wires, snapshot, usable.beyond),
             values,
-            compensation.scale_setpoint_mm,
+            at_scale_mm,
             warm_start.effects,
         ),
         state.tip_noise_um,
@@ -237,6 +247,17 @@ def _compute(
         ),
         next_state,
     )
+
+
+def _compensated(
+    machine: MachineModel, values: GaugeValues, target: Target | None, started: WarmStart, settings: CycleSettings
+) -> tuple[Compensation, WarmStart, FloatArray]:
+    """The compensation, without scales that of the pose; the next warm start; and where the scales (m) are then."""
+    compensation, warm_start = compensate(machine, values, target, started)
+    at_scale_mm = compensation.scale_setpoint_mm
+    if settings.commands_pose and int(compensation.reason) == 0:
+        compensation = command_pose(machine, compensation)
+    return compensation, warm_start, at_scale_mm
 
 
 def _limited(compensation: Compensation, state: CycleState, settings: CycleSettings) -> LimitedCorrection:

@@ -131,6 +131,11 @@ class CycleSettings:
         return isinstance(self.model, ExternalModel)
 
     @cached_property
+    def commands_pose(self) -> bool:
+        """Whether the pose to command follows from the drawing, for a controller whose machine has no scales."""
+        return self.corrects_pose and not self.has_own_pose
+
+    @cached_property
     def period_s(self) -> float:
         """Seconds from tick to tick."""
         return 1.0 / self.loop.rate_hz

@@ -144,6 +144,8 @@ def tip_uncertainty(
         time_s=float(values.time_s),
         effects=effects,
     )
+    if not len(noise.scale_mm):  # a machine without scales: what its controller drives is taken to be reached
+        derivatives = derivatives._replace(by_gauge=derivatives.by_gauge[:, machine.scales :])
     by_gauge_mm = derivatives.by_gauge * _lengths_mm(noise)
     variance = (by_gauge_mm * by_gauge_mm).sum(axis=1) + (derivatives.by_quantity**2).sum(axis=1)
     covariance = by_gauge_mm @ by_gauge_mm.T + derivatives.by_quantity @ derivatives.by_quantity.T

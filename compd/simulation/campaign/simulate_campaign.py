@@ -112,6 +112,7 @@ def simulate_campaign(
     (608, 608)
     """
     path = written_path(Path(out))
+    _check_apart(path, machine)
     configuration = load_machine(machine)
     mechanism = Mechanism(configuration.geometry)
     if plan is not None and reference in ("ball_plate", *FIXED):
@@ -129,7 +130,7 @@ def simulate_campaign(
     planned = () if plan is None else read_plan(Path(plan), mechanism)
     causes = parse_hidden(effects)
     if hidden is not None:
-        causes.append(draw_hidden(hidden, mechanism))
+        causes.append(draw_hidden(hidden, mechanism, configuration.wiring))
     plate = path.with_name(f"{path.stem}.plate.csv")
     recorded = simulate_recording(
         configuration, seed, causes, reference, plate.name, other_days, planned, AirAtZero(zero_degC)
@@ -142,3 +143,17 @@ def simulate_campaign(
     rows = len(recorded.columns["time_s"])
     unmeasured = sum(map(math.isnan, recorded.columns[min(recorded.reference_columns)])) if planned else 0
     return CampaignFiles(path, answer, rows, len(recorded.columns), rows - unmeasured, len(planned))
+
+
+def _check_apart(path: Path, machine: Machine) -> None:
+    """Raise CompdError if the recording's sidecar would replace the machine's own configuration."""
+    sidecar = path.with_suffix(".yaml")
+    if isinstance(machine, str | Path) and sidecar.resolve() == Path(machine).resolve():
+        raise CompdError(
+            Problem(
+                where=str(path),
+                what="its sidecar would replace the machine's configuration",
+                value=str(sidecar),
+                next_step="give the recording another name or place",
+            )
+        )

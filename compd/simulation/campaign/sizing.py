@@ -75,7 +75,7 @@ class CauseSizer:
 
     def weak_disturbances(self, besides: Sequence[str]) -> list[Cause]:
         """WEAK_CAUSES causes other than `besides`, each too weak to be found by a diagnosis."""
-        others = [name for name in possible_causes(self.mechanism) if name not in besides]
+        others = [name for name in possible_causes(self.mechanism, self._wiring) if name not in besides]
         causes = []
         for name in shuffle_causes(others, self._seed, "weak")[:WEAK_CAUSES]:
             largest = CAUSES[name].max_strength

@@ -13,20 +13,29 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from compd.simulation.causes import comparators, joints, link, outside_library, reference, scale, tool
+from compd.operation_settings import Wiring
+from compd.simulation.causes import actuators, comparators, joints, link, outside_library, reference, scale, tool
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism
 
 CAUSES: Mapping[str, type[Cause]] = {
     cause.id: cause
-    for module in (scale, comparators, link, joints, tool, reference, outside_library)
+    for module in (scale, comparators, link, joints, tool, reference, outside_library, actuators)
     for cause in module.CAUSES
 }
 
 
-def possible_causes(mechanism: Mechanism) -> list[str]:
-    """Ids of the causes that this machine can have."""
-    return [name for name, cause in CAUSES.items() if cause.applies_to(mechanism)]
+def possible_causes(mechanism: Mechanism, wiring: Wiring | None = None) -> list[str]:
+    """Ids of the causes that this machine can have.
+
+    wiring : tells whether there are joint comparators; left out: there are.
+    """
+    unwired = wiring is not None and not wiring.joint
+    return [
+        name
+        for name, cause in CAUSES.items()
+        if cause.applies_to(mechanism) and not (unwired and cause.acts_on_joint_comparators)
+    ]
 
 
 def build_cause(name: str, strength: float, mechanism: Mechanism, seed: int) -> Cause:

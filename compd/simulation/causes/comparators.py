@@ -27,6 +27,7 @@ class JointComparatorGain(Cause):
     id = "joint_comparator_gain"
     unit = "1"
     max_strength = 0.2
+    acts_on_joint_comparators = True
     signed = True
 
     def joint_reading_mm(self, joint_mm: FloatArray) -> FloatArray:
@@ -42,6 +43,7 @@ class JointComparatorDrift(Cause):
     id = "joint_comparator_drift"
     unit = "um/K"
     max_strength = 0.5
+    acts_on_joint_comparators = True
     signed = True
 
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from compd.errors import CompdError, Problem
 from compd.files import write_files
+from compd.operation_settings import Wiring
 from compd.simulation.causes.catalogue import CAUSES, possible_causes, shuffle_causes
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.mechanism import Mechanism
@@ -65,14 +66,16 @@ def parse_hidden(texts: Sequence[str]) -> list[HiddenCause]:
     return hidden
 
 
-def draw_hidden(seed: int, mechanism: Mechanism) -> HiddenCause:
+def draw_hidden(seed: int, mechanism: Mechanism, wiring: Wiring | None = None) -> HiddenCause:
     """Cause and size that follow from `seed` alone, among the causes that this machine can have.
+
+    wiring : as in `possible_causes`.
 
     With one cause more in the catalogue, the draw is the same for every seed by which the new one is not drawn.
     """
     rng = np.random.default_rng([seed, 0x5EA1])
     outside = rng.uniform() < OUTSIDE_SHARE
-    names = [name for name in possible_causes(mechanism) if CAUSES[name].in_library != outside]
+    names = [name for name in possible_causes(mechanism, wiring) if CAUSES[name].in_library != outside]
     first, *_ = shuffle_causes(names, seed, "hidden")
     return HiddenCause(first, None, float(rng.uniform(MIN_FLOORS, MAX_FLOORS)))
 

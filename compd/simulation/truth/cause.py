@@ -78,6 +78,7 @@ class Cause:
         by which the cause can be described.
     only_in_motion : no effect while the machine is at rest.
     acts_on_frame : it acts on the plate, or on what measures the frame, which a machine may not have.
+    acts_on_joint_comparators : it acts on them alone, which a machine may not have.
 
     Attributes
     ----------
@@ -86,6 +87,7 @@ class Cause:
     """
 
     acts_on_frame: ClassVar[bool] = False
+    acts_on_joint_comparators: ClassVar[bool] = False
     id: ClassVar[str]
     unit: ClassVar[str]
     max_strength: ClassVar[float]

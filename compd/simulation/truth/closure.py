@@ -72,10 +72,18 @@ class Closure:
 
         link_of_axis : (r,), from 0.
         """
-        # an axis of the base moves with nothing: its row is 0, and it is added in {M}
+        # an axis of the base does not move with the platform: its row is 0, and it is added in {M}
         self._axes = direction_rows(np.where(on_base[:, None], 0.0, axes))
         self._fixed_M: FloatArray = np.where(on_base[:, None], axes, 0.0)
         self._link = link_of_axis
+        self._given = axes, on_base
+
+    def with_base_turned(self, turn: FloatArray) -> Closure:
+        """The closure with the base's revolute axes turned by a matrix (3, 3) in {M}."""
+        axes, on_base = self._given
+        if not on_base.any():
+            return self
+        return Closure(np.where(on_base[:, None], axes @ turn.T, axes), self._link, on_base)
 
     def by_lengths(self, base_M: FloatArray, joints_P: FloatArray, lengths_mm: FloatArray, guess: Posture) -> Posture:
         """The posture in which the links have these lengths.

@@ -65,7 +65,7 @@ class Equilibrium:
             axes_P = cause.tilted_axes_P(axes_P)
         self._closure = Closure(axes_P, mechanism.link_of_axis, mechanism.hinge_on_base)
         self._axial0_N, self._lateral0_M = self._forces(
-            mechanism.posture0, mechanism.joints0_M, mechanism.joints_P, np.zeros(3)
+            self._closure, mechanism.posture0, mechanism.joints0_M, mechanism.joints_P, np.zeros(3)
         )
 
     def solve(self, scale_mm: FloatArray, guess: Posture, force_M_N: FloatArray) -> EquilibriumState:
@@ -86,9 +86,10 @@ class Equilibrium:
 
         supports_M = self._frame.supports_M(warm, np.zeros((3, 3)))
         base_M = machine.base_joints_M(supports_M, stretch, scale_mm)
-        posture = self._closure.by_lengths(base_M, joints_P, lengths_mm, guess)
+        closure = self._closure.with_base_turned(machine.base_turn(supports_M))
+        posture = closure.by_lengths(base_M, joints_P, lengths_mm, guess)
         platform_M = homogeneous(joints_P) @ posture
-        total_N, total_lateral_M = self._forces(posture, base_M, joints_P, force_M_N)
+        total_N, total_lateral_M = self._forces(closure, posture, base_M, joints_P, force_M_N)
         axial_N, lateral_M = total_N - self._axial0_N, total_lateral_M - self._lateral0_M
 
         pull_M = np.zeros((3, 3))
@@ -119,7 +120,8 @@ class Equilibrium:
             + _sum((cause.link_extension_mm(inputs) for cause in causes), machine.links)
             + machine.extensions(beyond_mm)
         )
-        posture = self._closure.by_lengths(
+        closure = self._closure.with_base_turned(machine.base_turn(supports_M))
+        posture = closure.by_lengths(
             machine.base_joints_M(supports_M, stretch, scale_mm + beyond_mm)
             + balls.base_across_M
             + _sum((cause.base_shift_M(inputs) for cause in causes), machine.links, 3),
@@ -156,14 +158,14 @@ class Equilibrium:
         return tip_M, posture[1:] @ (tip_M - posture[0])
 
     def _forces(
-        self, posture: Posture, base_M: FloatArray, joints_P: FloatArray, force_M_N: FloatArray
+        self, closure: Closure, posture: Posture, base_M: FloatArray, joints_P: FloatArray, force_M_N: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         machine = self._mechanism
         tip_P = machine.tip0_P
         if machine.tip_frame == "P":
             tip_P = posture[1:] @ (machine.tip0_M - posture[0])
         loads = [(machine.weight_M, machine.weight_at_P), (force_M_N, tip_P)]
-        return self._closure.forces(posture, base_M, joints_P, loads)
+        return closure.forces(posture, base_M, joints_P, loads)
 
 
 def _sum(displacements: Iterable[FloatArray | float], *shape: int) -> FloatArray:

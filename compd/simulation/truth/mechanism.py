@@ -139,17 +139,35 @@ class Mechanism:
 
         stretch : relative growth of the offsets.  scale_mm : (m,), where the actuators are.
         """
-        z_M = np.cross(supports_M[1] - supports_M[0], supports_M[2] - supports_M[0])
-        y_M = supports_M[0] - supports_M.mean(axis=0)
-        z_M, y_M = z_M / np.linalg.norm(z_M), y_M / np.linalg.norm(y_M)
-        axes = np.array([np.cross(y_M, z_M), y_M, z_M])
-        if not self.has_frame:
-            axes = self.rotation_M_B0.T
+        axes = self._base_axes(supports_M)
         joints_M: FloatArray = supports_M[self.support_of_joint] + (1 + stretch) * self.joint_offsets_B @ axes
         if scale_mm is None or self.extended.all():
             return joints_M
         moved_M: FloatArray = joints_M + self._displacements_B(self._zero_mm + scale_mm) @ axes
         return moved_M
+
+    def base_turn(self, supports_M: FloatArray) -> FloatArray:
+        """(3, 3) matrix in {M} by which a base on these supports is turned since machine zero."""
+        return self._base_axes(supports_M).T @ self._base_axes(self.supports0_M)
+
+    def _base_axes(self, supports_M: FloatArray) -> FloatArray:
+        """(3, 3) the axes of {B} in {M}, as rows."""
+        if not self.has_frame:
+            return np.asarray(self.rotation_M_B0.T)
+        z_M = np.cross(supports_M[1] - supports_M[0], supports_M[2] - supports_M[0])
+        y_M = supports_M[0] - supports_M.mean(axis=0)
+        z_M, y_M = z_M / np.linalg.norm(z_M), y_M / np.linalg.norm(y_M)
+        return np.array([np.cross(y_M, z_M), y_M, z_M])
+
+    def moves_M(self, scale_mm: FloatArray) -> FloatArray:
+        """(n, 3) by how much the actuators have moved the base joints since machine zero; scale_mm : (m,)."""
+        moved_B = self._displacements_B(self._zero_mm + scale_mm) - self._displacements_B(self._zero_mm)
+        return np.where(self.extended[:, None], 0.0, moved_B @ self.rotation_M_B0.T)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """(m,) what each actuator does: extends, slides or turns."""
+        return tuple(way.kind for way in self._ways)
 
     @property
     def turned(self) -> FloatArray:
@@ -189,6 +207,7 @@ class _Way:
     """Where one actuator takes the base joints of its links, in {B}; a turning one counts mm of arc."""
 
     def __init__(self, actuator: Any) -> None:
+        self.kind: str = actuator.kind
         self.extends = actuator.kind == "extends"
         self._radius_mm = getattr(actuator, "radius_mm", 0.0)
         self._cosine_B = np.array(getattr(actuator, "along_B", getattr(actuator, "cosine_B", np.zeros(3))))

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
+from compd.compensation import GaugeValues, WarmStart, command_pose, compensate_cmm, compensate_machine_tool
 from compd.configuration import Geometry
 from compd.machine_builder import build_model
 from compd.model import (
@@ -27,7 +27,7 @@ from compd.model import (
 )
 from compd.model.effect_memory import EffectMemory
 from compd.model.effects import FittedEffect, MachineDetails, Observations, port_size, unmet_needs
-from compd.model.kinematics import Movement, Pose
+from compd.model.kinematics import Movement, Pose, inverse_by_actuators
 from compd.model.library import load_library
 from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix, rotation_vector, to_inner
@@ -261,3 +261,32 @@ def test_the_tip_by_the_scales_from_a_pose_alone(kind: str) -> None:
     pose = Pose(rows.origin_M_mm, rows.rotation_M_P, lengths, *[np.zeros(len(rows))] * 3)
     expected = sensitivities(model, rows, ["scale"])["scale"].tip
     np.testing.assert_allclose(tip_by_scales(model, mechanism, pose, rows.tip_M_mm, scale_mm), expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_scales_the_commanded_pose_makes_the_controller_drive_what_is_wanted(kind: str) -> None:
+    """A controller that knows the drawing alone, told the corrected pose, drives the scales of the compensation."""
+    model = with_effects(machine(kind))
+    case = worked_cases("machines")[kind]["cases"][0]
+    zero_B = model.frame.zero_rotation_M_B
+    target_M, R = np.array(case["tip_mm"]), rotation_matrix(np.array(case["rotation_vector_rad"]))
+    wanted = rotation_vector(zero_B.T @ R) if model.attitude_is_free else None
+    target_B = to_inner(zero_B, model.frame.zero_origin_M_mm, target_M)
+    unknown = values(np.full(model.scales, np.nan), 1.0)
+    scales, _ = compensate_machine_tool(model, target_B, wanted, unknown, WarmStart.at_zero(model))
+    found = command_pose(model, scales)
+    assert found.reason == 0
+    assert found.pose_correction is not None
+    assert np.abs(found.pose_correction[:3]).max() > 1e-4
+    assert len(found.correction_mm) == len(found.scale_setpoint_mm) == 0
+    drive = inverse_by_actuators(
+        model.mechanism(model.base_joints_at_0_M_mm),
+        model.actuators,
+        target_M + zero_B @ found.pose_correction[:3],
+        model.zero.contact.tip_P_mm,
+        rotation_matrix(zero_B @ found.pose_correction[3:]) @ R if model.attitude_is_free else R,
+        model.zero.actuator_mm,
+    )
+    np.testing.assert_allclose(drive.actuator_mm - model.zero.actuator_mm, scales.scale_setpoint_mm, atol=1e-7)
+    total_mm = np.sum([found.contributions[cause] for cause in found.contributions], axis=0)
+    np.testing.assert_allclose(zero_B.T @ total_mm, found.pose_correction[:3], atol=0.03 * np.abs(total_mm).max())

@@ -42,6 +42,27 @@ def test_the_truth_meets_the_worked_cases(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_a_machine_whose_frame_turns_turns_as_a_whole(kind: str) -> None:
+    geometry = geometry_of(worked_cases("machines")[kind])
+    links = int(geometry.links)
+    ring = [(0.0, 300.0, 0.0), (-150 * 3**0.5, -150.0, 0.0), (150 * 3**0.5, -150.0, 0.0)]
+    base = geometry.base.model_copy(
+        update={"supports_B_mm": tuple(ring), "support_of_joint": (1, 2, 3, 1, 2, 3)[:links]}
+    )
+    plate = ((400.0, 0.0, 0.0), (-200.0, 340.0, 0.0), (-200.0, -340.0, 0.0))
+    truth = Mechanism(geometry.model_copy(update={"base": base, "plate_points_M_mm": plate}))
+    turn, shift_mm = rotation_matrix(np.array([2e-4, -3e-4, 1e-4])), np.array([0.02, -0.01, 0.03])
+    supports_M = truth.supports0_M @ turn.T + shift_mm
+    scale_mm = 5.0 * np.random.default_rng(2).uniform(-1, 1, truth.scales)
+    still = posture_at_scales(truth, scale_mm)
+    posture = truth.closure.with_base_turned(truth.base_turn(supports_M)).by_lengths(
+        truth.base_joints_M(supports_M, 0.0, scale_mm), truth.joints_P, truth.lengths_at(scale_mm), still
+    )
+    assert posture[0] == pytest.approx(turn @ still[0] + shift_mm, abs=TOLERANCE_MM)
+    assert posture[1:] == pytest.approx(still[1:] @ turn.T, abs=1e-11)
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_every_cause_that_applies_can_act(kind: str) -> None:
     geometry = geometry_of(worked_cases("machines")[kind])
     wiring = Wiring(scale=(), joint=(), frame=())

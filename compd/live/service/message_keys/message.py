@@ -32,7 +32,11 @@ class VersionKeys(SentMessage):
     release: str = Field(description="version of compd")
     machine: str = Field(description="the machine's name in the configuration")
     config_hash: str = Field(description="hash of the whole configuration, hexadecimal")
-    links: int = Field(description="number of links: 3 or 6")
+    links: int = Field(description="number of links")
+    not_measured: list[str] | None = Field(
+        default=None,
+        description="for people: what no gauge measures, and what is taken in its place; none of daemons up to 0.2.0",
+    )
     computed_by: dict[str, str] | None = Field(
         default=None,
         description="what the last bits of a setpoint follow from, by name: `kernels` (hash of their source), `numba`, "

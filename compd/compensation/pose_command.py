@@ -1,0 +1,54 @@
+"""The pose to command where a machine has no scales: its controller computes links by the drawing, and drives them.
+
+A controller that is told another pose drives other links. The one to tell is where the machine as drawn, on its frame
+at machine zero, is with the actuators as the compensation wants them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.compensation.compensation import compensate_cmm
+from compd.compensation.values import Compensation, Contributions, GaugeValues, WarmStart
+from compd.model import MachineModel, tip_by_scales
+from compd.model.kinematics import Pose
+from compd.rotation import rotation_vector, to_inner
+
+_NO_LENGTHS: FloatArray = np.zeros(0)
+
+
+def command_pose(model: MachineModel, wanted: Compensation) -> Compensation:
+    """The compensation of a target in machine-tool mode, as a correction of the target's pose.
+
+    wanted : of one snapshot. Its scales, which the machine does not have, are left out; `contributions` are those of
+    the commanded tip, to first order.
+    The reason is that of the machine as drawn where it has no such pose.
+    """
+    nowhere, zero = np.zeros(model.joint_weights.shape[1]), model.zero
+    drawn = replace(model, effects=())
+    values = GaugeValues(wanted.scale_setpoint_mm, nowhere, _NO_LENGTHS, {})
+    start = WarmStart.at_zero(drawn)
+    command, _ = compensate_cmm(drawn, values, start)
+    nominal, _ = compensate_cmm(drawn, values._replace(scale_mm=wanted.nominal_scale_mm), start)
+    rotation_M_B = model.frame.zero_rotation_M_B
+    moved_B = to_inner(rotation_M_B, np.zeros(3), command.tip_M_mm - nominal.tip_M_mm)
+    turned_M = rotation_vector(command.rotation_M_P @ nominal.rotation_M_P.T)
+    attitude, solved = command.rotation_M_P[None], np.zeros(1, dtype=np.int64)
+    origin_M_mm = command.tip_M_mm[None] - attitude @ zero.contact.tip_P_mm
+    pose = Pose(origin_M_mm, attitude, command.link_length_mm[None], solved, np.zeros(1), solved)
+    scale_mm = wanted.scale_setpoint_mm[None]
+    mechanism, _ = model.links_on(rotation_M_B, model.base_joints_at_0_M_mm[None], scale_mm)
+    by_scale = tip_by_scales(model, mechanism, pose, command.tip_M_mm[None], scale_mm)[0]
+    contributions = Contributions(wanted.contributions.causes, wanted.contributions.by_cause_mm @ by_scale.T)
+    return wanted._replace(
+        nominal_scale_mm=_NO_LENGTHS,
+        scale_setpoint_mm=_NO_LENGTHS,
+        correction_mm=_NO_LENGTHS,
+        contributions=contributions,
+        rotation_M_rad=rotation_vector(wanted.rotation_M_P),
+        pose_correction=np.concatenate([moved_B, to_inner(rotation_M_B, np.zeros(3), turned_M)]),
+        reason=np.maximum(wanted.reason, command.reason),
+    )
