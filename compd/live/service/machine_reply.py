@@ -16,6 +16,7 @@ def machine_message(configuration: Configuration, wires: MachineWires) -> dict[s
         "machine": configuration.machine,
         "config_hash": configuration.config_hash,
         "geometry": _geometry(configuration),
+        **_mechanism(configuration),
         "limits": configuration.limits.model_dump(mode="json"),
         "loop": configuration.loop.model_dump(mode="json", include={"rate_hz", "stale_after_s", "on_stale", "hold_s"}),
         "wiring": _wiring(configuration, wires),
@@ -28,6 +29,18 @@ def _geometry(configuration: Configuration) -> dict[str, Any]:
     if (external := configuration.external) is not None and external.own_class is not None:
         geometry["kinematics"] = external.own_class[1]
     return geometry
+
+
+def _mechanism(configuration: Configuration) -> dict[str, Any]:
+    """Actuators, rods, hinges and what a target fixes, whichever keys the configuration has; none of own kinematics."""
+    if configuration.external is not None:
+        return {}
+    described = configuration.geometry.mechanism
+    parts = {
+        name: [part.model_dump(mode="json", exclude_none=True) for part in getattr(described, name)]
+        for name in ("actuators", "rods", "hinges")
+    }
+    return {"mechanism": {**parts, "target_fixes": list(described.target_fixes)}}
 
 
 def _wiring(configuration: Configuration, wires: MachineWires) -> list[dict[str, Any]]:

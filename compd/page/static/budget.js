@@ -9,7 +9,10 @@ export class Budget {
     this.scale_um = 1;
   }
 
-  begin() {
+  begin(machine) {
+    // A cause without gauges has no place in the legend: it stays 0.
+    const kinds = new Set(machine.wiring.map(({ kind }) => kind));
+    this.absent = [["joints", "joint"], ["frame", "frame"]].filter(([, kind]) => !kinds.has(kind)).map(([cause]) => cause);
     this.rows = ["x", "y", "z"].map((axis) => {
       const bar = element("div", { class: "bar" });
       const number = element("b");
@@ -58,7 +61,7 @@ export class Budget {
       if (colour) sample.style.background = colour;
       return element("span", {}, sample, text);
     };
-    const entries = causes.map((cause, k) => patch("", cause.replaceAll("_", " "), causeColour(k)));
+    const entries = causes.flatMap((cause, k) => (this.absent.includes(cause) ? [] : [patch("", cause.replaceAll("_", " "), causeColour(k))]));
     if (causes.length) entries.push(patch("sum", "sum"));
     if (bounded) entries.push(patch("whisker", "bound of the tip's error, 95 %"));
     if (shadow) entries.push(patch("shadow", why ? `shadow model, not applied: ${why}` : "shadow model, not applied"));

@@ -18,6 +18,7 @@ export function quantity(name) {
 export function measured(wire) {
   if (wire.name) return quantity(wire.name);
   if (wire.distance) return { measures: `frame ${wire.distance}`, unit: "mm" };
+  if (wire.kind === "scale") return { measures: `scale ${wire.link}`, unit: "mm" };
   return { measures: `${wire.kind} of link ${wire.link}${wire.role ? `, ${wire.role}` : ""}`, unit: "mm" };
 }
 

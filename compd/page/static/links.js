@@ -19,6 +19,8 @@ export class Links {
   }
 
   begin(machine) {
+    // Scales may be fewer than links: an actuator that moves several rods has one correction.
+    this.noun = (machine.mechanism?.actuators ?? []).some(({ kind }) => kind !== "extends") ? "actuator" : "link";
     const count = machine.wiring.filter(({ kind }) => kind === "scale").length;
     this.limit_um = machine.limits.correction_mm * 1000;
     this.times = [];
@@ -38,7 +40,7 @@ export class Links {
     const bar = element("div", { class: "bar" });
     const label = element("div", { class: "number" }, number, sources);
     const row = element("div", { class: "strip", onclick: () => this.select(link + 1) }, label, plot, bar);
-    row.title = `link ${link + 1}`;
+    row.title = `${this.noun} ${link + 1}`;
     plot.style.height = `${heightOf(count)}px`;
     return { row, number, sources, plot, bar };
   }
@@ -125,7 +127,7 @@ export class Links {
     if (!setpoint.valid) {
       this.rows.forEach(({ number, sources, bar }, k) => {
         number.textContent = "–";
-        sources.textContent = `link ${k + 1}\nnot valid`;
+        sources.textContent = `${this.noun} ${k + 1}\nnot valid`;
         bar.replaceChildren();
       });
       return;
@@ -137,7 +139,7 @@ export class Links {
     this.scale.textContent = `Colours: causes, as at the tip. Bars end at ±${this.scale_um} µm; red lines: the limits, ±${this.limit_um.toFixed(0)} µm.`;
     this.rows.forEach(({ number, sources, bar }, k) => {
       number.textContent = signed(setpoint.correction_mm[k] * 1000);
-      sources.textContent = `link ${k + 1}${shadow_um ? `\nshadow ${signed(shadow_um[k])}` : ""}`;
+      sources.textContent = `${this.noun} ${k + 1}${shadow_um ? `\nshadow ${signed(shadow_um[k])}` : ""}`;
       stack(bar, causes.map((links) => links[k] * 1000), this.scale_um);
       if (shadow_um) outline(bar, shadow_um[k], this.scale_um);
     });

@@ -1,5 +1,6 @@
 // The machine in three dimensions on a plain canvas, with the errors drawn many times larger than they are.
 import { ink, prepared, signed } from "./format.js";
+import { actuatorParts, hingeParts } from "./mechanism.js";
 import { Turn } from "./orbit_control.js";
 
 const RODS = { t1: ["supports", 0, "supports", 1], t2: ["supports", 1, "supports", 2], t3: ["supports", 2, "supports", 0], u1: ["supports", 0, "plate", 0], u2: ["supports", 0, "plate", 2], u3: ["supports", 1, "plate", 0], u4: ["supports", 1, "plate", 1], u5: ["supports", 2, "plate", 1], u6: ["supports", 2, "plate", 2] };
@@ -31,7 +32,13 @@ export class Machine {
 
   begin(machine) {
     this.trail = [];
+    this.machine = machine;
     this.frame = Object.fromEntries(machine.wiring.map((wire, k) => [wire.distance, k]).filter(([distance]) => distance));
+  }
+
+  // The number of the actuator that moves a link.
+  actuatorOf(link) {
+    return this.machine?.mechanism?.rods[link - 1]?.actuator ?? link;
   }
 
   // Mark a rod of the frame, or none.
@@ -66,14 +73,17 @@ export class Machine {
   draw() {
     const { context, width, height } = prepared(this.canvas);
     this.parts = [];
-    if (!this.scene) {
+    if (!this.scene || !this.machine?.mechanism) {
       context.fillStyle = ink("--soft");
       context.font = "13px system-ui";
-      context.fillText("no valid setpoint: position of the machine unknown", 12, 24);
+      const own = this.machine && !this.machine.mechanism;
+      context.fillText(own ? "own kinematics: where its parts are is not known" : "no valid setpoint: position of the machine unknown", 12, 24);
       return;
     }
     const { plate, supports, base, platform, tip, supports_moved_um, tip_moved_um } = this.scene;
-    const place = this.turn.projector([...plate, ...supports, ...platform, tip].flat(), width, height);
+    const { mechanism } = this.machine;
+    const actuators = actuatorParts(this.machine, this.scene);
+    const place = this.turn.projector([...plate, ...supports, ...base, ...platform, tip, ...actuators.flatMap(({ points }) => points)].flat(), width, height);
     const ghost = (point, moved_um) => point.map((value, k) => value - (moved_um[k] * this.times) / 1000);
     const line = (points, colour, thick, dash = []) => {
       context.beginPath();
@@ -85,6 +95,7 @@ export class Machine {
       context.setLineDash([]);
     };
     const fill = (points, colour) => {
+      if (!points.length) return;
       context.beginPath();
       points.map(place).forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
       context.closePath();
@@ -92,33 +103,54 @@ export class Machine {
       context.fill();
     };
     fill(plate, "#8c959f33");
-    line([...plate, plate[0]], ink("--soft"), 1);
+    if (plate.length) line([...plate, plate[0]], ink("--soft"), 1);
     const old = { supports: supports.map((point, k) => ghost(point, supports_moved_um[k])), platform: platform.map((point) => ghost(point, tip_moved_um)), tip: ghost(tip, tip_moved_um) };
     const faint = "#8c959f99";
-    line([...old.supports, old.supports[0]], faint, 1, [4, 4]);
+    if (supports.length) line([...old.supports, old.supports[0]], faint, 1, [4, 4]);
     line([...old.platform, old.platform[0]], faint, 1, [4, 4]);
     old.platform.forEach((point) => line([point, old.tip], faint, 1, [4, 4]));
-    for (const [name, [from, i, to, k]] of Object.entries(RODS)) {
+    for (const [name, [from, i, to, k]] of supports.length ? Object.entries(RODS) : []) {
       const um = this.rods_um?.[name];
       const ends = [this.scene[from][i], this.scene[to][k]];
       if (this.rod === name) line(ends, ink("--ink"), 6);
       line(ends, um === null || um === undefined ? "#8c959f55" : diverging(um / this.largest_um), 2);
-      this.parts.push({ ends: ends.map(place), text: `rod ${name}: ${signed(um)} µm since machine zero` });
+      this.parts.push({ ends: ends.map(place), text: `frame ${name}: ${signed(um)} µm since machine zero` });
     }
     fill(supports, "#8c959f22");
     fill(platform, "#009e7355");
     line([...platform, platform[0]], "#009e73", 2);
     platform.forEach((point) => line([point, tip], "#009e73", 1));
-    base.forEach((point, k) => {
-      const ends = [point, platform[k]];
-      if (this.page.selected === k + 1) line(ends, ink("--ink"), 9);
-      line(ends, diverging(this.corrections_um[k] / this.largest_um), 5);
-      this.parts.push({ ends: ends.map(place), text: `link ${k + 1}: correction ${signed(this.corrections_um[k])} µm, ${Math.hypot(...point.map((value, axis) => value - platform[k][axis])).toFixed(3)} mm long` });
-      const [x, y] = place(point);
+    const corrected = (actuator) => diverging(this.corrections_um[actuator] / this.largest_um);
+    const said = (actuator) => `${mechanism.actuators[actuator].kind === "extends" ? "link" : "actuator"} ${actuator + 1}: correction ${signed(this.corrections_um[actuator])} µm`;
+    for (const { actuator, points, dash } of actuators) {
+      if (dash) {
+        line(points, faint, 1, dash);
+        continue;
+      }
+      if (this.page.selected === actuator + 1) line(points, ink("--ink"), 9);
+      line(points, corrected(actuator), 5);
+      this.parts.push({ ends: points.map(place), text: said(actuator) });
+    }
+    const numbered = new Set();
+    mechanism.rods.forEach((rod, k) => {
+      const ends = [base[k], platform[k]];
+      const actuator = rod.actuator - 1;
+      const extending = mechanism.actuators[actuator].kind === "extends";
+      if (extending && this.page.selected === actuator + 1) line(ends, ink("--ink"), 9);
+      line(ends, extending ? corrected(actuator) : ink("--soft"), extending ? 5 : 3);
+      const length = `${Math.hypot(...base[k].map((value, axis) => value - platform[k][axis])).toFixed(3)} mm long`;
+      this.parts.push({ ends: ends.map(place), text: extending ? `${said(actuator)}, ${length}` : `rod ${k + 1} on ${said(actuator)}, ${length}` });
+      if (numbered.has(actuator)) return;
+      numbered.add(actuator);
+      const [x, y] = place(base[k]);
       context.fillStyle = ink("--ink");
       context.font = "bold 12px system-ui";
-      context.fillText(String(k + 1), x + 8, y - 6);
+      context.fillText(String(actuator + 1), x + 8, y - 6);
     });
+    for (const { points, rod } of hingeParts(this.machine, this.scene)) {
+      line(points, "#8a2d7c", 5);
+      this.parts.push({ ends: points.map(place), text: `hinge of rod ${rod}` });
+    }
     line(this.trail.map(([, point]) => point), ink("--line"), 1.5);
     const [x, y] = place(tip);
     context.beginPath();
@@ -151,6 +183,6 @@ export class Machine {
       return Math.hypot(x - ax - along * (bx - ax), y - ay - along * (by - ay));
     };
     const nearest = this.parts.map((part) => ({ part, away: distance(part) })).sort((a, b) => a.away - b.away)[0];
-    document.getElementById("part").textContent = nearest && nearest.away < 12 ? nearest.part.text : "Point at a link or a rod.";
+    document.getElementById("part").textContent = nearest && nearest.away < 12 ? nearest.part.text : "Point at a part of the machine.";
   }
 }

@@ -22,7 +22,7 @@ const links = new Links(at("strips"), page);
 const budget = new Budget(at("budget"));
 const gauges = new Gauges(at("gauge-table"), at("gauges-summary"), {
   accept: (channel) => drawer.ask("accept", channel),
-  select: (wire) => (wire.link ? links.select(wire.link) : machine.select(wire.distance)),
+  select: (wire) => (wire.link ? links.select(wire.kind === "joint" ? machine.actuatorOf(wire.link) : wire.link) : machine.select(wire.distance)),
 });
 const hour = new Hour(at("tape"), at("hour-chart"), at("scrub"), links);
 const parts = [machine, links, budget, gauges];

@@ -58,6 +58,11 @@ class MachineKeys(SentMessage):
     geometry: dict[str, Any] = Field(
         description="the section `geometry` of the configuration, with the same keys; of own kinematics the class alone"
     )
+    mechanism: dict[str, Any] | None = Field(
+        default=None,
+        description="`actuators`, `rods`, `hinges` and `target_fixes` of the machine, also where `geometry` has the "
+        "keys of `kinematics`; absent with own kinematics",
+    )
     limits: MachineLimitKeys = Field(description="what a correction may be")
     loop: MachineLoopKeys = Field(description="how the loop runs")
     wiring: list[WiredChannelKeys] = Field(description="what each channel measures: scales, joints, frame, quantities")
