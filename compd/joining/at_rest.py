@@ -141,7 +141,7 @@ def match_at_rest(
     left_out = dict(assigned.left_out)
     if no_pose:
         left_out["dwells in which the gauges give no pose"] = str(no_pose)
-    number_rows = len(columns["time_s"])
+    number_rows = len(columns["visit"])
     sidecar = joined_sidecar(
         recording, export, instrument, by, number_rows, len(export.line), assigned.rms_mm, assigned.next_best
     )

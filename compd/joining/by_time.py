@@ -179,6 +179,15 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
                 where=str(track.path), what="has no attitude", next_step="leave --sigma-urad out, or export rx, ry, rz"
             )
         )
+    if not recording.has_time:
+        problems.append(
+            Problem(
+                where=str(recording.path),
+                what="has no `time_s` to compare with the instrument's",
+                allowed="a time in each row",
+                next_step="join with --by order, name or distance",
+            )
+        )
     if recording.scale_mm is None:
         problems.append(
             Problem(where=str(recording.path), what="has no scales to compare the instrument's motion with")

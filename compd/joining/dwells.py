@@ -36,7 +36,7 @@ class Dwell:
     ----------
     number : from 1, in the order of time.
     rows : (R,) positions of the rows in the recording.
-    time_s : (2,) of the first and the last of them.
+    time_s : (2,) of the first and the last of them; nan in a recording without `time_s`.
     point : id of the place as the recording has it; "" if it has none.
     """
 
@@ -52,7 +52,8 @@ class Dwell:
 
     def __str__(self) -> str:
         point = f" (point {self.point})" if self.point else ""
-        return f"dwell {self.number}{point} at {self.middle_s:.1f} s"
+        at = "" if np.isnan(self.middle_s) else f" at {self.middle_s:.1f} s"
+        return f"dwell {self.number}{point}{at}"
 
 
 def find_dwells(recording: Recording) -> tuple[Dwell, ...]:
@@ -63,13 +64,17 @@ def find_dwells(recording: Recording) -> tuple[Dwell, ...]:
     or within what its noise can imitate, for MIN_ROWS rows and MIN_S seconds. Rows that a person excluded are in
     no dwell.
 
-    Raises RecordingError if there is none.
+    Raises RecordingError if there is none, or the recording has neither `time_s` nor `point`.
     """
+    if recording.point is None and not recording.has_time:
+        raise RecordingError(_neither_time_nor_point(recording))
     stretches = _stretches_of_points(recording) if recording.point is not None else _still_stretches(recording)
     if not stretches:
         raise RecordingError(_no_dwell(recording))
+    # without `has_time`, `time_s` has numbers of rows
+    time_s = recording.time_s if recording.has_time else np.full(recording.rows, np.nan)
     return tuple(
-        Dwell(number, rows, (float(recording.time_s[rows[0]]), float(recording.time_s[rows[-1]])), point)
+        Dwell(number, rows, (float(time_s[rows[0]]), float(time_s[rows[-1]])), point)
         for number, (rows, point) in enumerate(stretches, start=1)
     )
 
@@ -95,6 +100,15 @@ def dwell_columns(recording: Recording, rows_of: Sequence[IntArray]) -> dict[str
 def _mean(values: FloatArray) -> float:
     known = values[~np.isnan(values)]
     return float(known.mean()) if len(known) else np.nan
+
+
+def _neither_time_nor_point(recording: Recording) -> Problem:
+    return Problem(
+        where=str(recording.path),
+        what="has neither `time_s` nor `point`, so rows at rest cannot be told from rows in motion",
+        allowed="one of the two columns",
+        next_step="where each row is a place at rest, number the places in a column `point`",
+    )
 
 
 def _no_dwell(recording: Recording) -> Problem:

@@ -36,7 +36,8 @@ def joined_columns(
     dwell_of : (G,) number of each point's dwell from 0, -1 for none. visit_of : (G,) the same for repeats,
         rising with the dwell. places_mm : (D, d) expected places.
     A dwell of as many rows as it has points keeps its rows, where the recording says by `point` that they are at rest;
-    in any other the readings are averaged, and the times of several points are spread over the dwell.
+    in any other the readings are averaged, and the times of several points are spread over the dwell. A recording
+    without `time_s` is joined without it.
     """
     order: list[int] = []
     dwell_numbers: list[int] = []
@@ -52,7 +53,8 @@ def joined_columns(
         rows_of += [rows[k : k + 1] for k in range(len(rows))] if one_by_one else [rows] * len(points)
         times_s += recording.time_s[rows].tolist() if one_by_one else _times_s(recording, dwells[i], len(points))
     columns = dwell_columns(recording, rows_of)
-    columns["time_s"] = np.array(times_s)
+    if recording.has_time:
+        columns["time_s"] = np.array(times_s)
     if recording.point is None:
         columns["point"] = _place_numbers(places_mm, export, dwell_of)[dwell_numbers]
     columns["visit"] = _numbered(visit_of[order])

@@ -20,11 +20,12 @@ TURNED = Rotation.from_rotvec([0.4, -0.9, 1.3]).as_matrix()
 MOVED_MM = np.array([2500.0, -800.0, 310.0])
 
 
-def write_gauges(path: Path, time_s: FloatArray, scale_mm: FloatArray, **extra: FloatArray) -> Path:
-    """A recording of gauges alone; comparators that do not move."""
-    columns = {"time_s": time_s, **{f"scale_{i + 1}_mm": scale_mm[:, i] for i in range(3)}}
-    columns |= {f"joint_{k}_um": np.zeros(len(time_s)) for k in range(1, 10)}
-    columns |= {name: np.zeros(len(time_s)) for name in FRAME_COLUMNS}
+def write_gauges(path: Path, time_s: FloatArray | None, scale_mm: FloatArray, **extra: FloatArray) -> Path:
+    """A recording of gauges alone, with or without times; comparators that do not move."""
+    columns = {} if time_s is None else {"time_s": time_s}
+    columns |= {f"scale_{i + 1}_mm": scale_mm[:, i] for i in range(3)}
+    columns |= {f"joint_{k}_um": np.zeros(len(scale_mm)) for k in range(1, 10)}
+    columns |= {name: np.zeros(len(scale_mm)) for name in FRAME_COLUMNS}
     write_recording(path, {**columns, **extra}, SIDECAR)
     return path
 

@@ -136,6 +136,29 @@ def test_a_table_with_one_row_per_place_and_repeats_of_the_instrument(tmp_path: 
     assert recording.scale_mm == pytest.approx(np.repeat(measured.length_mm, 3, axis=0))
 
 
+@pytest.mark.parametrize("by", ["order", "distance", "name"])
+def test_rows_without_times_are_joined_without_times(tmp_path: Path, by: By) -> None:
+    rng = np.random.default_rng(5)
+    tip_mm, scale_mm = targets(rng, 20)
+    ids = 1.0 + np.arange(20)
+    measured = Measured(write_gauges(tmp_path / "gauges.csv", None, scale_mm, point=ids), tip_mm, scale_mm)
+    joined = measured.join(points(seen(rng, tip_mm), [f"{number:g}" for number in ids]), by)
+    assert joined.joined == 20
+    assert str(joined.last[1]) == "dwell 20 (point 20)"
+    assert "time_s" not in (tmp_path / "joined.csv").read_text()
+    recording = read_recording(tmp_path / "joined.csv")
+    assert not recording.has_time
+    assert recording.scale_mm == pytest.approx(scale_mm)
+
+
+def test_rows_with_neither_times_nor_points_are_refused(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    tip_mm, scale_mm = targets(rng, 20)
+    measured = Measured(write_gauges(tmp_path / "gauges.csv", None, scale_mm), tip_mm, scale_mm)
+    with pytest.raises(RecordingError, match="neither `time_s` nor `point`"):
+        measured.join(points(seen(rng, tip_mm)))
+
+
 def test_by_distance_in_any_order_and_without_names(tmp_path: Path) -> None:
     """The dwells at machine zero are at one place, at the start and at the end: its point has no clear dwell."""
     rng = np.random.default_rng(8)

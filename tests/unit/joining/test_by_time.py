@@ -18,6 +18,7 @@ from compd.instruments import track_of as track_of_export
 from compd.joining.by_time import Instrument, join_reference
 from compd.joining.clock_offset import agreement_curve, estimate_offset
 from compd.recording import read_recording, write_recording
+from tests.support.points_at_rest import write_gauges
 from tests.support.sampled import sampled
 from tests.support.two_clocks import TipPath, random_path, track_of
 
@@ -202,6 +203,16 @@ def test_offset_by_hand_and_refusals_write_nothing(tmp_path: Path) -> None:
     again = CliRunner().invoke(app, [*arguments, "--offset", "30"])
     assert isinstance(again.exception, RecordingError)
     assert "is there already" in str(again.exception)
+
+
+def test_gauges_without_times_are_refused(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    motion = random_path(rng, 20, (2.0, 4.0))
+    track, _ = track_of(motion, rng, 0.0, 0.1, TRACKER_NOISE_MM)
+    file = write_gauges(tmp_path / "g.csv", None, motion.scales(np.arange(20.0, 40.0, 0.2)))
+    recording = read_recording(file, needs_reference=False)
+    with pytest.raises(RecordingError, match="has no `time_s` to compare with the instrument's"):
+        join_reference(recording, track, tmp_path / "joined.csv", Instrument())
 
 
 def test_command_shows_the_offset_and_its_uncertainty(tmp_path: Path) -> None:

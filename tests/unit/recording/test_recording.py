@@ -326,7 +326,7 @@ def test_writer_refuses_and_leaves_nothing_behind(tmp_path: Path) -> None:
         ({"time_s": [0, 1], "scale_1_um": [1, 2]}, "no column of the format"),
         ({"time_s": [0, 1], "scale_1_mm": [1]}, "not as long as the others"),
         ({"time_s": [0, 0], "scale_1_mm": [1, 2]}, "does not rise"),
-        ({"time_s": [0, math.nan], "scale_1_mm": [1, 2]}, "is missing"),
+        ({"time_s": [0, math.nan], "scale_1_mm": [1, 2]}, "does not rise"),
         ({"time_s": [0, 1], "scale_1_mm": [1, math.inf]}, "infinite"),
     ):
         with pytest.raises(RecordingError, match=wanted):
