@@ -1,4 +1,4 @@
-"""What no gauge of a machine measures, and what follows: the same words in `compd check`, `compd status` and VERSION."""
+"""What no gauge of a machine measures, and what follows: the same words in `check`, `status` and VERSION."""
 
 from __future__ import annotations
 

@@ -16,7 +16,6 @@ from .link_kinematics import Pose as Pose
 from .link_kinematics import closure_at as closure_at
 from .link_kinematics import forward_kinematics as forward_kinematics
 from .link_kinematics import inverse_kinematics as inverse_kinematics
-from .link_kinematics import link_length_mm as link_length_mm
 from .motion import Motion as Motion
 from .motion import Movement as Movement
 from .motion import pack_motion as pack_motion

@@ -1,4 +1,4 @@
-"""Link lengths by equation (1), and forward and inverse kinematics of links that end in known base joints.
+"""Forward and inverse kinematics of links that end in known base joints.
 
 `compd.model.kinematics.actuators` has the inverse of machines whose actuators move the base joints.
 
@@ -70,25 +70,6 @@ class Closure(NamedTuple):
     offset_by_displacement: FloatArray
     offset_by_rotation_mm: FloatArray
     reason: IntArray
-
-
-def link_length_mm(zero_length_mm: FloatArray, scale_mm: FloatArray, joint_shortening_mm: FloatArray) -> FloatArray:
-    """Equation (1): l_i = l0_i + gL_i - gB_i - gS_i, (..., n), in mm.
-
-    zero_length_mm : (n,), l0, at machine zero.  scale_mm : (..., n), gL.  joint_shortening_mm : (..., n), gB + gS.
-    nan in, nan out.
-    """
-    return zero_length_mm + scale_mm - joint_shortening_mm
-
-
-def scale_for_length_mm(
-    zero_length_mm: FloatArray, length_mm: FloatArray, joint_shortening_mm: FloatArray
-) -> FloatArray:
-    """Equation (1) solved for gL, (..., n), in mm: what the scales show when the links have these lengths.
-
-    zero_length_mm : (n,).  length_mm : (..., n).  joint_shortening_mm : (..., n), gB + gS.  nan in, nan out.
-    """
-    return length_mm - zero_length_mm + joint_shortening_mm
 
 
 def check_mechanism(mechanism: Mechanism) -> Mechanism:
