@@ -29,7 +29,7 @@ _SAME = 1e-3
 _NAMED_SHARE = 0.3
 
 
-class Way(NamedTuple):
+class CoordinateReach(NamedTuple):
     """How far a machine gets along one coordinate that a target fixes, and why no farther.
 
     coordinate : one of `COORDINATES`.  sign : 1 or -1.  reach : mm, or rad of a turn.  ends : "singularity", "reach",
@@ -51,10 +51,10 @@ class MachineReach(NamedTuple):
 
     fixes: tuple[str, ...]
     amplification: float
-    ways: tuple[Way, ...]
+    ways: tuple[CoordinateReach, ...]
 
     @property
-    def nearest_singularity(self) -> Way | None:
+    def nearest_singularity(self) -> CoordinateReach | None:
         """The shortest way along x, y or z that ends at one, else the smallest turn; None where none was met."""
         met = [way for way in self.ways if way.ends == "singularity"]
         return min(met, key=lambda way: (way.coordinate in "abc", way.reach), default=None)
@@ -94,7 +94,7 @@ def machine_reach(model: MachineModel, stroke_mm: tuple[float, float] | None = N
                 reach[way] = longest[way] * step / _STEPS
                 guess_mm[way], attitude[way] = found.actuator_mm[way], found.pose.rotation_M_P[way]
     ways = tuple(
-        Way(COORDINATES[place], int(sign), float(far), end)
+        CoordinateReach(COORDINATES[place], int(sign), float(far), end)
         for place, sign, far, end in zip(places, signs, reach, ends, strict=True)
     )
     return MachineReach(
@@ -182,7 +182,7 @@ def reach_lines(reach: MachineReach) -> list[str]:
     return lines
 
 
-def _amount(way: Way) -> str:
+def _amount(way: CoordinateReach) -> str:
     beyond = "" if way.ends else " or more"
     if way.coordinate in "abc":
         return f"{np.rad2deg(way.sign * way.reach):+.0f} deg{beyond}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
@@ -52,9 +53,16 @@ def read_range(text: str) -> StatedRange:
 
 
 def check_ranges(ranges: Iterable[StatedRange], effects: Iterable[Effect]) -> None:
-    """Raise CompdError, with every problem, where a range is of no parameter of these effects or in another unit."""
+    """Raise CompdError, with every problem, where a range is of no parameter of these effects, is in another unit, or
+    is one of several for a parameter."""
     parameters = {f"{effect.id}.{one.name}": one for effect in effects for one in effect.parameters}
-    problems = []
+    ranges = tuple(ranges)
+    times = Counter((stated.effect, stated.parameter) for stated in ranges)
+    problems = [
+        Problem(where="range", what="is stated more than once", value=f"{effect}.{parameter}", next_step="keep one")
+        for (effect, parameter), count in times.items()
+        if count > 1
+    ]
     for stated in ranges:
         name = f"{stated.effect}.{stated.parameter}"
         of_effect = sorted(other for other in parameters if other.startswith(f"{stated.effect}."))

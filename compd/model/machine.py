@@ -24,6 +24,7 @@ from compd.model.kinematics import (
     base_pose,
     distances_mm,
     forward_kinematics,
+    hinges_on_platform,
     inverse_by_actuators,
     inverse_kinematics,
     link_forces,
@@ -143,7 +144,7 @@ class MachineModel:
     def by_actuators(self) -> bool:
         """Whether the inverse takes the actuators as its unknowns; else `inverse_kinematics` gives the lengths."""
         extended = not self.actuators.kinds.any() and np.array_equal(self.actuators.of_link, np.arange(self.scales))
-        of_links = np.stack([np.arange(len(self.hinges)), np.zeros(len(self.hinges), dtype=np.int64)], axis=1)
+        of_links = hinges_on_platform(len(self.hinges))
         free = 3 if len(self.hinges) else 6
         fixed = self.actuators.fixed[:free].all() and not self.actuators.fixed[free:].any()
         return not (extended and np.array_equal(self.hinges, of_links) and fixed and len(self.hinges) in (0, 3))

@@ -13,6 +13,16 @@ from compd.model.library import find_effect
 from compd.model_file import ModelFile
 from tests.support.live_machine import Machine
 
+# The spindle's growth moves the tip along z, in um/K from 20 degC, on a machine whose kinematics compd does not know.
+SPINDLE_GROWTH = {
+    "id": "spindle_growth",
+    "physics": "the spindle grows",
+    "port": "reference",
+    "axis": "z",
+    "formula": "-k * (temperature_spindle_degC - 20)",
+    "parameters": {"k": {"unit": "um/K", "plausible": [-10, 10], "source": "a guess"}},
+}
+
 
 def file_with(path: Path, *declared, name="tripod-cmm", links=3, fitted_range=None, **theta) -> Path:
     """A model file with these effects; numbers by id, else ones, which need not be plausible."""

@@ -15,6 +15,7 @@ from .link_kinematics import Mechanism as Mechanism
 from .link_kinematics import Pose as Pose
 from .link_kinematics import closure_at as closure_at
 from .link_kinematics import forward_kinematics as forward_kinematics
+from .link_kinematics import hinges_on_platform as hinges_on_platform
 from .link_kinematics import inverse_kinematics as inverse_kinematics
 from .motion import Motion as Motion
 from .motion import Movement as Movement

@@ -15,20 +15,11 @@ from compd.cli.live.watch import view
 from compd.client import Client, connect
 from compd.errors import DaemonError
 from tests.support.external_machines import GANTRY, Served, class_geometry, served
-from tests.support.live_models import file_with
+from tests.support.live_models import SPINDLE_GROWTH, file_with
 from tests.support.running_daemon import supervised
 
 PATIENCE_S = 30
 CYCLES = 1000
-# The spindle's growth moves the tip along z, 2 um/K, from 20 degC.
-SPINDLE = {
-    "id": "spindle_growth",
-    "physics": "the spindle grows",
-    "port": "reference",
-    "axis": "z",
-    "formula": "-k * (temperature_spindle_degC - 20)",
-    "parameters": {"k": {"unit": "um/K", "plausible": [-10, 10], "source": "a guess"}},
-}
 # The gantry is less square than the class says, by so much more of x along y.
 SQUARE = {
     "id": "square",
@@ -68,7 +59,7 @@ def is_ok(setpoint: Any) -> bool:
 
 @pytest.fixture
 def spindle_file(tmp_path: Path) -> Path:
-    return file_with(tmp_path / "spindle.yaml", SPINDLE, name="external", links=3, spindle_growth=2.0)
+    return file_with(tmp_path / "spindle.yaml", SPINDLE_GROWTH, name="external", links=3, spindle_growth=2.0)
 
 
 def test_a_class_gives_the_pose_and_a_model_corrects_it(tmp_path: Path, spindle_file: Path) -> None:

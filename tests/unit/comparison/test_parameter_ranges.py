@@ -84,6 +84,11 @@ def test_a_range_of_nothing_or_in_another_unit_is_refused(text: str, said: str) 
         check_ranges([read_range(text)], LIBRARY.values())
 
 
+def test_two_ranges_of_one_parameter_are_refused() -> None:
+    with pytest.raises(CompdError, match=r"more than once\s+value: link_zero\.z"):
+        check_ranges([read_range("link_zero.z=-1..1mm"), read_range("link_zero.z=-2..2mm")], LIBRARY.values())
+
+
 def test_the_tolerance_changes_no_hash(tmp_path: Any) -> None:
     from compd.configuration import load, shipped_configuration
 

@@ -8,16 +8,8 @@ import pytest
 from compd.errors import CompdError
 from compd.model.external import Kinematics, OwnKinematicsError
 from compd.model_file import ModelFile, read_model_file
-from tests.support.live_models import file_with
+from tests.support.live_models import SPINDLE_GROWTH, file_with
 
-GROWTH = {
-    "id": "growth",
-    "physics": "the spindle grows",
-    "port": "reference",
-    "axis": "z",
-    "formula": "-k * (temperature_spindle_degC - 20)",
-    "parameters": {"k": {"unit": "um/K", "plausible": [-10, 10], "source": "a guess"}},
-}
 RADIUS = {
     "id": "radius",
     "physics": "the arm is longer than the class says",
@@ -42,7 +34,9 @@ class Arm(Kinematics):
 
 @pytest.fixture
 def model(tmp_path) -> ModelFile:
-    path = file_with(tmp_path / "m.yaml", GROWTH, RADIUS, name="external", links=1, growth=2.0, radius=0.5)
+    path = file_with(
+        tmp_path / "m.yaml", SPINDLE_GROWTH, RADIUS, name="external", links=1, spindle_growth=2.0, radius=0.5
+    )
     return read_model_file(path, "external", 1)
 
 
