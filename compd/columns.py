@@ -7,13 +7,12 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from compd.operation_settings import FRAME_DISTANCES
+from compd.operation_settings import measured_distances
 from compd.tables import ProblemList, Table
 from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
-FRAME_COLUMNS = tuple(f"frame_{distance}_um" for distance in FRAME_DISTANCES)
 ID_COLUMNS = ("session", "visit", "point", "ball", "pin")
 DISTANCE_COLUMN = "reference_distance_mm"
 SKEW_COLUMN = "skew_s"
@@ -163,7 +162,6 @@ _RESERVED = re.compile(
     r"|time(?:_[^_]+)?$|frame_?[tu](?:_?\d|_)|frame_\d"
 )
 _COVARIATE = re.compile(r"[a-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+")
-_COMMON = ("time_s", SKEW_COLUMN, *ID_COLUMNS, *FRAME_COLUMNS, "pressure_hPa", "humidity_pct")
 
 
 class ColumnName(NamedTuple):
@@ -181,6 +179,14 @@ def scale_columns(links: int) -> tuple[str, ...]:
 def joint_columns(comparators: int) -> tuple[str, ...]:
     """joint_1_um ... for this many joint comparators."""
     return tuple(f"joint_{k}_um" for k in range(1, comparators + 1))
+
+
+def frame_columns(count: int) -> tuple[str, ...]:
+    """frame_t1_um ... frame_u6_um for this many frame comparators; see `measured_distances`."""
+    return tuple(f"frame_{distance}_um" for distance in measured_distances(count))
+
+
+_COMMON = ("time_s", SKEW_COLUMN, *ID_COLUMNS, *frame_columns(9), "pressure_hPa", "humidity_pct")
 
 
 def approach_columns(links: int) -> tuple[str, ...]:

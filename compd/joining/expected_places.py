@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.columns import frame_columns, joint_columns, scale_columns
 from compd.configuration import Configuration
 from compd.machine_builder import build_model
 from compd.model import observe, predict
@@ -38,7 +38,7 @@ def expected_places_mm(
         model.constants,
         scale_mm=scale_mm,
         joint_mm=joint_mm,
-        frame_mm=comparators_mm(FRAME_COLUMNS),
+        frame_mm=comparators_mm(frame_columns(9)),
         quantities={},
         time_s=np.arange(count, dtype=np.float64),
         session_start=np.zeros(count, dtype=bool),

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray, TextArray
-from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.columns import frame_columns, joint_columns, scale_columns
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
 from compd.recording.reference import Reference
@@ -159,7 +159,7 @@ class Recording:
         return (
             *scale_columns(scales),
             *joint_columns(joints),
-            *(FRAME_COLUMNS if self.frame_mm is not None else ()),
+            *frame_columns(0 if self.frame_mm is None else self.frame_mm.shape[1]),
         )
 
     @property

@@ -17,9 +17,9 @@ from compd.columns import (
     ATTITUDES,
     AXES,
     DISTANCE_COLUMN,
-    FRAME_COLUMNS,
     approach_columns,
     correct_names,
+    frame_columns,
     joint_columns,
     scale_columns,
 )
@@ -110,7 +110,7 @@ class RecordingBuilder:
         if self._plate is not None and "ball" in table.columns:
             check_balls(table, self._plate, table_problems)
         if self._configuration is not None and sidecar is not None and sidecar.machine:
-            counts = (layout.scales, layout.joints, len(FRAME_COLUMNS) if layout.frame else 0)
+            counts = (layout.scales, layout.joints, layout.frame)
             quantity = sidecar.reference.quantity if sidecar.reference else None
             problems += machine_problems(sidecar.machine, counts, quantity, self._configuration, str(sidecar.path))
         problems += table_problems.problems
@@ -182,7 +182,7 @@ class RecordingBuilder:
         if approach is None and scale_mm is not None:
             approach = self._directions.of_block(scale_mm, session)
         joint_um = stack(joint_columns(layout.joints))
-        frame_um = stack(FRAME_COLUMNS) if layout.frame else None
+        frame_um = stack(frame_columns(layout.frame))
         position = in_mm("reference", AXES)
         links = [f"link_{i}" for i in layout.links]
         if self._plate is not None and ball is not None:

@@ -229,7 +229,7 @@ def _observations(
         )
     comparators = model.joint_weights.shape[1]
     joint_mm = np.zeros((count, comparators)) if recording.joint_mm is None else recording.joint_mm
-    frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
+    frame_mm = np.zeros((count, 0)) if recording.frame_mm is None else recording.frame_mm
     approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
     at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
     if recording.has_time:

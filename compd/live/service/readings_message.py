@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.columns import frame_columns, joint_columns, scale_columns
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading, ReadingMotion
 from compd.live.loop import CycleInputs, CycleState, SentCycle, Target, setpoint_line, with_zero_of
@@ -83,7 +83,7 @@ def columns(wires: MachineWires) -> list[dict[str, Any]]:
     sign here and is recorded as it is read.
     """
     names = [*scale_columns(len(wires.scale.wires)), *joint_columns(wires.joints)]
-    names += FRAME_COLUMNS[: len(wires.frame.wires)]
+    names += frame_columns(len(wires.frame.wires))
     lengths: list[dict[str, Any]] = [
         {"column": name, "channel": wire.channel, "sign": wire.sign, "stale_after_s": wire.stale_after_s}
         for name, wire in zip(names, wires.length_wires, strict=True)
