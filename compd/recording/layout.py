@@ -11,6 +11,8 @@ from compd.columns import (
     ATTITUDE_COLUMNS,
     ATTITUDES,
     AXES,
+    COMMANDED_ATTITUDE_COLUMNS,
+    COMMANDED_COLUMNS,
     DISTANCE_COLUMN,
     ID_COLUMNS,
     SKEW_COLUMN,
@@ -43,6 +45,7 @@ class Layout:
     axes, attitude : of the reference's position; whether it has an attitude.
     links : the links (1-based) whose length the reference measures.
     covariates : names of all other columns.
+    commanded : names of the columns of the commanded pose, of a machine without scales.
     ending : what the names of reference and model end in: "mm", or another unit that the sidecar names.
     """
 
@@ -55,6 +58,7 @@ class Layout:
     links: tuple[int, ...]
     covariates: tuple[str, ...]
     ending: str = "mm"
+    commanded: tuple[str, ...] = ()
 
     @property
     def reference(self) -> tuple[str, ...]:
@@ -83,9 +87,13 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
         # without a known machine every gauge is a quantity like any other
         scales, joints, frame = 0, 0, []
     quantity = sidecar.reference.quantity if sidecar and sidecar.reference else None
+    turned = [name for name in COMMANDED_ATTITUDE_COLUMNS if name in names]
+    commanded = () if external else tuple(name for name in (*COMMANDED_COLUMNS, *turned) if name in names)
     if not external:
-        if not scales and not any(name.startswith("scale_") for name in names):
-            _add_missing(["scale_1_mm, scale_2_mm, ..."], names, problems)
+        if not scales and not commanded and not any(name.startswith("scale_") for name in names):
+            _add_missing(["scale_1_mm, scale_2_mm, ..., or commanded_x_mm, ... without scales"], names, problems)
+        if 0 < len(turned) < 3:
+            _add_missing([name for name in COMMANDED_ATTITUDE_COLUMNS if name not in turned], names, problems)
         if approaches and scales and approaches != scales:
             problems.add(
                 "",
@@ -103,7 +111,7 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
     if quantity in ("ball_plate", *OF_FIXED_PLACES):
         axes = AXES
     has_approach = approaches > 0 and (external or approaches == scales)
-    layout = Layout(scales, joints, len(frame), has_approach, axes, len(attitude) == 3, links, (), ending)
+    layout = Layout(scales, joints, len(frame), has_approach, axes, len(attitude) == 3, links, (), ending, commanded)
     if sidecar is not None and reference_valid:
         _check_reference(names, sidecar, layout, attitude, problems)
         _check_model(names, external, layout, problems)
@@ -306,7 +314,7 @@ def _check_folds(names: Sequence[str], sidecar: Sidecar, problems: ProblemList) 
 def _covariates(names: Sequence[str], layout: Layout) -> Iterable[str]:
     """Names of the columns that have no attribute of their own in a Recording."""
     own = {"time_s", SKEW_COLUMN, *ID_COLUMNS, *frame_columns(layout.frame)}
-    own |= {*scale_columns(layout.scales), *joint_columns(layout.joints)}
+    own |= {*scale_columns(layout.scales), *joint_columns(layout.joints), *layout.commanded}
     own |= {*approach_columns(layout.scales)} if layout.approach else set()
     return (name for name in names if name not in own and not name.startswith(("reference_", "model_")))
 

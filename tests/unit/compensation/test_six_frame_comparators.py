@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from compd.columns import frame_columns
-from compd.compensation import GaugeValues, WarmStart, compensate_cmm
+from compd.compensation import WarmStart, compensate_cmm
 from compd.configuration import load
 from compd.errors import ConfigurationError, RecordingError
 from compd.live.loop.tip_uncertainty import stated_noise
@@ -75,7 +75,7 @@ def test_each_gauge_keeps_its_distance(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize("without", [("u1",), ("t1",), ("t1", "t2"), ("t1", "t2", "t3", "u4")])
 def test_other_parts_of_the_nine_are_refused(tmp_path: Path, without: tuple[str, ...]) -> None:
-    with pytest.raises(ConfigurationError, match="u1..u6 alone; or none of them") as refusal:
+    with pytest.raises(ConfigurationError, match=r"u1\.\.u6 alone; or none of them") as refusal:
         load(six(tmp_path, "hexapod.yaml", without))
     missing = [problem.what.split()[2] for problem in refusal.value.problems if "is wired 0 times" in problem.what]
     assert missing == [distance for distance in without if len(without) < 3 or distance[0] == "u"]
