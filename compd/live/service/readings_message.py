@@ -42,10 +42,24 @@ class RecordedCycle(NamedTuple):
 class ReadingsMessage:
     """Makes the READINGS messages of a machine, and the `columns` that describe them in the answer to WATCH."""
 
-    def __init__(self, wires: MachineWires, channels: Sequence[str], model_columns: Sequence[str] = ()) -> None:
-        """`channels`: names of a snapshot's readings, in order. `model_columns`: of a recording, that are made of
-        setpoints: the pose that own kinematics or a client gives, and what its class gives beside it."""
-        self.model_columns = list(model_columns)
+    def __init__(
+        self,
+        wires: MachineWires,
+        channels: Sequence[str],
+        model_columns: Sequence[str] = (),
+        rotation_B0_in_M_rad: Sequence[float] = (),
+    ) -> None:
+        """channels : names of a snapshot's readings, in order.
+
+        model_columns : of a recording, that are made of setpoints: the pose that own kinematics or a client gives and
+        what its class gives beside it, or the one that the controller of a machine without scales is told.
+        rotation_B0_in_M_rad : (3,), where these columns need it.
+        """
+        self.from_setpoints: dict[str, list[str] | list[float]] = {}
+        if model_columns:
+            self.from_setpoints["model_columns"] = list(model_columns)
+        if rotation_B0_in_M_rad:
+            self.from_setpoints["rotation_B0_in_M_rad"] = list(rotation_B0_in_M_rad)
         self.columns = columns(wires)
         self._channels = tuple(channels)
 
