@@ -87,7 +87,7 @@ def test_a_campaign_is_compared_and_its_cause_found(tmp_path: Path) -> None:
     assert comparison.uncertainty.total_um[comparison.used].min() >= WARM_UM
     assert "unmeasured by 5 um" in comparison.gauges.how
     verdict = compd.diagnose(compd.open_recording(path, machine=configuration))
-    assert (verdict.kind, [step.effect.id for step in verdict.steps]) == ("identified", ["base_joint_position"])
+    assert (verdict.verdict, [step.effect.id for step in verdict.steps]) == ("identified", ["base_joint_position"])
 
 
 def test_a_quaternion_gives_the_same(tmp_path: Path, hexapod: tuple[Path, Configuration]) -> None:
