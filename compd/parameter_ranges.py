@@ -24,6 +24,8 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "urad": {"rad": 1e6, "mrad": 1e3, "deg": 1e6 * np.pi / 180},
     "ppm": {"%": 1e4, "1": 1e6},
 }
+# How the source of a range begins that follows from the machine's tolerance.
+TOLERANCE_KEY = "geometry.tolerance_mm"
 _PER_MM, _PER_ONE = 1e3, 1e6  # um per mm; ppm and urad per 1
 
 
@@ -128,7 +130,7 @@ def _ranged(parameter: Parameter, rows: Observations, stated: StatedRange | None
     )
     if not np.isfinite(largest):
         return parameter
-    source = f"geometry.tolerance_mm {tolerance_mm:g}{what}"
+    source = f"{TOLERANCE_KEY} {tolerance_mm:g}{what}"
     return replace(parameter, low=-float(largest), high=float(largest), source=source, rough=True)
 
 

@@ -69,12 +69,12 @@ def _result_alone(
     status: Status
     if (named := _reason_of_explaining(candidate.name, candidate.effect.separated_by, steps)) is not None:
         status, why = "explains", named
+    elif gain >= losses.price(member) and (implausible := [p for p in parameters if not p.plausible]):
+        status, why = "partial", f"only with implausible numbers: {_values(implausible[:3])}"
     elif is_undetermined(candidate.limits, np.sqrt(np.diag(covariance))):
         status, why = "not_testable", "its numbers stay less certain than their plausible ranges are wide"
     elif gain < losses.price(member):
         status, why = "no_gain", f"takes {100 * max(fraction, 0.0):.0f} % of the error away: not worth a name"
-    elif implausible := [parameter for parameter in parameters if not parameter.plausible]:
-        status, why = "partial", f"only with implausible numbers: {_values(implausible[:3])}"
     elif steps:
         status, why = "partial", "nothing more beside what is named"
     else:

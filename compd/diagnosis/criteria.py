@@ -112,6 +112,12 @@ class Criteria:
         "between, it is named with a question",
         reason="a choice: classes of tolerance are a factor of ten apart, and an owner's statement is rough",
     )
+    excellent_share: float = threshold(
+        0.4,
+        unit="share of the squared error above noise",
+        meaning="an implausible effect that alone takes so much, and more than all that is named, is asked about",
+        reason="a choice: less than half, as a second cause may hide one that is real",
+    )
     range_slack: float = threshold(
         0.25,
         unit="share of the range's width",

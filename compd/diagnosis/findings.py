@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from compd.model.effects import Effect, FittedEffect
+from compd.model.effects import Effect, FittedEffect, Parameter
 
 Status = Literal["explains", "partial", "no_gain", "not_testable"]
 
@@ -251,6 +251,44 @@ class CandidateResult:
             "explained_fraction": self.explained_fraction,
             "p_adjusted": self.p_value,
             "parameters": [parameter.as_json() for parameter in self.parameters],
+        }
+
+
+@dataclass(frozen=True)
+class ImplausibleEffect:
+    """An effect that would explain the error better than all that is named, with a number outside its plausible range.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    heldout_rms_um : float
+        Error on rows that were left out, with the effect alone, um per coordinate.
+    explained_fraction : float
+        Share of what is above the noise floor that it explains alone, 0 to 1.
+    number : ParameterEstimate
+        The one that exceeds its range the most.
+    parameter : Parameter
+        What the number is of, with the range and its source.
+    """
+
+    effect: str
+    heldout_rms_um: float
+    explained_fraction: float
+    number: ParameterEstimate
+    parameter: Parameter
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys of the verdict's `asked`."""
+        parameter = self.parameter
+        return {
+            "effect": self.effect,
+            "heldout_rms_um": self.heldout_rms_um,
+            "explained_fraction": self.explained_fraction,
+            "number": self.number.as_json(),
+            "parameter": parameter.name,
+            "plausible": [parameter.low, parameter.high],
+            "source": parameter.source,
         }
 
 

@@ -18,6 +18,7 @@ from compd.diagnosis.candidates.proxies import proxy_candidates
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
 from compd.diagnosis.findings import CandidateResult, ConstantFinding, DiagnosisStep, Rival, UntestedEffect
+from compd.diagnosis.implausible_effect import implausible_effect
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.rival_selection import named_members
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
@@ -159,16 +160,22 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     candidates = candidate_results(problem, losses, steps, p_value_by_effect)
     verdict = _verdict(problem, explanation, steps, candidates)
     above = verdict in ("partial", "unexplained", "not_testable")
+    asked = implausible_effect(problem, explanation) if above else None
+    depends_on = describe_remainder(problem, explanation) if above else ()
+    if asked is not None:
+        # where the platform was at a time looks like the time
+        depends_on = tuple(finding for finding in depends_on if not finding.is_change)
     diagnosis = Diagnosis(
         verdict,
         before,
         after,
         steps,
         candidates,
-        describe_remainder(problem, explanation) if above else (),
+        depends_on,
         constant=describe_constant(problem, explanation, named, after.constant_um),
         gross=gross_rows(problem.gross, aligned.recording.row, criteria.gross),
         untested=_untested(problem, explanation, steps),
+        asked=asked,
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
         criteria=criteria,

@@ -14,6 +14,7 @@ from compd.diagnosis.findings import (
     DiagnosisStep,
     EmpiricalFinding,
     GrossRows,
+    ImplausibleEffect,
     UntestedEffect,
 )
 from compd.result_tables import Columns, data_frame, html_table
@@ -57,6 +58,8 @@ class Diagnosis:
         Rows that nothing explains and that do not count.
     untested : tuple of UntestedEffect
         Effects that cannot be tried here; first those that may be behind what was found.
+    asked : ImplausibleEffect or None
+        The effect that explains the error best, and only with an implausible number; None where none is asked about.
     heldout_before_um : float
         Error on rows that were left out with the model as it was, without its constant, um per coordinate.
     heldout_after_um : float
@@ -77,6 +80,7 @@ class Diagnosis:
     constant: ConstantFinding | None = None
     gross: GrossRows = field(default_factory=GrossRows)
     untested: tuple[UntestedEffect, ...] = ()
+    asked: ImplausibleEffect | None = None
     heldout_before_um: float = float("nan")
     heldout_after_um: float = float("nan")
     summary: str = ""
@@ -149,6 +153,7 @@ class Diagnosis:
             "heldout_after_um": self.heldout_after_um,
             "constant": None if self.constant is None else self.constant.as_json(),
             "steps": [step.as_json() for step in self.steps],
+            **({} if self.asked is None else {"asked": self.asked.as_json()}),
             "candidates": [candidate.as_json() for candidate in self.candidates],
             "depends_on": [finding.as_json() for finding in self.depends_on],
             "next_measurement": [dict(row) for row in self.next_measurement],

@@ -12,6 +12,7 @@ from compd.diagnosis.words.phrases import (
     untested_here,
 )
 from compd.model.formula import FormulaDeclaration
+from compd.parameter_ranges import TOLERANCE_KEY
 from compd.text import join_words
 
 # What a formula says of telling it from others where the person who wrote it said nothing.
@@ -31,7 +32,13 @@ def advice(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
             still = "change nothing on the machine yet: what mends one does not mend its rival"
             return [*clauses, still, *_how_to_tell(diagnosis)]
         case "partial":
-            return [*clauses, *_how_to_tell(diagnosis), *_what_to_measure(diagnosis), *_what_may_be_added(diagnosis)]
+            return [
+                *clauses,
+                *_what_to_state(diagnosis),
+                *_how_to_tell(diagnosis),
+                *_what_to_measure(diagnosis),
+                *_what_may_be_added(diagnosis),
+            ]
         case "adequate":
             constant = diagnosis.constant
             if constant is not None and (rows := _planned_rows(diagnosis)):
@@ -42,11 +49,19 @@ def advice(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
         case "not_testable":
             vary = "vary one thing after the other: place, direction, load, temperature"
             return [*clauses, *(_proposed(diagnosis) or [vary])]
-    clauses += ["change nothing on the machine yet", *_what_to_measure(diagnosis)]
+    clauses += ["change nothing on the machine yet", *_what_to_state(diagnosis), *_what_to_measure(diagnosis)]
     described = best_description(diagnosis)
     if described is not None and described.formula_effects:
         clauses.append("until the cause is known, the formulas below lower the error")
     return clauses
+
+
+def _what_to_state(diagnosis: Diagnosis) -> list[str]:
+    """How to state the range of what is asked about."""
+    if (asked := diagnosis.asked) is None:
+        return []
+    key = f"{TOLERANCE_KEY} or " if asked.parameter.source.startswith(TOLERANCE_KEY) else ""
+    return [f"if that can be, state it: {key}--range {asked.effect}.{asked.parameter.name}=LOW..HIGH"]
 
 
 def _how_to_add(diagnosis: Diagnosis) -> list[str]:

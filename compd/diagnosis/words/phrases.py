@@ -8,11 +8,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.comparison import Comparison
-from compd.diagnosis.findings import ConstantFinding, DiagnosisStep, EmpiricalFinding, GrossRows, UntestedEffect
+from compd.diagnosis.findings import (
+    ConstantFinding,
+    DiagnosisStep,
+    EmpiricalFinding,
+    GrossRows,
+    ImplausibleEffect,
+    UntestedEffect,
+)
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effects import Effect
 from compd.model.formula import FormulaDeclaration
 from compd.model.library import BUNDLED
+from compd.parameter_ranges import TOLERANCE_KEY
 from compd.text import chance_text, estimate_text, estimates_text, join_words, number_text, percent_text
 
 # What a formula says of its physics where the person who wrote it said nothing.
@@ -110,6 +118,19 @@ def change_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
     if not finding.effect:
         return f"from {moment} every row is shifted alike"
     return f"from {moment} {finding.effect} {_how_it_changed(finding, diagnosis)}"
+
+
+def question_text(asked: ImplausibleEffect, share: str, tolerance_mm: float) -> str:
+    """An effect that explains much with an implausible number, and the question that only the owner can answer.
+
+    share : what it takes, in words.  tolerance_mm : to which the machine is stated to be made.
+    """
+    number, parameter = asked.number, asked.parameter
+    value = estimate_text(number.value, number.std, number.unit)
+    found = f"{asked.effect} would take {share}, with {number.name} = {value}"
+    if parameter.source.startswith(TOLERANCE_KEY):
+        return f"{found}; this machine is declared good to {tolerance_mm:g} mm. Is it?"
+    return f"{found}; {parameter.low:g} to {parameter.high:g} is usual. Can that be?"
 
 
 def moment_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:

@@ -8,7 +8,14 @@ from __future__ import annotations
 
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import error_fall
-from compd.diagnosis.words.phrases import change_text, followed_text, rivals_text, shown_by, was_any_tried
+from compd.diagnosis.words.phrases import (
+    change_text,
+    followed_text,
+    question_text,
+    rivals_text,
+    shown_by,
+    was_any_tried,
+)
 from compd.text import join_words, number_text
 
 CANNOT_KNOW = "how much of it is noise cannot be known"
@@ -34,14 +41,24 @@ def summary(diagnosis: Diagnosis) -> str:
             return f"{falls} But these rows cannot tell apart: {pairs}."
         case "adequate" | "not_testable":
             tried = "that was tried lowers it" if was_any_tried(diagnosis) else "can be tested on this recording"
-            return f"The error is {before}, {noise}. No effect {tried}."
+            return " ".join([f"The error is {before}, {noise}. No effect {tried}.", *question(diagnosis)])
     if diagnosis.steps:
         verb = "explains" if len(diagnosis.steps) == 1 else "explain"
-        rest = f"{fall.noise_text}, so something else acts as well" if fall.noise_known else CANNOT_KNOW
-        share = f"{names} {verb} {fall.share_text(fall.after)} ({fall.text(fall.after)}); {rest}."
-        return " ".join([share, *_rest(diagnosis, "The rest")])
+        remains = f"{fall.noise_text}, so something else acts as well" if fall.noise_known else CANNOT_KNOW
+        share = f"{names} {verb} {fall.share_text(fall.after)} ({fall.text(fall.after)}); {remains}."
+        return " ".join([share, *question(diagnosis), *_rest(diagnosis, "The rest")])
     unexplained = f"No effect that was tried explains the error of {before}, {noise}."
-    return " ".join([unexplained, *(_rest(diagnosis, "It") or ["It follows nothing that was measured."])])
+    asked = question(diagnosis)
+    rest = [] if asked else ["It follows nothing that was measured."]
+    return " ".join([unexplained, *asked, *(_rest(diagnosis, "It") or rest)])
+
+
+def question(diagnosis: Diagnosis) -> list[str]:
+    """What is asked about an implausible effect that explains much; empty where none does."""
+    if (asked := diagnosis.asked) is None:
+        return []
+    share = error_fall(diagnosis).share_text(asked.heldout_rms_um)
+    return [question_text(asked, share, diagnosis.before.aligned.rows.constants.tolerance_mm)]
 
 
 def _rest(diagnosis: Diagnosis, what: str) -> list[str]:

@@ -23,7 +23,7 @@ from compd.diagnosis.words.phrases import (
     untested_here,
     was_any_tried,
 )
-from compd.diagnosis.words.summary import CANNOT_KNOW
+from compd.diagnosis.words.summary import CANNOT_KNOW, question
 from compd.text import LabelledText, fall_text, fit_lines, join_words, number_text, percent_text
 
 # What a terminal shows without scrolling, and its usual width.
@@ -48,6 +48,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     names = tuple(clause.partition(": ")[0] for clause in found)
     others = [
         LabelledText("Changed", tuple(_changed(diagnosis, fall))),
+        LabelledText("Asked", tuple(question(diagnosis))),
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
         LabelledText("Follows", tuple(_follows(diagnosis, fall))),
         LabelledText("Left", tuple(_left(diagnosis, fall))),
@@ -92,7 +93,11 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
             text = "no effect can be tested; nothing that drives one was varied"
         case _:
             text = _above_the_noise(diagnosis, fall)
-    headings = [f"{diagnosis.verdict}: {text.format(names)}" for names in (join_words(ids), count)]
+    texts = [text.format(join_words(ids)), text.format(count)]
+    if (asked := diagnosis.asked) is not None:
+        takes = f"would take {percent_text(fall.share_of(asked.heldout_rms_um))}, with an implausible number"
+        texts = [f"{asked.effect} {takes}", f"an effect {takes}"]
+    headings = [f"{diagnosis.verdict}: {text}" for text in texts]
     return headings[len(headings[0]) > WIDTH]
 
 
