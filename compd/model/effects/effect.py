@@ -174,6 +174,9 @@ class Constant:
     period_of : str
         Of a period, the quantity that it is a period of, as a formula names it (``"scale_mm"``, a measured column):
         other periods than those of the grid are then looked for in a residual. ``""`` for what is no period.
+    unstated : float or None
+        Its value in model files that do not state it, of releases in which the effect did not have it; None where every
+        file states it.
     """
 
     name: str
@@ -184,6 +187,7 @@ class Constant:
     grid: tuple[float, ...]
     setting: str = ""
     period_of: str = ""
+    unstated: float | None = None
 
     @property
     def choice(self) -> bool:
