@@ -7,13 +7,12 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from compd.operation_settings import FRAME_DISTANCES
+from compd.operation_settings import measured_distances
 from compd.tables import ProblemList, Table
 from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
-FRAME_COLUMNS = tuple(f"frame_{distance}_um" for distance in FRAME_DISTANCES)
 ID_COLUMNS = ("session", "visit", "point", "ball", "pin")
 DISTANCE_COLUMN = "reference_distance_mm"
 SKEW_COLUMN = "skew_s"
@@ -21,6 +20,9 @@ POSITION_COLUMNS = tuple(f"reference_{axis}_mm" for axis in AXES)
 MODEL_COLUMNS = tuple(f"model_{axis}_mm" for axis in AXES)
 ATTITUDE_COLUMNS = tuple(f"reference_{axis}_rad" for axis in ATTITUDES)
 QUATERNION_COLUMNS = tuple(f"reference_q{part}" for part in "xyzw")
+COMMANDED_COLUMNS = tuple(f"commanded_{axis}_mm" for axis in AXES)
+COMMANDED_ATTITUDE_COLUMNS = tuple(f"commanded_{axis}_rad" for axis in ATTITUDES)
+COMMANDED_QUATERNION_COLUMNS = tuple(f"commanded_q{part}" for part in "xyzw")
 # Decimals by unit: a picometre, a microsecond, a tenth of a nanoradian. Finer than any gauge, and coarse enough
 # that the conversion from mm to um leaves no digits of its own behind. Other units are written in full.
 DECIMALS = {"mm": 9, "um": 6, "s": 6, "rad": 10}
@@ -75,6 +77,25 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
         ),
         ("point", r"point", "", "number or name of the nominal target; optional"),
         ("scale_<i>_mm", r"scale_[1-9]\d*", "mm", "linear scale of link i, zero at machine zero"),
+        (
+            "commanded_x_mm, commanded_y_mm, commanded_z_mm",
+            r"commanded_[xyz]",
+            "mm",
+            "in place of the scales, of a machine without: the tip that its controller was told, in {B0}, or on the "
+            "work, in {P}, where the tool stands on the plate; those that its target fixes",
+        ),
+        (
+            "commanded_rx_rad, commanded_ry_rad, commanded_rz_rad",
+            r"commanded_r[xyz]",
+            "rad",
+            "the attitude that it was told: rotation vector of {P} in {B0}; left out: that of machine zero",
+        ),
+        (
+            "commanded_qx, commanded_qy, commanded_qz, commanded_qw",
+            r"commanded_q[xyzw]",
+            "",
+            "in place of the rotation vector: the same attitude as a quaternion of length 1, scalar last",
+        ),
         ("joint_<k>_um", r"joint_[1-9]\d*", "um", "joint comparator k of the wiring, zero at machine zero"),
         (
             "frame_t<k>_um, frame_u<k>_um",
@@ -158,12 +179,11 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
 # A name that begins like a column of the format but is none: probably misspelt, so no covariate. The angle of a robot's
 # joint or of a rotary table, joint_1_deg, is no comparator's or scale's length.
 _RESERVED = re.compile(
-    r"(?:reference|model|approach)(?![a-z])"
+    r"(?:reference|model|approach|commanded)(?![a-z])"
     r"|(?:scale|joint)(?!_[1-9]\d*_(?:rad|mrad|urad|deg|arcsec)$)(?:_?\d|(?:_[a-z])?_[mun]?m$|$)"
     r"|time(?:_[^_]+)?$|frame_?[tu](?:_?\d|_)|frame_\d"
 )
 _COVARIATE = re.compile(r"[a-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+")
-_COMMON = ("time_s", SKEW_COLUMN, *ID_COLUMNS, *FRAME_COLUMNS, "pressure_hPa", "humidity_pct")
 
 
 class ColumnName(NamedTuple):
@@ -181,6 +201,14 @@ def scale_columns(links: int) -> tuple[str, ...]:
 def joint_columns(comparators: int) -> tuple[str, ...]:
     """joint_1_um ... for this many joint comparators."""
     return tuple(f"joint_{k}_um" for k in range(1, comparators + 1))
+
+
+def frame_columns(count: int) -> tuple[str, ...]:
+    """frame_t1_um ... frame_u6_um for this many frame comparators; see `measured_distances`."""
+    return tuple(f"frame_{distance}_um" for distance in measured_distances(count))
+
+
+_COMMON = ("time_s", SKEW_COLUMN, *ID_COLUMNS, *frame_columns(9), "pressure_hPa", "humidity_pct")
 
 
 def approach_columns(links: int) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ from compd.model.external import ExternalModel, Kinematics, new_external_model
 from compd.model.kinematics import ACTUATOR_KINDS, Actuators, Arrangement, Contact, ToolOnPlate, ToolOnPlatform
 from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix, to_outer
+from compd.units import UM_PER_MM
 
 # Equation (1): the two ball shanks of a revolute joint are averaged, gB = (Ra + Rb) / 2.
 WEIGHT_OF_ROLE: Mapping[str, float] = {"S": 1.0, "B": 1.0, "Ra": 0.5, "Rb": 0.5}
@@ -44,7 +45,11 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
     if (external := external_of(geometry)) is not None:
         return build_external(external, wiring)
     model = machine_model(machine_parts(geometry, wiring))
-    return replace(model, constants=machine_constants(model, machine_details(geometry)))
+    return replace(
+        model,
+        constants=machine_constants(model, machine_details(geometry)),
+        frame_drift_mm=wiring.unmeasured_frame_um / UM_PER_MM,
+    )
 
 
 def machine_parts(geometry: Geometry, wiring: Wiring) -> MachineParts:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from compd.configuration import Configuration
+from compd.operation_settings import FRAME_DISTANCES
 
 
 def not_measured(configuration: Configuration) -> list[str]:
@@ -17,8 +18,13 @@ def not_measured(configuration: Configuration) -> list[str]:
         clauses.append("the scales: the pose that a controller commands is corrected")
     if known and not wiring.joint:
         clauses.append("the joints, which are taken not to move along their links")
-    if known and not wiring.frame:
-        clauses.append(f"the frame, which is taken to stand still; {_frame_drift(wiring.frame_drift_um)}")
+    if known and len(wiring.frame) < len(FRAME_DISTANCES):
+        what = (
+            "the frame's t1 to t3, which are taken to stay as at machine zero"
+            if wiring.frame
+            else "the frame, which is taken to stand still"
+        )
+        clauses.append(f"{what}; {_frame_drift(wiring.frame_drift_um)}")
     if not any(quantity.name.startswith("temperature_") for quantity in wiring.quantities):
         clauses.append("temperatures: what heat does is not corrected")
     return clauses

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import math
 from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
@@ -12,6 +13,8 @@ from compd.documents import AbsolutePath, Finite, Positive, Section, Text, refus
 # The nine distances of the frame's octahedron: t_k between the base platform's supports, u_k from them to the plate.
 FrameDistance = Literal["t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6"]
 FRAME_DISTANCES: tuple[FrameDistance, ...] = get_args(FrameDistance)
+# How many of them a machine measures: all, u1 to u6, or none.
+FRAME_COUNTS = (9, 6, 0)
 GaugeChannel = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+(\.[A-Za-z0-9_]+)?$")]
 LinkNumber = Annotated[int, Field(ge=1, le=6)]
 Sign = Literal[1, -1]
@@ -83,6 +86,11 @@ class QuantityWire(Section):
         return self
 
 
+def measured_distances(count: int) -> tuple[FrameDistance, ...]:
+    """The frame distances that `count` comparators measure, one of FRAME_COUNTS: without t1 to t3, the last six."""
+    return FRAME_DISTANCES[len(FRAME_DISTANCES) - count :]
+
+
 class Wiring(Section):
     """Assignment of gauges to the quantities of the machine."""
 
@@ -90,16 +98,24 @@ class Wiring(Section):
     joint: tuple[JointWire, ...] = Field(default=(), description="one entry for every joint comparator")
     frame: tuple[FrameWire, ...] = Field(
         default=(),
-        description="one entry for each of the nine frame comparators; none: the frame is taken to stand still",
+        description="one entry for each of the nine frame comparators, or for u1 to u6, which leaves t1 to t3 as at "
+        "machine zero; none: the frame is taken to stand still",
     )
     frame_drift_um: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = Field(
         default=None,
-        description="without frame comparators: standard uncertainty of the tip along each axis, um, from what the "
-        "frame moves between two machine zeros; left out: unknown, and with it the tip's",
+        description="without all nine frame comparators: standard uncertainty of the tip along each axis, um, "
+        "from what the frame moves unmeasured between two machine zeros; left out: unknown, and with it the tip's",
     )
     quantities: tuple[QuantityWire, ...] = Field(
         default=(), description="whatever else is measured: temperatures, forces, air pressure"
     )
+
+    @property
+    def unmeasured_frame_um(self) -> float:
+        """`frame_drift_um`, nan where nobody states it; 0 where all nine distances are measured."""
+        if len(self.frame) == len(FRAME_DISTANCES):
+            return 0.0
+        return math.nan if self.frame_drift_um is None else self.frame_drift_um
 
 
 class LoopSettings(Section):

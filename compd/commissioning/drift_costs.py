@@ -16,7 +16,7 @@ from compd.errors import KinematicsError
 from compd.machine_builder import build_model
 from compd.model import MachineModel
 from compd.model.kinematics import ToolOnPlate
-from compd.operation_settings import FRAME_DISTANCES
+from compd.operation_settings import measured_distances
 from compd.units import UM_PER_MM
 
 DRIFT_UM = 10.0
@@ -40,7 +40,7 @@ def drift_costs(configuration: Configuration) -> list[DriftCost]:
     gauge_of = {length: gauge for gauge, lengths in measured_lengths(configuration).items() for length in lengths}
     lengths = [f"scale {link}" for link in range(1, model.scales + 1)]
     lengths += [f"joint {k}" for k in range(1, len(configuration.wiring.joint) + 1)]
-    lengths += [f"frame {distance}" for distance in FRAME_DISTANCES[: len(configuration.wiring.frame)]]
+    lengths += [f"frame {distance}" for distance in measured_distances(len(configuration.wiring.frame))]
     drift_mm = DRIFT_UM / UM_PER_MM
     costs = []
     for number, length in enumerate(lengths):

@@ -26,15 +26,18 @@ from compd.units import UM_PER_MM
 
 
 class Uncertainty(NamedTuple):
-    """Standard uncertainty of each predicted coordinate, (N, m) in um: by the gauges, by the fitted numbers."""
+    """Standard uncertainty of each predicted coordinate, (N, m) in um: by the gauges, by the fitted numbers, and by
+    what the frame moves unmeasured.
+    """
 
     gauges_um: FloatArray
     parameters_um: FloatArray
+    frame_um: FloatArray
 
     @property
     def total_um(self) -> FloatArray:
-        """Both, which are independent of each other."""
-        return np.asarray(np.hypot(self.gauges_um, self.parameters_um))
+        """All three, which are independent of each other."""
+        return np.asarray(np.sqrt(self.gauges_um**2 + self.parameters_um**2 + self.frame_um**2))
 
 
 def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True) -> GaugeNoise:
@@ -55,7 +58,16 @@ def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True) -> GaugeNo
         repeated |= scatter is not None
         noise_mm[port] = (by_digit if scatter is None else np.maximum(scatter.by_axis_um, by_digit)) / UM_PER_MM
     how = "scatter of the gauges within visits" if repeated else "the gauges' last digits alone: a lower bound"
-    return GaugeNoise(noise_mm["scale"], noise_mm["joint"], noise_mm["frame"], how=how)
+    drift_mm = _frame_drift_mm(aligned)
+    if drift_mm:
+        unknown = np.isnan(drift_mm)
+        how += f"; the frame moves unmeasured by {'an unknown amount' if unknown else f'{drift_mm * UM_PER_MM:g} um'}"
+    return GaugeNoise(noise_mm["scale"], noise_mm["joint"], noise_mm["frame"], how=how, frame_drift_mm=drift_mm)
+
+
+def _frame_drift_mm(aligned: AlignedRecording) -> float:
+    """Of the tip along each axis; 0 of links' lengths, which are measured between their joints."""
+    return 0.0 if aligned.model is None or aligned.of_links else aligned.model.frame_drift_mm
 
 
 def first_order_uncertainty(
@@ -83,7 +95,8 @@ def first_order_uncertainty(
     if fitted:
         derivatives = np.concatenate([aligned.columns(effect.effect, effect.constants) for effect in fitted], axis=2)
         parameters = np.sqrt(np.maximum(parameter_variance(derivatives, covariance), 0.0))
-    return Uncertainty(np.sqrt(variance) * UM_PER_MM, parameters * UM_PER_MM)
+    frame_mm = 0.0 if noise is None else noise.frame_drift_mm
+    return Uncertainty(np.sqrt(variance) * UM_PER_MM, parameters * UM_PER_MM, np.full(shape, frame_mm * UM_PER_MM))
 
 
 def monte_carlo(

@@ -11,13 +11,34 @@ from dataclasses import replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.compensation.compensation import compensate_cmm
+from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import Compensation, Contributions, GaugeValues, WarmStart
 from compd.model import MachineModel, tip_by_scales
+from compd.model.kernels import Reason
 from compd.model.kinematics import Pose
 from compd.rotation import rotation_vector, to_inner
 
 _NO_LENGTHS: FloatArray = np.zeros(0)
+
+
+def scales_of_command(model: MachineModel, tip_mm: FloatArray, rotation_rad: FloatArray | None) -> FloatArray:
+    """(N, m) mm since machine zero: what the actuators of a machine without scales do at the commanded poses.
+
+    Its controller computes them by the drawing, and drives them; nan where the machine as drawn has no such pose.
+
+    tip_mm : (N, 3), in {B0}; with the tool on the plate the place on the work, in {P}. Along an axis that the target
+        does not fix it may be nan.
+    rotation_rad : (N, 3), rotation vector of {P} in {B0}; None for the attitude at machine zero.
+    """
+    drawn = replace(model, effects=())
+    fixed = model.actuators.fixed.astype(bool)
+    tip_mm = np.where(fixed[:3], tip_mm, 0.0)
+    values = GaugeValues(
+        np.full((len(tip_mm), model.scales), np.nan), np.zeros(model.joint_weights.shape[1]), _NO_LENGTHS, {}
+    )
+    rotation_rad = rotation_rad if model.attitude_is_free else None
+    found, _ = compensate_machine_tool(drawn, tip_mm, rotation_rad, values, WarmStart.at_zero(drawn))
+    return np.where((found.reason == Reason.OK)[:, None], found.nominal_scale_mm, np.nan)
 
 
 def command_pose(model: MachineModel, wanted: Compensation) -> Compensation:

@@ -15,8 +15,8 @@ from compd.model.kinematics import Frame
 class GaugeValues(NamedTuple):
     """One snapshot, or N rows of them: changes since machine zero, signed as in equations (1), (6) and (7).
 
-    scale_mm : (..., m).  joint_mm : (..., k), in the wiring's order.  frame_mm : (..., 9), t1..t3, u1..u6; (..., 0)
-        where no comparator measures the frame, which is taken to stand still.
+    scale_mm : (..., m).  joint_mm : (..., k), in the wiring's order.  frame_mm : (..., 9), t1..t3, u1..u6; (..., 6),
+        u1..u6 alone, with t1..t3 as at machine zero; or (..., 0): the frame is taken to stand still.
     quantities : anything else by its name with unit (temperatures, forces), each (...): what effects need, or empty.
     time_s : (...), monotonic, for effects with a memory; rows follow each other in time.
     quantities_at_zero : the quantities at machine zero, by name: those from which effects count, or empty.

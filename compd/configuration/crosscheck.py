@@ -12,7 +12,7 @@ from compd.configuration.sections import Sections
 from compd.documents import Location
 from compd.errors import Problem
 from compd.gauge import Gauge, GaugeOptions
-from compd.operation_settings import FRAME_DISTANCES
+from compd.operation_settings import FRAME_DISTANCES, measured_distances
 
 # Packages whose drivers are covered by compd's own tests.
 _OWN_PACKAGES = ("compd", "compd_drivers")
@@ -218,13 +218,15 @@ def _frame_problems(sections: Sections) -> Iterator[Problem]:
             what="has frame comparators, but the geometry does not say where they stand",
             next_step="write `geometry: base: supports_B_mm` and `plate_points_M_mm`, or leave `frame` out",
         )
-    least = 1 if _is_whole(sections.wiring, "frame", "distance") else 0
+    whole = _is_whole(sections.wiring, "frame", "distance")
+    needed = FRAME_DISTANCES if any(counts[t] for t in FRAME_DISTANCES[:3]) else measured_distances(6)
     for distance in FRAME_DISTANCES:
+        least = 1 if whole and distance in needed else 0
         if not least <= counts[distance] <= 1:
             yield Problem(
                 where=sections.document.where(("wiring", "frame")),
                 what=f"frame distance {distance} is wired {counts[distance]} times",
-                allowed="t1..t3 and u1..u6, each exactly once; or none of them",
+                allowed="t1..t3 and u1..u6, each exactly once; u1..u6 alone; or none of them",
             )
 
 

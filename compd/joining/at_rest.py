@@ -185,9 +185,15 @@ def _problems(
     if recording.reference is not None:
         what = "has a reference already"
         add(recording.sidecar.path, what, recording.reference.quantity, "", "join to a recording of gauges alone")
-    if configuration is None or recording.scale_mm is None:
+    if configuration is None or recording.motion_mm is None:
         what = "points at rest are joined by the distances that the machine's kinematics expects"
-        add(recording.sidecar.path, what, recording.machine, "a machine with scales and a configuration", "--machine")
+        add(
+            recording.sidecar.path,
+            what,
+            recording.machine,
+            "scales or a commanded pose, and the machine's configuration",
+            "--machine",
+        )
     if instrument.sigma_um is not None and not 0 < instrument.sigma_um < np.inf:
         what, next_step = "no standard uncertainty", "leave --sigma-um out where it is not known"
         add(export.path, what, str(instrument.sigma_um), "more than 0 um", next_step)

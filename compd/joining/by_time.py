@@ -105,12 +105,12 @@ def match_by_time(
         Where the offset cannot be estimated, or no row matches.
     """
     problems = _problems(recording, track, instrument, moving)
-    if problems or recording.scale_mm is None:
+    if problems or recording.motion_mm is None:
         raise RecordingError(problems)
     if offset_s is None:
-        offset = estimate_offset(recording.time_s, recording.scale_mm, track)
+        offset = estimate_offset(recording.time_s, recording.motion_mm, track)
     else:
-        offset = evaluate_offset(recording.time_s, recording.scale_mm, track, offset_s)
+        offset = evaluate_offset(recording.time_s, recording.motion_mm, track, offset_s)
     still_mm = max(STILL_MM, _NOISE_SIGMAS * track.noise_mm)
     reference, left_out = _reference_at_rows(
         recording.time_s - offset.offset_s, track, offset, np.inf if moving else still_mm
@@ -188,9 +188,12 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
                 next_step="join with --by order, name or distance",
             )
         )
-    if recording.scale_mm is None:
+    if recording.motion_mm is None:
         problems.append(
-            Problem(where=str(recording.path), what="has no scales to compare the instrument's motion with")
+            Problem(
+                where=str(recording.path),
+                what="has neither scales nor a commanded pose to compare the instrument's motion with",
+            )
         )
     length = track.axes == (LENGTH,)
     links = 0 if recording.scale_mm is None else recording.scale_mm.shape[1]

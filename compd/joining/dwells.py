@@ -141,15 +141,15 @@ def _stretches_of_points(recording: Recording) -> list[tuple[IntArray, str]]:
 
 def _has_scales(recording: Recording) -> BoolArray:
     """(N,) rows with a value of every scale."""
-    assert recording.scale_mm is not None
-    return np.asarray(np.isfinite(recording.scale_mm).all(axis=1))
+    assert recording.motion_mm is not None
+    return np.asarray(np.isfinite(recording.motion_mm).all(axis=1))
 
 
 def _still_stretches(recording: Recording) -> list[tuple[IntArray, str]]:
     """Stretches in which no scale leaves the mean of the stretch so far by more than the limit."""
-    assert recording.scale_mm is not None
+    assert recording.motion_mm is not None
     usable = np.flatnonzero(_has_scales(recording) & ~recording.excluded)
-    scale_mm, time_s = recording.scale_mm[usable], recording.time_s[usable]
+    scale_mm, time_s = recording.motion_mm[usable], recording.time_s[usable]
     limit_mm = _limits_mm(scale_mm)
     stretches = []
     first = 0

@@ -7,10 +7,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.columns import (
+    COMMANDED_ATTITUDE_COLUMNS,
+    COMMANDED_COLUMNS,
+    frame_columns,
+    joint_columns,
+    scale_columns,
+)
+from compd.compensation import scales_of_command
 from compd.configuration import Configuration
 from compd.machine_builder import build_model
-from compd.model import observe, predict
+from compd.model import MachineModel, observe, predict
 from compd.model.kinematics import Movement
 from compd.units import UM_PER_MM
 
@@ -26,7 +33,7 @@ def expected_places_mm(
     """
     model = build_model(configuration.geometry, configuration.wiring)
     assert model.constants is not None
-    scale_mm = np.column_stack([columns[name] for name in scale_columns(model.scales)])
+    scale_mm = _scales_mm(model, columns)
     count, comparators = len(scale_mm), model.joint_weights.shape[1]
 
     def comparators_mm(names: tuple[str, ...]) -> FloatArray:
@@ -38,7 +45,7 @@ def expected_places_mm(
         model.constants,
         scale_mm=scale_mm,
         joint_mm=joint_mm,
-        frame_mm=comparators_mm(FRAME_COLUMNS),
+        frame_mm=comparators_mm(frame_columns(9)),
         quantities={},
         time_s=np.arange(count, dtype=np.float64),
         session_start=np.zeros(count, dtype=bool),
@@ -48,3 +55,13 @@ def expected_places_mm(
     if link is not None:
         return np.asarray(prediction.link_length_mm[:, link - 1 : link] - model.zero.link_length_mm[link - 1])
     return prediction.tip_mm
+
+
+def _scales_mm(model: MachineModel, columns: Mapping[str, FloatArray]) -> FloatArray:
+    """(D, m) as recorded, or as the controller drives the poses that it was told."""
+    if set(names := scale_columns(model.scales)) <= set(columns):
+        return np.column_stack([columns[name] for name in names])
+    nowhere = np.full(len(next(iter(columns.values()))), np.nan)
+    told = [columns[name] for name in COMMANDED_ATTITUDE_COLUMNS if name in columns]
+    tip_mm = np.column_stack([columns.get(name, nowhere) for name in COMMANDED_COLUMNS])
+    return scales_of_command(model, tip_mm, np.column_stack(told) if told else None)

@@ -20,7 +20,7 @@ from typing import Any
 import structlog
 
 from compd.clock import Clock, MonotonicClock
-from compd.columns import MODEL_COLUMNS
+from compd.columns import COMMANDED_ATTITUDE_COLUMNS, COMMANDED_COLUMNS, MODEL_COLUMNS
 from compd.configuration import Configuration, listed_code
 from compd.errors import DaemonError, StateError
 from compd.kernel_versions import kernel_versions
@@ -214,7 +214,9 @@ class Daemon:
                     status=report.message,
                     budget=BudgetMessage(pipeline.settings.model, self._newest_setpoint).message,
                     models=lambda: {**adopted.summary, **keeping(adopted.summary)},
-                    readings=ReadingsMessage(self._wires, self.latest.channels, model_columns(pipeline.settings.model)),
+                    readings=ReadingsMessage(
+                        self._wires, self.latest.channels, *model_columns(pipeline.settings.model, configuration)
+                    ),
                 ),
                 errands=Errands(
                     take_zero=zero_capture.start,
@@ -367,9 +369,17 @@ class Daemon:
         return zero
 
 
-def model_columns(model: MachineModel) -> tuple[str, ...]:
-    """Columns of a recording that are made of the setpoints: those of `machine: external`."""
-    return (*MODEL_COLUMNS, *model.columns) if isinstance(model, ExternalModel) else ()
+def model_columns(model: MachineModel, configuration: Configuration) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """Columns of a recording that are made of the setpoints, and the turn of {B0} in {M} that they need, or nothing.
+
+    Of `machine: external` the pose that it gives, of a machine without scales the one that its controller is told.
+    """
+    if isinstance(model, ExternalModel):
+        return (*MODEL_COLUMNS, *model.columns), ()
+    if configuration.wiring.scale or configuration.geometry.tool.on == "plate":
+        return (), ()
+    attitude = COMMANDED_ATTITUDE_COLUMNS if model.attitude_is_free else ()
+    return (*COMMANDED_COLUMNS, *attitude), configuration.geometry.base.rotation_B0_in_M_rad
 
 
 def _target_keys(configuration: Configuration) -> TargetKeys:

@@ -19,7 +19,7 @@ from compd.live.acquisition import (
 from compd.live.machine import MachineWires, Wire
 from compd.live.memory import TrustMemory
 from compd.model import MachineModel
-from compd.operation_settings import FRAME_DISTANCES
+from compd.operation_settings import measured_distances
 from compd.stated_noise import SAME_VALUE_SIGMAS, tolerance_mm
 from compd.units import UM_PER_MM, unit_of
 
@@ -59,12 +59,12 @@ def wired_trust(configuration: Configuration, wires: MachineWires, memory: Trust
 def wired_channels(configuration: Configuration, wires: MachineWires, model: MachineModel) -> list[WiredLength]:
     """What each channel measures, for the votes: lengths, then quantities."""
     wiring = configuration.wiring
-    distance_mm = dict(zip(FRAME_DISTANCES, model.zero.distances_mm.tolist(), strict=True))
+    distance_mm = dict(zip(measured_distances(9), model.zero.distances_mm.tolist(), strict=True))
     unknown = math.nan
     parts: list[tuple[Literal["scale", "joint", "frame"], int, str, float]] = [
         *(("scale", link, "", unknown) for link in range(1, len(wiring.scale) + 1)),
         *(("joint", joint.link, joint.role, unknown) for joint in wiring.joint),
-        *(("frame", 0, "", distance_mm[distance]) for distance in FRAME_DISTANCES[: len(wiring.frame)]),
+        *(("frame", 0, "", distance_mm[distance]) for distance in measured_distances(len(wiring.frame))),
     ]
     lengths = [
         WiredLength(kind, wire.meaning, wire.sign, link, role, length_mm, wire.noise.um / UM_PER_MM)

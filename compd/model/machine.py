@@ -53,6 +53,8 @@ class MachineModel:
     weight_N : the moving platform's, at weight_at_P_mm (3,).
     effects : in their order.  covariance : (P, P) of all their fitted numbers jointly.
     constants : what effects need beyond the kinematics; None where none was computed, as for a model without effects.
+    frame_drift_mm : standard uncertainty of the tip along each axis by what the frame moves unmeasured; nan where it is
+        not known.
     """
 
     frame: FrameGeometry
@@ -68,6 +70,7 @@ class MachineModel:
     effects: tuple[FittedEffect, ...] = ()
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     constants: MachineConstants | None = None
+    frame_drift_mm: float = 0.0
 
     @property
     def links(self) -> int:

@@ -47,12 +47,13 @@ def observe(
     """N rows by equations (1), (3) and forward kinematics; Newton starts at machine zero, so that no row needs another.
 
     constants : of this machine, from `machine_constants`.
-    scale_mm (N, m), joint_mm (N, k), frame_mm (N, 9): changes since machine zero.  quantities: (N,) each.
-    time_s (N,).  session_start (N,): True where a row has no history.  quantities_at_zero: as in `Observations`.
+    scale_mm (N, m), joint_mm (N, k), frame_mm (N, 9), or as in `whole_frame_mm`: changes since machine zero.
+    quantities: (N,) each.  time_s (N,).  session_start (N,): True where a row has no history.
+    quantities_at_zero: as in `Observations`.
     A row that has no pose is nan in everything that the pose gives.
     Raises CompdError where a quantity is a column of the reference.
     """
-    zero = model.zero
+    zero, frame_mm = model.zero, whole_frame_mm(frame_mm)
     frame = solve_frame(model.frame, zero.distances_mm + frame_mm)
     shortening_mm, _ = joint_shortening(model.joint_weights, joint_mm)
     mechanism, length_mm = model.links_on(frame.rotation_M_B, frame.base_joints_M_mm, scale_mm)
@@ -69,6 +70,11 @@ def observe(
     return observe_at_pose(constants, inputs, session_start, movement)
 
 
+def whole_frame_mm(frame_mm: FloatArray) -> FloatArray:
+    """(N, 9) changes of t1..t3, u1..u6; those before the ones that are measured, (N, 6) or (N, 0), stay 0."""
+    return np.pad(frame_mm, ((0, 0), (9 - frame_mm.shape[-1], 0)))
+
+
 def observe_at_pose(
     constants: MachineConstants, inputs: EffectInputs, session_start: BoolArray, movement: Movement
 ) -> Observations:
@@ -79,7 +85,7 @@ def observe_at_pose(
         constants=constants,
         scale_mm=gauges.scale_mm,
         joint_mm=gauges.joint_mm,
-        frame_mm=gauges.frame_mm,
+        frame_mm=whole_frame_mm(gauges.frame_mm),
         quantities=quantities,
         time_s=gauges.time_s,
         session_start=session_start,

@@ -46,7 +46,8 @@ def tip_derivatives(
 ) -> TipDerivatives:
     """Of one snapshot, at the pose without effects.
 
-    scale_mm (m,), joint_mm (k,), frame_mm (9,), or (0,) of a frame that is not measured : changes since machine zero.
+    scale_mm (m,), joint_mm (k,), frame_mm (9,), (6,) of u1..u6 alone, or (0,) : changes since
+        machine zero.
     quantities : those that the effects need.
     quantities_at_zero : the same at machine zero.
     sigmas : standard deviation of each, in its own unit; nan for one that is not named.
@@ -84,7 +85,9 @@ def tip_derivatives(
         arrays,
     )
     by_port, by_theta, by_quantity = arrays
-    derivatives = TipDerivatives(by_port[:, : model.scales + len(joint_mm) + len(frame_mm)], by_theta, by_quantity)
+    t1 = model.scales + len(joint_mm)
+    by_gauge = np.delete(by_port[:, : t1 + 9], np.s_[t1 : t1 + 9 - len(frame_mm)], axis=1)
+    derivatives = TipDerivatives(by_gauge, by_theta, by_quantity)
     if program.given:
         rows = _rows(model, scale_mm, joint_mm, frame_mm, quantities, quantities_at_zero, time_s, effects)
         _add_python_effects(model, rows, raised, effects, by_port, derivatives)

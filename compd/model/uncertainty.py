@@ -23,8 +23,8 @@ GAUGE_PORTS: tuple[Port, ...] = ("scale", "joint", "frame")
 class GaugeNoise(NamedTuple):
     """Standard deviation of one reading of each gauge.
 
-    scale_mm (n,), joint_mm (k,), frame_mm (9,), or (0,) of a frame that is not measured.
-    frame_drift_mm : of the tip along each axis, by what a frame moves that is not measured; 0 of one that is.
+    scale_mm (n,), joint_mm (k,), frame_mm (9,), (6,) of u1..u6 alone, or (0,).
+    frame_drift_mm : of the tip along each axis, by what the frame moves unmeasured; 0 with all nine distances.
     quantities : of other gauges by name, in their own unit; one that is not named has an unknown noise.
     how : how the noise was found, for people.
     """

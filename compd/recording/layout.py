@@ -11,17 +11,20 @@ from compd.columns import (
     ATTITUDE_COLUMNS,
     ATTITUDES,
     AXES,
+    COMMANDED_ATTITUDE_COLUMNS,
+    COMMANDED_COLUMNS,
     DISTANCE_COLUMN,
-    FRAME_COLUMNS,
     ID_COLUMNS,
     SKEW_COLUMN,
     approach_columns,
+    frame_columns,
     joint_columns,
     parse_name,
     scale_columns,
 )
 from compd.configuration import Configuration
 from compd.errors import Problem
+from compd.operation_settings import FRAME_COUNTS
 from compd.recording.reference import OF_FIXED_PLACES, sigma_key
 from compd.recording.sidecar import EXTERNAL, PLACE, TIME, Sidecar
 from compd.tables import ProblemList
@@ -37,23 +40,25 @@ class Layout:
     Attributes
     ----------
     scales, joints : how many columns; 0 = none, or an external model.
-    frame : whether the nine frame comparators are there.
+    frame : how many frame comparators: nine, the six of u1 to u6, or none.
     approach : whether there is an approach column for every scale; of an external model, any.
     axes, attitude : of the reference's position; whether it has an attitude.
     links : the links (1-based) whose length the reference measures.
     covariates : names of all other columns.
+    commanded : names of the columns of the commanded pose, of a machine without scales.
     ending : what the names of reference and model end in: "mm", or another unit that the sidecar names.
     """
 
     scales: int
     joints: int
-    frame: bool
+    frame: int
     approach: bool
     axes: tuple[str, ...]
     attitude: bool
     links: tuple[int, ...]
     covariates: tuple[str, ...]
     ending: str = "mm"
+    commanded: tuple[str, ...] = ()
 
     @property
     def reference(self) -> tuple[str, ...]:
@@ -77,14 +82,18 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
     scales = _count(names, "scale", "mm", external, problems)
     joints = _count(names, "joint", "um", external, problems)
     approaches = _count(names, "approach", "", external, problems)
-    frame = [name for name in FRAME_COLUMNS if name in names]
+    frame = [name for name in frame_columns(9) if name in names]
     if external:
         # without a known machine every gauge is a quantity like any other
         scales, joints, frame = 0, 0, []
     quantity = sidecar.reference.quantity if sidecar and sidecar.reference else None
+    turned = [name for name in COMMANDED_ATTITUDE_COLUMNS if name in names]
+    commanded = () if external else tuple(name for name in (*COMMANDED_COLUMNS, *turned) if name in names)
     if not external:
-        if not scales and not any(name.startswith("scale_") for name in names):
-            _add_missing(["scale_1_mm, scale_2_mm, ..."], names, problems)
+        if not scales and not commanded and not any(name.startswith("scale_") for name in names):
+            _add_missing(["scale_1_mm, scale_2_mm, ..., or commanded_x_mm, ... without scales"], names, problems)
+        if 0 < len(turned) < 3:
+            _add_missing([name for name in COMMANDED_ATTITUDE_COLUMNS if name not in turned], names, problems)
         if approaches and scales and approaches != scales:
             problems.add(
                 "",
@@ -93,15 +102,16 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
                 next_step="add or delete columns",
             )
         # whether the machine has frame comparators at all, its configuration says: `machine_problems`
-        if 0 < len(frame) < 9:
-            _add_missing([name for name in FRAME_COLUMNS if name not in frame], names, problems)
+        if frame and tuple(frame) not in map(frame_columns, FRAME_COUNTS):
+            needed = frame_columns(9 if any(name.startswith("frame_t") for name in frame) else 6)
+            _add_missing([name for name in needed if name not in frame], names, problems)
     links = tuple(_numbers(names, "reference_link", ending))
     axes = tuple(axis for axis in AXES if f"reference_{axis}_{ending}" in names)
     attitude = [axis for axis in ATTITUDES if f"reference_{axis}_rad" in names]
     if quantity in ("ball_plate", *OF_FIXED_PLACES):
         axes = AXES
     has_approach = approaches > 0 and (external or approaches == scales)
-    layout = Layout(scales, joints, len(frame) == 9, has_approach, axes, len(attitude) == 3, links, (), ending)
+    layout = Layout(scales, joints, len(frame), has_approach, axes, len(attitude) == 3, links, (), ending, commanded)
     if sidecar is not None and reference_valid:
         _check_reference(names, sidecar, layout, attitude, problems)
         _check_model(names, external, layout, problems)
@@ -136,7 +146,7 @@ def machine_problems(
     comparisons = (
         ("scale", scales, len(configuration.wiring.scale), "scale_<i>_mm"),
         ("joint comparator", joints, len(configuration.wiring.joint), "joint_<k>_um"),
-        ("frame comparator", frame, wired_frame, "frame_t1_um ... frame_u6_um"),
+        ("frame comparator", frame, wired_frame, ", ".join(frame_columns(wired_frame))),
     )
     for what, count, expected, column in comparisons:
         if count != expected:
@@ -144,7 +154,7 @@ def machine_problems(
                 Problem(
                     where=where,
                     what=f"{count} {what} columns, {configuration.machine} has {expected}",
-                    allowed=f"{expected} {column}",
+                    allowed=f"{expected} {column}" if expected else "none",
                     next_step="add the missing columns, or name the right machine",
                 )
             )
@@ -303,8 +313,8 @@ def _check_folds(names: Sequence[str], sidecar: Sidecar, problems: ProblemList) 
 
 def _covariates(names: Sequence[str], layout: Layout) -> Iterable[str]:
     """Names of the columns that have no attribute of their own in a Recording."""
-    own = {"time_s", SKEW_COLUMN, *ID_COLUMNS, *(FRAME_COLUMNS if layout.frame else ())}
-    own |= {*scale_columns(layout.scales), *joint_columns(layout.joints)}
+    own = {"time_s", SKEW_COLUMN, *ID_COLUMNS, *frame_columns(layout.frame)}
+    own |= {*scale_columns(layout.scales), *joint_columns(layout.joints), *layout.commanded}
     own |= {*approach_columns(layout.scales)} if layout.approach else set()
     return (name for name in names if name not in own and not name.startswith(("reference_", "model_")))
 

@@ -11,7 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray, TextArray
-from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.columns import (
+    COMMANDED_ATTITUDE_COLUMNS,
+    COMMANDED_COLUMNS,
+    frame_columns,
+    joint_columns,
+    scale_columns,
+)
+from compd.display_unit import MM_PER_RAD
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
 from compd.recording.reference import Reference
@@ -52,6 +59,8 @@ class Recording:
         Text ids of points are numbered in sorted order; `point_labels` has the texts, empty where ids are numbers.
     scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
         None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
+    commanded_mm, commanded_rotation_rad : (N, 3) or None: the pose that the controller of a machine without scales was
+        told; nan along an axis that has no column.
     approach : (N, n) or None: +1/-1, the direction in which link i last moved; from the columns, else from
         the scales (`compd.travel_direction`); nan where it is not known.
         With `machine: external` None; gauges and directions are quantities then.
@@ -107,6 +116,8 @@ class Recording:
     warnings: tuple[Problem, ...] = ()
     has_time: bool = True
     point_labels: tuple[str, ...] = ()
+    commanded_mm: FloatArray | None = None
+    commanded_rotation_rad: FloatArray | None = None
 
     @property
     def machine(self) -> str:
@@ -153,14 +164,26 @@ class Recording:
 
     @property
     def gauge_columns(self) -> tuple[str, ...]:
-        """Names of the columns behind scale_mm, joint_mm and frame_mm."""
+        """Names of the columns behind scale_mm, joint_mm and frame_mm; without scales those of the commanded pose."""
         scales = 0 if self.scale_mm is None else self.scale_mm.shape[1]
         joints = 0 if self.joint_mm is None else self.joint_mm.shape[1]
+        commanded = () if scales else (*COMMANDED_COLUMNS, *COMMANDED_ATTITUDE_COLUMNS)
         return (
+            *(name for name in commanded if name in self.columns),
             *scale_columns(scales),
             *joint_columns(joints),
-            *(FRAME_COLUMNS if self.frame_mm is not None else ()),
+            *frame_columns(0 if self.frame_mm is None else self.frame_mm.shape[1]),
         )
+
+    @property
+    def motion_mm(self) -> FloatArray | None:
+        """(N, k) what tells where the machine is: the scales; without them the commanded pose, a urad as a um."""
+        if self.scale_mm is not None or self.commanded_mm is None:
+            return self.scale_mm
+        parts = [self.commanded_mm[:, ~np.isnan(self.commanded_mm).all(axis=0)]]
+        if self.commanded_rotation_rad is not None:
+            parts.append(self.commanded_rotation_rad * MM_PER_RAD)
+        return np.concatenate(parts, axis=1)
 
     @property
     def reference_columns(self) -> tuple[str, ...]:

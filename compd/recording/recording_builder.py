@@ -16,10 +16,12 @@ from compd.columns import (
     ATTITUDE_COLUMNS,
     ATTITUDES,
     AXES,
+    COMMANDED_ATTITUDE_COLUMNS,
+    COMMANDED_COLUMNS,
     DISTANCE_COLUMN,
-    FRAME_COLUMNS,
     approach_columns,
     correct_names,
+    frame_columns,
     joint_columns,
     scale_columns,
 )
@@ -35,7 +37,7 @@ from compd.recording.checks import (
     largest_joint_um,
 )
 from compd.recording.layout import Layout, machine_problems, read_layout
-from compd.recording.quaternion import with_rotation_vector
+from compd.recording.quaternion import with_rotation_vectors
 from compd.recording.recording import Recording
 from compd.recording.sidecar import Sidecar, read_sidecar
 from compd.tables import FIRST_ROW, ProblemList, Table, rows_text
@@ -95,7 +97,7 @@ class RecordingBuilder:
         if table is None:
             raise RecordingError([*problems, *table_problems.problems])
         table = correct_names(table, table_problems)
-        table = with_rotation_vector(table, table_problems)
+        table = with_rotation_vectors(table, table_problems)
         has_time = "time_s" in table.letters or sidecar is None
         if not has_time:
             table = _with_row_numbers(table, self._count.rows)
@@ -110,7 +112,7 @@ class RecordingBuilder:
         if self._plate is not None and "ball" in table.columns:
             check_balls(table, self._plate, table_problems)
         if self._configuration is not None and sidecar is not None and sidecar.machine:
-            counts = (layout.scales, layout.joints, len(FRAME_COLUMNS) if layout.frame else 0)
+            counts = (layout.scales, layout.joints, layout.frame)
             quantity = sidecar.reference.quantity if sidecar.reference else None
             problems += machine_problems(sidecar.machine, counts, quantity, self._configuration, str(sidecar.path))
         problems += table_problems.problems
@@ -182,11 +184,12 @@ class RecordingBuilder:
         if approach is None and scale_mm is not None:
             approach = self._directions.of_block(scale_mm, session)
         joint_um = stack(joint_columns(layout.joints))
-        frame_um = stack(FRAME_COLUMNS) if layout.frame else None
+        frame_um = stack(frame_columns(layout.frame))
         position = in_mm("reference", AXES)
         links = [f"link_{i}" for i in layout.links]
         if self._plate is not None and ball is not None:
             position = self._plate.positions_of_mm(ball)
+        commanded_mm = np.stack([columns.get(name, np.full(len(kept), np.nan)) for name in COMMANDED_COLUMNS], axis=1)
         distance_mm = columns.get(DISTANCE_COLUMN)
         if sidecar.reference is not None and sidecar.reference.radius_mm is not None:
             distance_mm = np.full(len(kept), sidecar.reference.radius_mm)
@@ -202,6 +205,8 @@ class RecordingBuilder:
             scale_mm=scale_mm,
             joint_mm=_to_mm(joint_um),
             frame_mm=_to_mm(frame_um),
+            commanded_mm=commanded_mm if layout.commanded else None,
+            commanded_rotation_rad=stack(COMMANDED_ATTITUDE_COLUMNS) if layout.commanded else None,
             approach=approach,
             approach_measured=layout.approach,
             quantities={name: columns[name] for name in layout.covariates},
@@ -279,7 +284,7 @@ def _needed_columns(layout: Layout, sidecar: Sidecar | None, names: Collection[s
     if reference is not None and reference.of_fixed_places:
         own = ("pin",) if reference.quantity == "fixed_point" else (DISTANCE_COLUMN, "ball")
         reference_columns = [name for name in own if name in names]
-    predictors = list(scale_columns(layout.scales))
+    predictors = [*scale_columns(layout.scales), *layout.commanded]
     if sidecar is not None and sidecar.external:
         predictors = [f"model_{name}" for name in layout.reference]
     return ["time_s", *predictors, *(reference_columns if reference is not None else ())]

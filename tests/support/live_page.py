@@ -65,18 +65,22 @@ def served(*options: str, name: str = "tripod-cmm.yaml", simulate: Sequence[str]
 def running_machine(
     name: str = "tripod-cmm.yaml", simulate: Sequence[str] = AT_REST
 ) -> Iterator[tuple[Path, ControlClient]]:
-    """A simulated machine and its daemon, zero taken; their directory, and the simulation's control."""
+    """A simulated machine and its daemon, zero taken; their directory, and the simulation's control.
+
+    name : of a shipped machine, or the path of another.
+    """
     with run_directory() as directory:
-        patient = directory / "patient" / name
+        shipped = CONFIG / name
+        patient = directory / "patient" / shipped.name
         patient.parent.mkdir()
         # a browser that starts keeps simulated gauges from answering
-        patient.write_text(made_patient((CONFIG / name).read_text()))
+        patient.write_text(made_patient(shipped.read_text()))
         commands = [
             Command(
                 ["simulate", str(patient), "--directory", str(directory), *simulate],
                 ready=directory / "control.sock",
             ),
-            Command(["run", str(directory / name)], ready=directory / "compd.sock"),
+            Command(["run", str(directory / shipped.name)], ready=directory / "compd.sock"),
         ]
         with run_commands(commands, log=directory / "output.log"):
             take_zero(directory / "compd.sock")

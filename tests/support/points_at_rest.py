@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
-from compd.columns import FRAME_COLUMNS
+from compd.columns import frame_columns
 from compd.instruments import InstrumentExport
 from compd.recording import write_recording
 
@@ -25,7 +25,7 @@ def write_gauges(path: Path, time_s: FloatArray | None, scale_mm: FloatArray, **
     columns = {} if time_s is None else {"time_s": time_s}
     columns |= {f"scale_{i + 1}_mm": scale_mm[:, i] for i in range(3)}
     columns |= {f"joint_{k}_um": np.zeros(len(scale_mm)) for k in range(1, 10)}
-    columns |= {name: np.zeros(len(scale_mm)) for name in FRAME_COLUMNS}
+    columns |= {name: np.zeros(len(scale_mm)) for name in frame_columns(9)}
     write_recording(path, {**columns, **extra}, SIDECAR)
     return path
 

@@ -33,7 +33,9 @@ class Run:
         self.packer = CyclePacker(Directions(machine.wires.scale.wires))
         self.unpacker = CycleUnpacker()
         model = machine.settings.model
-        self.transcript = ReadingsMessage(machine.wires, machine.latest.channels, model_columns(model))
+        self.transcript = ReadingsMessage(
+            machine.wires, machine.latest.channels, *model_columns(model, machine.configuration)
+        )
         self.version = {
             "class": "VERSION",
             "protocol": 1,

@@ -147,6 +147,8 @@ def _summary(contents: Recording) -> list[str]:
         )
         if values is not None
     ]
+    if contents.commanded_mm is not None:
+        gauges.insert(0, "none along the links, but the commanded pose")
     needed = (*contents.gauge_columns, *contents.reference_columns, *contents.model_columns)
     usable = contents.usable(needed)
     hours = (contents.time_s[-1] - contents.time_s[0]) / 3600.0

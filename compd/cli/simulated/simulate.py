@@ -204,7 +204,7 @@ def _status(simulation: Simulation) -> Text:
     """One line: action, tip, temperatures, displacement of the frame."""
     from rich.text import Text
 
-    from compd.simulation import DISTANCES
+    from compd.units import UM_PER_MM
 
     truth, sense = simulation.truth(), simulation.world.sense
     doing = {
@@ -216,11 +216,11 @@ def _status(simulation: Simulation) -> Text:
         "blocked": "blocked: the links cannot meet there",
     }[truth["mode"]]
     tip = " ".join(f"{value:9.4f}" for value in truth["tip_mm"])
-    frame_um = max((sense(f"frame_{name}") for name in DISTANCES), key=abs) * 1e3
+    frame_mm = [sense(name) for name in simulation.world.names if name.startswith("frame_")]
+    frame = f"  frame {max(frame_mm, key=abs) * UM_PER_MM:+.1f} um at most" if frame_mm else ""
     return Text(
         f"{truth['time_s']:8.1f} s  {doing:<28} tip in {{{truth['tip_frame']}}} {tip} mm  "
-        f"room {sense('temperature_room_degC'):.2f}, link 1 {sense('temperature_link_1_degC'):.2f} degC  "
-        f"frame {frame_um:+.1f} um at most",
+        f"room {sense('temperature_room_degC'):.2f}, link 1 {sense('temperature_link_1_degC'):.2f} degC{frame}",
         no_wrap=True,
         overflow="ellipsis",
     )

@@ -15,6 +15,7 @@ from compd.comparison.alignment.registration import Registration, register
 from compd.comparison.alignment.target_place import PlacedTarget, place_target
 from compd.comparison.alignment.velocity import velocities
 from compd.comparison.criteria import ComparisonCriteria, SpeedCriteria
+from compd.compensation import scales_of_command
 from compd.configuration import Configuration
 from compd.display_unit import ATTITUDE_LABELS
 from compd.errors import Problem, RecordingError
@@ -23,6 +24,7 @@ from compd.model import MachineModel, observe
 from compd.model.effects import Observations
 from compd.model.kinematics import Movement
 from compd.recording import Recording
+from compd.travel_direction import row_directions
 
 
 def align_recording(
@@ -218,20 +220,12 @@ def _observations(
     """
     assert model.constants is not None
     count = recording.rows
-    scale_mm = recording.scale_mm
-    if scale_mm is None:
-        raise RecordingError(
-            Problem(
-                where=str(recording.path),
-                what="has no scale columns",
-                allowed="scale_1_mm ...",
-                next_step="a machine's recording needs its scales; `machine: external` needs none",
-            )
-        )
+    scale_mm = _scales_mm(recording, model)
     comparators = model.joint_weights.shape[1]
     joint_mm = np.zeros((count, comparators)) if recording.joint_mm is None else recording.joint_mm
-    frame_mm = np.zeros((count, 9)) if recording.frame_mm is None else recording.frame_mm
-    approach = np.zeros_like(scale_mm) if recording.approach is None else np.nan_to_num(recording.approach)
+    frame_mm = np.zeros((count, 0)) if recording.frame_mm is None else recording.frame_mm
+    approach = row_directions(scale_mm, recording.session) if recording.approach is None else recording.approach
+    approach = np.nan_to_num(approach)
     at_point = np.zeros(count, dtype=bool) if recording.point is None else recording.point >= 0
     if recording.has_time:
         velocity = velocities(recording.time_s, starts, at_point, scale_mm, joint_mm, criteria)
@@ -255,6 +249,22 @@ def _observations(
         return rows
     direction = () if recording.approach_measured else ("direction",)
     return replace(rows, lacking=frozenset({"time", "order", "motion", *direction}))
+
+
+def _scales_mm(recording: Recording, model: MachineModel) -> FloatArray:
+    """(N, m) as recorded, or as the controller drives the poses that it was told."""
+    if recording.scale_mm is not None:
+        return recording.scale_mm
+    if recording.commanded_mm is not None:
+        return scales_of_command(model, recording.commanded_mm, recording.commanded_rotation_rad)
+    raise RecordingError(
+        Problem(
+            where=str(recording.path),
+            what="has neither scale columns nor a commanded pose",
+            allowed="scale_1_mm ..., or commanded_x_mm ...",
+            next_step="a machine's recording needs one of the two; `machine: external` needs none",
+        )
+    )
 
 
 def session_starts(recording: Recording) -> BoolArray:

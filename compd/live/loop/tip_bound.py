@@ -164,7 +164,7 @@ def _unknown(bound: TipBound | None, needed: tuple[str, ...], settings: CycleSet
     if bound is None:
         unstated = dict.fromkeys(w.channel.split(".")[0] for w in wires.length_wires if math.isnan(w.noise.um))
         if not unstated:
-            return "nothing measures the frame; state how far that moves the tip, `wiring: frame_drift_um`"
+            return "the frame is not measured whole; state how far that moves the tip, `wiring: frame_drift_um`"
         return f"nobody states how much {_listed(list(unstated))} scatters; give `noise_um` of it under `gauges:`"
     unlimited = [k for k, mm in enumerate(bound.lengths_mm.tolist()) if math.isinf(mm)]
     unmoved = [k for k, mm in enumerate(bound.lengths_mm.tolist()) if math.isnan(mm)]

@@ -26,15 +26,15 @@ def stated_noise(configuration: Configuration, wires: MachineWires, readings: in
     """Of the lengths, which are each the difference of two readings: now and at machine zero.
 
     At zero many readings are averaged, which makes them no better than one where the last digit stands still. None
-    where a length gauge states none, or where nothing is known of a frame that is not measured: then the tip's
+    where a length gauge states none, or where nothing is known of a frame that is not measured whole: then the tip's
     uncertainty is not known.
 
     readings : as of which a length counts; of releases up to 0.2.0, 1.
     """
     lengths_mm = np.array([wire.noise.um * math.sqrt(readings) for wire in wires.length_wires]) / UM_PER_MM
     wiring = configuration.wiring
-    drift_um = 0.0 if wiring.frame else wiring.frame_drift_um
-    if drift_um is None or not np.isfinite(lengths_mm).all():
+    drift_um = wiring.unmeasured_frame_um
+    if math.isnan(drift_um) or not np.isfinite(lengths_mm).all():
         return None
     quantities = {quantity.name: quantity.noise for quantity in wiring.quantities if quantity.noise}
     return _noise(lengths_mm, wires, quantities, "stated", drift_um / UM_PER_MM)

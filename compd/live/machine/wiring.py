@@ -160,7 +160,7 @@ class MachineWires:
     scale : in the order of the links.
     joint, frame : the two parts of the comparators.
     lengths : scales, joint and frame comparators.
-    comparators : first the k = `joints` joint comparators, then t1..t3 and u1..u6 of the frame.
+    comparators : first the k = `joints` joint comparators, then those of t1..t3 and u1..u6 of the frame.
     tool_on_plate : whether the tool stands on the plate and the moving platform carries the work.
     """
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from scipy.spatial.transform import Rotation
+
 from compd.columns import MODEL_COLUMNS, SKEW_COLUMN, approach_columns, decimals
 from compd.live.record.part_table import Row
 from compd.setpoint_states import Mode
@@ -31,6 +33,7 @@ class TableRows:
         of_gauges = ["time_s", *(column["column"] for column in self._columns), SKEW_COLUMN]
         self._decimals = {name: decimals(name) for name in of_gauges}
         self._model: Sequence[str] = watch.get("model_columns", ())
+        self._rotation_B0_rad: Sequence[float] | None = watch.get("rotation_B0_in_M_rad")
         self._decimals |= {name: decimals(name) for name in self._model}
         self.names = [*of_gauges, *approach_columns(self._links), *self._model]
         self.in_full = {column["column"] for column in self._columns if "sign" not in column}
@@ -48,14 +51,26 @@ class TableRows:
         return row
 
     def _pose(self, setpoint: Message) -> list[float | None]:
-        """The tip before any correction, and what the class gives; None where the setpoint is not valid."""
+        """The tip before any correction, and what the class gives; without scales the pose that the controller is told.
+
+        None where the setpoint is not valid.
+        """
         if not setpoint["valid"]:
             return [None] * len(self._model)
+        if self._rotation_B0_rad is not None:
+            return self._told(setpoint, self._rotation_B0_rad)
         tip_mm = setpoint["tip_M_mm"]
         if setpoint["mode"] == Mode.CMM:
             tip_mm = [tip + undone for tip, undone in zip(tip_mm, setpoint["tip_correction_mm"], strict=True)]
         known = {**dict(zip(MODEL_COLUMNS, tip_mm, strict=True)), **setpoint.get("own_columns", {})}
         return [self._number(name, known[name]) if name in known else None for name in self._model]
+
+    def _told(self, setpoint: Message, rotation_B0_in_M_rad: Sequence[float]) -> list[float | None]:
+        """The target with its correction, in {B0}."""
+        told = [tip + more for tip, more in zip(setpoint["tip_B0_mm"], setpoint["tip_correction_mm"], strict=True)]
+        attitude = Rotation.from_rotvec(rotation_B0_in_M_rad).inv() * Rotation.from_rotvec(setpoint["rotation_M_rad"])
+        told += (Rotation.from_rotvec(setpoint["rotation_correction_rad"]) * attitude).as_rotvec().tolist()
+        return [self._number(name, value) for name, value in zip(self._model, told, strict=False)]
 
     def _value(self, column: Message, reading: Message, now_s: float) -> float | None:
         """None where the reading is not good, or too old for the daemon to use."""

@@ -44,7 +44,11 @@ class WatchKeys(SentMessage):
     rate_hz: float | None = Field(default=None, description="as in the request, Hz")
     columns: list[ColumnKeys] | None = Field(default=None, description="of readings: which channel is which column")
     model_columns: list[str] | None = Field(
-        default=None, description="of readings, with `machine: external`: columns that are made of the setpoints"
+        default=None,
+        description="of readings, with `machine: external` and without scales: columns that are made of the setpoints",
+    )
+    rotation_B0_in_M_rad: list[float] | None = Field(
+        default=None, description="of readings, without scales: the attitude of {B0} in {M}, as a rotation vector, rad"
     )
 
 
@@ -74,8 +78,7 @@ class WatchRequest(Request):
             raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
         client.watch(self.rate_hz, Stream.READINGS)
         readings = context.messages.readings
-        model_columns = {"model_columns": readings.model_columns} if readings.model_columns else {}
-        return line(message | {"columns": readings.columns} | model_columns)
+        return line(message | {"columns": readings.columns} | readings.from_setpoints)
 
 
 class TargetRequest(Request):

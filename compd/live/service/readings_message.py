@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from compd.columns import FRAME_COLUMNS, joint_columns, scale_columns
+from compd.columns import frame_columns, joint_columns, scale_columns
 from compd.errors import Problem, StateError
 from compd.gauge import Quality, Reading, ReadingMotion
 from compd.live.loop import CycleInputs, CycleState, SentCycle, Target, setpoint_line, with_zero_of
@@ -42,10 +42,24 @@ class RecordedCycle(NamedTuple):
 class ReadingsMessage:
     """Makes the READINGS messages of a machine, and the `columns` that describe them in the answer to WATCH."""
 
-    def __init__(self, wires: MachineWires, channels: Sequence[str], model_columns: Sequence[str] = ()) -> None:
-        """`channels`: names of a snapshot's readings, in order. `model_columns`: of a recording, that are made of
-        setpoints: the pose that own kinematics or a client gives, and what its class gives beside it."""
-        self.model_columns = list(model_columns)
+    def __init__(
+        self,
+        wires: MachineWires,
+        channels: Sequence[str],
+        model_columns: Sequence[str] = (),
+        rotation_B0_in_M_rad: Sequence[float] = (),
+    ) -> None:
+        """channels : names of a snapshot's readings, in order.
+
+        model_columns : of a recording, that are made of setpoints: the pose that own kinematics or a client gives and
+        what its class gives beside it, or the one that the controller of a machine without scales is told.
+        rotation_B0_in_M_rad : (3,), where these columns need it.
+        """
+        self.from_setpoints: dict[str, list[str] | list[float]] = {}
+        if model_columns:
+            self.from_setpoints["model_columns"] = list(model_columns)
+        if rotation_B0_in_M_rad:
+            self.from_setpoints["rotation_B0_in_M_rad"] = list(rotation_B0_in_M_rad)
         self.columns = columns(wires)
         self._channels = tuple(channels)
 
@@ -83,7 +97,7 @@ def columns(wires: MachineWires) -> list[dict[str, Any]]:
     sign here and is recorded as it is read.
     """
     names = [*scale_columns(len(wires.scale.wires)), *joint_columns(wires.joints)]
-    names += FRAME_COLUMNS[: len(wires.frame.wires)]
+    names += frame_columns(len(wires.frame.wires))
     lengths: list[dict[str, Any]] = [
         {"column": name, "channel": wire.channel, "sign": wire.sign, "stale_after_s": wire.stale_after_s}
         for name, wire in zip(names, wires.length_wires, strict=True)

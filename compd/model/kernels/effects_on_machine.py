@@ -14,7 +14,7 @@ from compd.arrays import FloatArray
 from compd.jit import helper
 from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.joints import shorten_by_joints
-from compd.model.kernels.machine_solver import copy_frame, copy_pose, inverse_pose, solve_frame
+from compd.model.kernels.machine_solver import copy_frame, copy_pose, frame_change_mm, inverse_pose, solve_frame
 from compd.model.kernels.reason_codes import OK
 from compd.model.kernels.row_arguments import EffectArrays
 from compd.model.kernels.standing_machine import inverse_standing, stand_on
@@ -50,7 +50,7 @@ def set_row(
     for i in range(k):
         row.joint_mm[i] = joint_mm[i]
     for i in range(9):
-        row.frame_mm[i] = frame_mm[i] if i < frame_mm.shape[0] else 0.0
+        row.frame_mm[i] = frame_change_mm(frame_mm, i)
     for i in range(3):
         row.origin_M_mm[i] = pose.origin_M_mm[i]
         row.tip_M_mm[i] = tip_M_mm[i]
@@ -122,8 +122,7 @@ def _add_to_machine(
         distances_mm = np.empty(9)
         for i in range(9):
             plate_points_M_mm[i // 3, i % 3] = model.plate_points_M_mm[i // 3, i % 3] + added[plate + i]
-            shown_mm = frame_mm[i] if i < frame_mm.shape[0] else 0.0
-            distances_mm[i] = model.zero_distances_mm[i] + (shown_mm + added[m + k + i])
+            distances_mm[i] = model.zero_distances_mm[i] + (frame_change_mm(frame_mm, i) + added[m + k + i])
         solve_frame(model, plate_points_M_mm, distances_mm, nominal_frame.supports_M_mm, frame)
     if model.by_actuators:
         stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, altered)

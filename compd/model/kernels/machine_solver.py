@@ -43,12 +43,20 @@ def solve_frame(
 
 
 @helper
+def frame_change_mm(frame_mm: FloatArray, i: int) -> float:
+    """Of distance i of t1..t3, u1..u6 since machine zero; 0 of one that is not measured.
+
+    frame_mm : (9,), (6,) of u1..u6 alone, or (0,).
+    """
+    place = i - 9 + frame_mm.shape[0]
+    return float(frame_mm[place]) if place >= 0 else 0.0
+
+
+@helper
 def set_distances(model: Any, frame_mm: FloatArray, distances_mm: FloatArray) -> None:
-    """The frame's nine distances, equations (6) and (7); frame_mm (9,), or (0,) where no comparator measures them."""
+    """The frame's nine distances, equations (6) and (7); frame_mm as in `frame_change_mm`."""
     for i in range(9):
-        distances_mm[i] = model.zero_distances_mm[i]
-        if i < frame_mm.shape[0]:
-            distances_mm[i] += frame_mm[i]
+        distances_mm[i] = model.zero_distances_mm[i] + frame_change_mm(frame_mm, i)
 
 
 @helper

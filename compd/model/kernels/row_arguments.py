@@ -41,7 +41,7 @@ class EffectArrays(NamedTuple):
 
 
 class GaugeRows(NamedTuple):
-    """Changes since machine zero: scale_mm (N, m), joint_mm (N, k), frame_mm (N, 9), or (N, 0) where no
+    """Changes since machine zero: scale_mm (N, m), joint_mm (N, k), frame_mm (N, 9), (N, 6) or (N, 0) where no
     comparator measures the frame; time_s (N,), monotonic.
     """
 

@@ -55,9 +55,9 @@ def _time(gauges: Path, export: InstrumentExport, offset: ClockOffset | None) ->
     """The agreement over all offsets; None if there is none."""
     try:
         recording, track = read_recording(gauges, needs_reference=False), track_of(export)
-        if recording.scale_mm is None:
+        if recording.motion_mm is None:
             return None
-        curve = agreement_curve(recording.time_s, recording.scale_mm, track)
+        curve = agreement_curve(recording.time_s, recording.motion_mm, track)
     except RecordingError:
         return None
     answer: dict[str, Any] = {

@@ -24,7 +24,8 @@ export class Gauges {
     this.table = element("table", {}, element("thead", {}, element("tr", {}, head("measures"), head("since zero"), head("age"), head("last 60 s, range"), head("quality"), head("faults"), recent)), this.body);
     this.table.hidden = true;
     this.order = "";
-    this.place.replaceChildren(this.button, this.table);
+    this.absent = element("ul", { class: "absent" });
+    this.place.replaceChildren(this.button, this.table, this.absent);
     this.written_ms = -WRITE_EVERY_MS;
     this.recalled = false;
   }
@@ -47,6 +48,12 @@ export class Gauges {
   count(faults) {
     this.faults = faults;
     this.since.textContent = !faults ? "" : faults.hour ? "in the last hour" : `since ${new Date(faults.since_s * 1000).toTimeString().slice(0, 5)}`;
+  }
+
+  // What no gauge measures, of the slow event.
+  lack(clauses) {
+    if (this.absent?.childElementCount === clauses.length) return;
+    this.absent?.replaceChildren(...clauses.map((clause) => element("li", {}, `Not measured: ${clause}`)));
   }
 
   // Every event in time, also while frozen: the lines go on in the background.

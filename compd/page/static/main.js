@@ -71,6 +71,7 @@ function takeSlow(message) {
   if (page.frozen || !message.status) return;
   showTiming(at("timing"), message.status);
   gauges.count(message.faults);
+  gauges.lack(message.status.not_measured ?? []);
 }
 
 // Freeze at `at_s`, whose `event` is known or requested; or go on.

@@ -10,6 +10,8 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.columns import (
     ATTITUDE_COLUMNS,
+    COMMANDED_ATTITUDE_COLUMNS,
+    COMMANDED_COLUMNS,
     DISTANCE_COLUMN,
     POSITION_COLUMNS,
     approach_columns,
@@ -63,6 +65,7 @@ class RowLog:
         places : of the balls or pins at which a ballbar, a probe or a nest measures.
         """
         self._places = places
+        self._has_scales = bool(wiring.scale)
         self._world, self._rng = world, rng
         self._reference = reference
         self._indicated = IndicatedTip(world.mechanism, wiring) if reference.sigma_um == 0 else None
@@ -75,6 +78,7 @@ class RowLog:
         readings = {name: world.sense(name) for name in world.names}
         joints = [name for name in readings if name.startswith("joint_")]
         frames = [name for name in readings if name.startswith("frame_")]
+        scales = {column: readings[f"scale_{i}"] for i, column in enumerate(scale_columns(world.mechanism.scales), 1)}
         others = [name for name in readings if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
         self.rows.add(
             {
@@ -82,16 +86,25 @@ class RowLog:
                 "session": session,
                 "point": np.nan if point is None else point,
                 "visit": visit,
-                **{column: readings[f"scale_{i}"] for i, column in enumerate(scale_columns(world.mechanism.scales), 1)},
+                **(scales if self._has_scales else self._told(np.array(list(scales.values())))),
                 **{f"{name}_um": readings[name] / UM for name in (*joints, *frames)},
                 **{name: round(readings[name], 3) for name in others},
-                **dict(zip(approach_columns(world.mechanism.scales), direction, strict=True)),
+                **dict(zip(approach_columns(len(direction) * self._has_scales), direction, strict=False)),
                 **(self._reference_values(point) if measured else dict.fromkeys(self._reference_columns(), np.nan)),
             }
         )
         if self._indicated is not None:
             self.rows.indicated_mm.append(self._indicated.solve(readings, world.posture))
             self.rows.reference_mm.append(world.reference_tip_mm())
+
+    def _told(self, scale_mm: FloatArray) -> dict[str, float]:
+        """The pose that the controller of a machine without scales was told, by column."""
+        mechanism = self._world.mechanism
+        tip_mm, turn_rad = mechanism.told_pose(scale_mm, self._world.posture)
+        told = {name: round(value, 6) for name, value in zip(COMMANDED_COLUMNS, tip_mm.tolist(), strict=True)}
+        if mechanism.fixed[3:].any():
+            told |= {n: round(value, 9) for n, value in zip(COMMANDED_ATTITUDE_COLUMNS, turn_rad.tolist(), strict=True)}
+        return told
 
     def _reference_columns(self) -> list[str]:
         """Names of the reference's columns."""

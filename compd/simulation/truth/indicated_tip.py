@@ -42,7 +42,7 @@ class IndicatedTip:
         joint_mm = np.array([readings[f"joint_{k + 1}"] for k in range(self._weights.shape[1])])
         supports_M = mechanism.supports0_M
         if mechanism.has_frame:
-            frame_mm = np.array([readings[f"frame_{name}"] for name in DISTANCES])
+            frame_mm = np.array([readings.get(f"frame_{name}", 0.0) for name in DISTANCES])
             supports_M = self._supports_M(self._distances0_mm + frame_mm)
         base_M = mechanism.base_joints_M(supports_M, 0.0, scale_mm)
         lengths_mm = mechanism.lengths_at(scale_mm) - self._weights @ joint_mm

@@ -28,7 +28,8 @@ class Mechanism:
         self.geometry = geometry
         self.links, self.scales = int(geometry.links), geometry.scales
         self.has_frame = geometry.has_frame
-        origin_M = np.array(base.origin_B0_in_M_mm)
+        self.origin_B0_M: FloatArray = np.array(base.origin_B0_in_M_mm)
+        origin_M = self.origin_B0_M
         self.rotation_M_B0: FloatArray = Rotation.from_rotvec(base.rotation_B0_in_M_rad).as_matrix()
         joints_B = np.array([rod.base_B_mm for rod in parts.rods])
         supports_B = np.array(base.supports_B_mm) if base.supports_B_mm else _triangle_about(joints_B)
@@ -131,6 +132,19 @@ class Mechanism:
         """Posture at ideal scales (m,), all parts as drawn; `guess`: one near by."""
         joints_M = self.base_joints_M(self.supports0_M, 0.0, scale_mm) if not self.extends_alone else self.joints0_M
         return self.closure.by_lengths(joints_M, self.joints_P, self.lengths_at(scale_mm), guess)
+
+    def told_pose(self, scale_mm: FloatArray, guess: Posture) -> tuple[FloatArray, FloatArray]:
+        """The pose for which a controller without scales drives its actuators to `scale_mm`, all parts as drawn.
+
+        Tip (3,) mm in {B0}, or on the work in {P} where the tool stands on the plate; rotation vector (3,) of {P} in
+        {B0}.
+        """
+        posture = self.posture_of(scale_mm, guess)
+        if self.tip_frame == "M":
+            tip = (homogeneous(self.tip0_P) @ posture - self.origin_B0_M) @ self.rotation_M_B0
+        else:
+            tip = posture[1:] @ (self.tip0_M - posture[0])
+        return tip, Rotation.from_matrix(self.rotation_M_B0.T @ posture[1:].T).as_rotvec()
 
     def base_joints_M(
         self, supports_M: FloatArray, stretch: float = 0.0, scale_mm: FloatArray | None = None

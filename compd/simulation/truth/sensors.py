@@ -20,13 +20,15 @@ DISPLAY_STEP_MM = 1e-4
 
 
 class Sensors:
-    """Scales `scale_1`.., joint comparators `joint_1`.. in the wiring's order, frame `frame_t1`.. `frame_u6`."""
+    """Scales `scale_1`.., joint comparators `joint_1`.. in the wiring's order, and of `frame_t1`.. `frame_u6` those
+    that are wired."""
 
     def __init__(self, geometry: Geometry, wiring: Wiring, strengths: Strengths, rng: np.random.Generator) -> None:
         period_mm = geometry.scale_signal_period_mm
         ideal = strengths.comparator_step_um == 0
         self._scale_step_mm = 0.0 if ideal else period_mm / INTERPOLATION if period_mm else DISPLAY_STEP_MM
         self._joints = [(wire.role, wire.link - 1) for wire in wiring.joint]
+        self._distances = {wire.distance for wire in wiring.frame}
         self._strengths = strengths
         self._rng = rng
 
@@ -44,7 +46,11 @@ class Sensors:
         return {
             **{f"scale_{i + 1}": value for i, value in enumerate(scale.tolist())},
             **{f"joint_{k + 1}": value for k, value in enumerate(joint.tolist())},
-            **{f"frame_{name}": value for name, value in zip(DISTANCES, frame.tolist(), strict=True)},
+            **{
+                f"frame_{name}": value
+                for name, value in zip(DISTANCES, frame.tolist(), strict=True)
+                if name in self._distances
+            },
             **dict(zip(thermometers_degC, thermometer.tolist(), strict=True)),
         }
 

@@ -343,8 +343,6 @@ class World:
             scale_mm, joint_mm = cause.scale_reading_mm(scale_mm), cause.joint_reading_mm(joint_mm)
             frame_mm = cause.frame_reading_mm(frame_mm, warm)
         readings = self._sensors.read(scale_mm, joint_mm, frame_mm, warm.thermometers_degC())
-        if not self._mechanism.has_frame:
-            readings = {name: value for name, value in readings.items() if not name.startswith("frame_")}
         return {**readings, **self._air_and_load()}
 
     def _air_and_load(self) -> dict[str, float]:

@@ -10,6 +10,7 @@ import pytest
 
 from compd.client import connect
 from compd.demo.processes import Command, run_commands
+from compd.machine_kinds import KINDS, machine_text
 from tests.support.live_page import opened, served, until
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
@@ -53,3 +54,18 @@ def test_a_hexapod_has_six_links(chromium):
         until(tab, "compd.live.scene && compd.live.scene.base.length === 6")
         tab.keyboard.press("6")
         assert tab.locator(".strip.selected").count() == 1
+
+
+def test_what_a_machine_does_not_measure_is_listed_once(chromium, tmp_path):
+    own = tmp_path / "delta.yaml"
+    text = machine_text("delta", "linear-delta", KINDS["linear-delta"].usual)
+    own.write_text(text.replace("limits: {", "limits: {tip_error_um: 3000, "))
+    with served(name=str(own)) as page, opened(chromium, page) as tab:
+        with connect(page.socket) as daemon:
+            clauses = daemon.status()["not_measured"]
+        assert len(clauses) == 3, "joints, frame, temperatures"
+        until(tab, "document.querySelectorAll('#gauge-table .absent li').length === 3")
+        shown = tab.locator("#gauge-table .absent li").all_inner_texts()
+        assert shown == [f"Not measured: {clause}" for clause in clauses]
+        if directory := os.environ.get("COMPD_PICTURES"):
+            tab.locator("#gauges").screenshot(path=str(Path(directory) / "not-measured.png"))
