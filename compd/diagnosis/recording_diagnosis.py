@@ -136,8 +136,8 @@ def explain_residual(
     weights = explanation.problem.weigh_beside(members)
     problem = build_problem(before, pool, criteria, weights)
     explanation = explain_again(problem, explanation, progress)
-    members = named_members(explanation.losses, explanation.members)
-    return replace(explanation, members=with_intercepts(explanation.losses, members))
+    named = named_members(explanation.losses, explanation.members)
+    return replace(explanation, members=with_intercepts(explanation.losses, named))
 
 
 def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:

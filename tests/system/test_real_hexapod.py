@@ -13,6 +13,7 @@ import yaml
 
 import compd
 from compd.comparison.recording_comparison import compare
+from compd.diagnosis import Diagnosis
 from compd.machine_kinds import KINDS, machine_text
 from tests.support.paths import ROOT
 
@@ -72,7 +73,7 @@ def recording(directory: Path, name: str) -> Path:
     return path
 
 
-def diagnosed(directory: Path, effects: str = "") -> tuple[compd.Diagnosis, float, float]:
+def diagnosed(directory: Path, effects: str = "") -> tuple[Diagnosis, float, float]:
     """The diagnosis of 108 poses, and what is left of 60 others before and with it, um per coordinate."""
     configuration = machine(directory)
     own = directory / "own.yaml"

@@ -152,7 +152,6 @@ PLAIN = {-1, 0, 0.5, 1, 2, 3, 100, 1000}
 GUARDS = {1e9, 1e-3, 1e-6, 1e-9, 1e-12, 1e-300}
 # Anything else needs a name, and so a place above or among the criteria; but for the following.
 IN_FUNCTIONS = {
-    "comparison/alignment/align_recording.py": {9: "numbers of the frame"},
     "comparison/alignment/aligned_recording.py": {3600: DEFINITION},
     "comparison/alignment/fixed_ends.py": {5: WORDS},
     "comparison/alignment/measured_attitude.py": {6: "columns of a rigid motion"},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -152,7 +153,7 @@ def test_a_preloaded_contact_gives_as_two_seats_do() -> None:
 
     def displaced(force_N: float) -> float:
         def too_little(x: float) -> float:
-            return max(held + x, 0.0) ** 1.5 - max(held - x, 0.0) ** 1.5 - force_N
+            return math.pow(max(held + x, 0.0), 1.5) - math.pow(max(held - x, 0.0), 1.5) - force_N
 
         return float(brentq(too_little, -50.0, 50.0, xtol=1e-14, rtol=1e-15))
 

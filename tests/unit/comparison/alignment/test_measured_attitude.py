@@ -92,5 +92,6 @@ def test_what_the_frame_takes_away_does_not_weigh_lengths_against_attitudes(tmp_
     left_um = np.random.default_rng(5).normal(0, [1.0] * 3 + [300.0] * 3, (150, 6))
     columns_um = nuisance_columns(recording, ())
     away_um = columns_um @ (20.0 / np.sqrt(np.mean(columns_um**2, axis=(0, 1))))
-    near, far = (residual - fit_along(recording, (), residual, use).total_um for residual in (left_um, left_um + away_um))
+    begins_um = (left_um, left_um + away_um)
+    near, far = (residual_um - fit_along(recording, (), residual_um, use).total_um for residual_um in begins_um)
     assert np.abs(far - near).max() < 1e-3
