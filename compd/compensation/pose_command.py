@@ -19,6 +19,8 @@ from compd.model.kinematics import Pose
 from compd.rotation import rotation_vector, to_inner
 
 _NO_LENGTHS: FloatArray = np.zeros(0)
+# A row of the compensation's result has 2 kB.
+_ROWS_AT_ONCE = 10_000
 
 
 def scales_of_command(model: MachineModel, tip_mm: FloatArray, rotation_rad: FloatArray | None) -> FloatArray:
@@ -30,15 +32,17 @@ def scales_of_command(model: MachineModel, tip_mm: FloatArray, rotation_rad: Flo
         does not fix it may be nan.
     rotation_rad : (N, 3), rotation vector of {P} in {B0}; None for the attitude at machine zero.
     """
-    drawn = replace(model, effects=())
-    fixed = model.actuators.fixed.astype(bool)
-    tip_mm = np.where(fixed[:3], tip_mm, 0.0)
-    values = GaugeValues(
-        np.full((len(tip_mm), model.scales), np.nan), np.zeros(model.joint_weights.shape[1]), _NO_LENGTHS, {}
-    )
-    rotation_rad = rotation_rad if model.attitude_is_free else None
-    found, _ = compensate_machine_tool(drawn, tip_mm, rotation_rad, values, WarmStart.at_zero(drawn))
-    return np.where((found.reason == Reason.OK)[:, None], found.nominal_scale_mm, np.nan)
+    drawn, nowhere = replace(model, effects=()), np.zeros(model.joint_weights.shape[1])
+    tip_mm = np.where(model.actuators.fixed.astype(bool)[:3], tip_mm, 0.0)
+    scale_mm = np.full((len(tip_mm), model.scales), np.nan)
+    for begin in range(0, len(tip_mm), _ROWS_AT_ONCE):
+        rows = slice(begin, begin + _ROWS_AT_ONCE)
+        values = GaugeValues(scale_mm[rows], nowhere, _NO_LENGTHS, {})
+        turned = rotation_rad[rows] if rotation_rad is not None and model.attitude_is_free else None
+        found, _ = compensate_machine_tool(drawn, tip_mm[rows], turned, values, WarmStart.at_zero(drawn))
+        solved = found.reason == Reason.OK
+        scale_mm[rows][solved] = found.nominal_scale_mm[solved]
+    return scale_mm
 
 
 def command_pose(model: MachineModel, wanted: Compensation) -> Compensation:
