@@ -15,11 +15,13 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.initial_states import initial_state_columns
 from compd.model.effects import FittedEffect
-from compd.statistics import MIN_SIGMA, column_norms, robust_regression, solve_least_squares, trimmed_scale
+from compd.statistics import column_norms, robust_regression, solve_least_squares
 from compd.units import UM_PER_MM
 
 # What is fitted along is an effect's own where the effect leaves less of it than this share.
 MIN_SHARE = 1e-4
+# Rounds in which the weights of lengths and attitudes settle.
+SCATTER_ROUNDS = 4
 
 
 class FittedAlong(NamedTuple):
@@ -88,6 +90,11 @@ def _fitted_parameters(aligned: AlignedRecording, G: FloatArray, residual_um: Fl
     """(Q,) of the columns G (N, m, Q)."""
     if not G.shape[2] or not use.any():
         return np.zeros(G.shape[2])
-    # of attitudes beside lengths each coordinate counts in its own scatter: urad and um have no size in common
-    size_um = np.maximum(trimmed_scale(residual_um[use]), MIN_SIGMA) if aligned.with_attitude else np.ones(1)
-    return robust_regression(G[use] / size_um[:, None], residual_um[use] / size_um, huber=aligned.criteria.huber_sigmas)
+    rows, residual_um, size_um = G[use], residual_um[use], np.ones(1)
+    theta = np.zeros(G.shape[2])
+    # urad and um have no size in common: each unit counts in the scatter that the fit leaves, not in what it takes away
+    for _ in range(SCATTER_ROUNDS if aligned.with_attitude else 1):
+        if aligned.with_attitude:
+            size_um = aligned.scatter_by_unit(residual_um - rows @ theta)
+        theta = robust_regression(rows / size_um[:, None], residual_um / size_um, huber=aligned.criteria.huber_sigmas)
+    return theta

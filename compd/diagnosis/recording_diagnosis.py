@@ -19,6 +19,7 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
 from compd.diagnosis.findings import CandidateResult, ConstantFinding, DiagnosisStep, Rival, UntestedEffect
 from compd.diagnosis.implausible_effect import implausible_effect
+from compd.diagnosis.intercepts import beside, with_intercepts
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.rival_selection import named_members
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
@@ -136,7 +137,8 @@ def explain_residual(
     weights = explanation.problem.weigh_beside(members)
     problem = build_problem(before, pool, criteria, weights)
     explanation = explain_again(problem, explanation, progress)
-    return replace(explanation, members=named_members(explanation.losses, explanation.members))
+    named = named_members(explanation.losses, explanation.members)
+    return replace(explanation, members=with_intercepts(explanation.losses, named))
 
 
 def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:
@@ -263,8 +265,8 @@ def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float
     constant = [k for k in members if losses.candidates[k].kind == "constant"]
     families = {}
     for name in dict.fromkeys(losses.name(k) for k in library):
-        beside = [k for k in members if k != member_by_name[name]] if name in member_by_name else constant
-        complement = OrthogonalComplement(losses.nuisance_with(beside).values)
+        others = beside(losses, members, member_by_name[name]) if name in member_by_name else constant
+        complement = OrthogonalComplement(losses.nuisance_with(others).values)
         own = [k for k in library if losses.name(k) == name]
         variants = [complement(losses.values[k]) for k in own]
         best_of = [losses.candidates[k].best_of for k in own]

@@ -171,7 +171,8 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
         if name not in known
     ]
     theta = np.array([column.parameter.to_theta(values[column.name]) for column in columns])
-    missing = [constant.name for constant in effect.constants if constant.name not in entry.shape]
+    shape = {c.name: c.unstated for c in effect.constants if c.unstated is not None} | entry.shape
+    missing = [constant.name for constant in effect.constants if constant.name not in shape]
     if missing:
         problems.append(
             Problem(
@@ -181,7 +182,7 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
                 next_step="remove the effect and add it again: `compd effect add` searches them",
             )
         )
-    return FittedEffect(effect, theta, entry.shape)
+    return FittedEffect(effect, theta, shape)
 
 
 def _error_problems(fitted: FittedEffect, entry: EffectEntry, links: int, where: str) -> Iterator[Problem]:

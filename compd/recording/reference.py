@@ -64,7 +64,7 @@ class Reference(Section):
     sigma_urad: float = Field(
         default=math.nan,
         description="tool_pose only: standard uncertainty of the attitude, urad, about each axis; with it "
-        "the attitude counts beside the tip, without it is only compared",
+        "the attitude counts beside the tip; beside `sigma_um` alone it is only compared",
     )
     absolute: bool = Field(
         default=False,

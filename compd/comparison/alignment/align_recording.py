@@ -127,7 +127,8 @@ def align_observations(
     # effect; where no noise is declared, each counts by the size of its own residual
     reference = recording.reference
     weighed = model is not None and len(axes) == 3
-    weighed &= bool(np.isfinite(reference.sigma_urad)) or not reference.standard_uncertainty
+    declared = np.isfinite(reference.standard_uncertainty).any()
+    weighed &= bool(np.isfinite(reference.sigma_urad)) or not declared
     if weighed and rotation_rad is not None:
         turn = target_turn(rotation_rad, nominal, registration) if part_of is None else part_of.target_turn
         attitude = measured_attitude(rotation_rad, registration, turn)

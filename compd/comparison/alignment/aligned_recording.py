@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.alignment.external_machine import external_change, external_prediction
 from compd.comparison.alignment.fixed_ends import FixedEnds
 from compd.comparison.alignment.measured_attitude import (
@@ -43,7 +43,7 @@ from compd.model.kernels import Reason
 from compd.parameter_ranges import StatedRange, on_machine
 from compd.recording import Recording, UsableRows
 from compd.result_tables import Columns, data_frame, html_table
-from compd.statistics import filled
+from compd.statistics import MIN_SIGMA, filled, trimmed_scale
 from compd.units import REFERENCE_UNITS, UM_PER_MM
 
 if TYPE_CHECKING:
@@ -141,6 +141,14 @@ class AlignedRecording:
     def lengths(self) -> slice:
         """The measured coordinates that are in `unit`: all but those of the attitude."""
         return slice(len(self.labels) - 3 * self.with_attitude)
+
+    def scatter_by_unit(self, residual_um: FloatArray) -> FloatArray:
+        """(m,) scatter of a residual (R, m), alike for all lengths and for the three coordinates of an attitude."""
+        scatter_um = trimmed_scale(residual_um)
+        by_unit_um = np.full(len(scatter_um), max(rms(scatter_um[self.lengths]), MIN_SIGMA))
+        if self.with_attitude:
+            by_unit_um[-3:] = max(rms(scatter_um[-3:]), MIN_SIGMA)
+        return by_unit_um
 
     def unit_of(self, label: str) -> str:
         """The unit in which people read the residual of a coordinate."""

@@ -18,7 +18,7 @@ from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search.gross_rows import RowWeights, weigh_rows
 from compd.diagnosis.search.regression import RegressionData, Regressors
 from compd.diagnosis.search.subset_losses import SubsetLosses
-from compd.statistics import MIN_SIGMA, filled, trimmed_scale
+from compd.statistics import filled
 from compd.units import UM_PER_MM
 
 
@@ -206,11 +206,7 @@ def _unit_um(comparison: Comparison) -> FloatArray:
     """(m,) noise of each coordinate; where it is not known the residual's own size, alike for all of one unit."""
     if comparison.floor.known:
         return comparison.floor.by_axis_um
-    sizes_um = trimmed_scale(comparison.residual_um[np.isfinite(comparison.residual_um).all(axis=1)])
-    unit_um = np.full(len(sizes_um), max(rms(sizes_um[comparison.aligned.lengths]), MIN_SIGMA))
-    if comparison.aligned.with_attitude:
-        unit_um[-3:] = max(rms(sizes_um[-3:]), MIN_SIGMA)
-    return unit_um
+    return comparison.aligned.scatter_by_unit(comparison.residual_um[np.isfinite(comparison.residual_um).all(axis=1)])
 
 
 def _everything(

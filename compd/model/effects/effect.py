@@ -174,6 +174,9 @@ class Constant:
     period_of : str
         Of a period, the quantity that it is a period of, as a formula names it (``"scale_mm"``, a measured column):
         other periods than those of the grid are then looked for in a residual. ``""`` for what is no period.
+    unstated : float or None
+        Its value in model files that do not state it, of releases in which the effect did not have it; None where every
+        file states it.
     """
 
     name: str
@@ -184,6 +187,7 @@ class Constant:
     grid: tuple[float, ...]
     setting: str = ""
     period_of: str = ""
+    unstated: float | None = None
 
     @property
     def choice(self) -> bool:
@@ -250,6 +254,9 @@ class Effect:
         20 degC, 1013.25 hPa and 0 of anything else, as in releases up to 0.2; so it is where nobody knows the
         quantities at machine zero. ``"its own"``: it has a reference of its own, as a graduation that is true at 20
         degC, or needs no measured quantity.
+    intercept : str
+        Of an effect that grows with a quantity, the id of the effect that remains where the quantity is 0; ``""`` for
+        none. A diagnosis that names the first tries the second.
     declared : str or dict
         What a model file names it by: the mapping that it was declared with as a formula, or
         ``"/absolute/file.py:NAME"``; ``""`` for its id.
@@ -289,6 +296,7 @@ class Effect:
     follows_reading: bool = False
     registration: bool = False
     counts_from: Datum = "machine zero"
+    intercept: str = ""
     declared: str | Mapping[str, Any] = ""
 
     @property

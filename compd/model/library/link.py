@@ -85,12 +85,15 @@ EFFECTS = (
     Effect(
         id="joint_contact",
         ports=("link",),
-        physics="Balls flatten where they touch, less and less as the force grows.",
-        equation="delta_i = c (sgn(F_i) |F_i|^(2/3) - sgn(F0_i) |F0_i|^(2/3))",
+        physics="Balls flatten where they touch, less and less as the force grows; a preload holds them between two "
+        "seats.",
+        equation="delta_i = c (x_i - x0_i); F_i = (p + x_i)^(3/2) - (p - x_i)^(3/2) while both seats touch, |x_i| < p; "
+        "beyond, x_i = sgn(F_i) (|F_i|^(2/3) - p); p = P^(2/3)",
         symbols={
             "c": "contact compliance, um/N^(2/3)",
             "F_i": "axial force in link i, N, tension positive",
-            "F0_i": "the same at machine zero, N",
+            "x0_i": "x_i at machine zero",
+            "P": "preload of the ball, N; without one x_i = sgn(F_i) |F_i|^(2/3)",
         },
         source="Hertz (1882); Johnson, Contact Mechanics (1985), chapter 4",
         needs=("kinematics", "force"),
@@ -98,6 +101,17 @@ EFFECTS = (
         mistaken_for=("link_elasticity",),
         separated_by="loads of 20, 60 and 120 N at one place: a spring is straight, a contact is not",
         basis=KernelBasis(link.contact),
+        constants=(
+            Constant(
+                "P",
+                "N",
+                0,
+                4,
+                "held by a magnet or a spring 0.5-4; a larger preload makes it a spring, link_elasticity",
+                (0.0, 0.5, 1.0, 2.0, 4.0),
+                unstated=0.0,
+            ),
+        ),
     ),
     Effect(
         id="link_sag",

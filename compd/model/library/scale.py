@@ -31,6 +31,7 @@ EFFECTS = (
         mistaken_for=("link_sag", "scale_expansion"),
         separated_by="long and short links in several attitudes, at two temperatures",
         basis=KernelBasis(scale.gain),
+        intercept="link_zero",
     ),
     Effect(
         id="scale_expansion",

@@ -45,7 +45,7 @@ NUMBERS = {
         "MIN_RMS_UM": ROUNDING,
     },
     "comparison/noise_floor.py": {"DIFFERENCE_VARIANCE": DEFINITION},
-    "comparison/nuisance.py": {"MIN_SHARE": CONDITIONING},
+    "comparison/nuisance.py": {"MIN_SHARE": CONDITIONING, "SCATTER_ROUNDS": ITERATION},
     "comparison/shape_search.py": {"FINE": ITERATION},
     "statistics/last_digit.py": {"PER_STEP": DEFINITION, "STEPS_UM": DEFINITION},
     "statistics/least_squares.py": {

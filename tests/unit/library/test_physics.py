@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from compd.model import Deltas, effect_deltas, predict
@@ -141,7 +143,28 @@ def test_contact_is_soft_at_first_and_odd_in_the_force() -> None:
         axial = (80.0 - force_z) / 3 / COSINE
         expected = np.sign(axial) * abs(axial) ** (2 / 3) - (80 / 3 / COSINE) ** (2 / 3)
         rows = row_at_zero(values={"force_z_N": force_z})
-        np.testing.assert_allclose(delta_mm("joint_contact", rows, 0.2), 0.2 * UM * expected, rtol=1e-9)
+        np.testing.assert_allclose(delta_mm("joint_contact", rows, 0.2, P=0.0), 0.2 * UM * expected, rtol=1e-9)
+
+
+def test_a_preloaded_contact_gives_as_two_seats_do() -> None:
+    """Each seat pushes by the power 3/2 of its approach until it opens; found by bisection of the force."""
+    preload_N = 12.0
+    held = preload_N ** (2 / 3)
+
+    def displaced(force_N: float) -> float:
+        def too_little(x: float) -> float:
+            return math.pow(max(held + x, 0.0), 1.5) - math.pow(max(held - x, 0.0), 1.5) - force_N
+
+        return float(brentq(too_little, -50.0, 50.0, xtol=1e-14, rtol=1e-15))
+
+    at_zero_N = 80 / 3 / COSINE
+    # the axial force is 28.5 N less a third of the load's part along the link: seats open at 33.9 N, both ways
+    for axial_N in (at_zero_N, 1e-4, -1e-4, 20.0, -33.0, 33.0, 34.5, -90.0):
+        rows = row_at_zero(values={"force_z_N": 80.0 - 3 * COSINE * axial_N})
+        expected = displaced(axial_N) - displaced(at_zero_N)
+        np.testing.assert_allclose(
+            delta_mm("joint_contact", rows, 0.2, P=preload_N), 0.2 * UM * expected, rtol=1e-9, atol=1e-15
+        )
 
 
 @pytest.mark.parametrize("n", [3.0, 7.0])

@@ -86,6 +86,19 @@ def test_an_unknown_error_stays_unknown(tmp_path: Path) -> None:
     assert np.isnan(read_model_file(path, "tripod-cmm", 3).covariance).all()
 
 
+def test_a_file_from_before_a_shape_constant_means_what_it_meant(tmp_path: Path) -> None:
+    """Releases up to 0.2 knew joint_contact without a preload."""
+    path = tmp_path / "m.yaml"
+    fitted = replace(hidden("joint_contact", 0.2), constants={"P": 2.0}, covariance=np.full((1, 1), 1e-4))
+    ModelFile("tripod-cmm", 3, ("joint_contact",), (fitted,), fitted.covariance).write(path)
+    assert read_model_file(path, "tripod-cmm", 3).fitted[0].constants == {"P": 2.0}
+    data = yaml.safe_load(path.read_text())
+    data["effects"][0]["shape"] = {}
+    del data["checksum"]
+    path.write_text(yaml.safe_dump(data))
+    assert read_model_file(path, "tripod-cmm", 3).fitted[0].constants == {"P": 0.0}
+
+
 def test_a_formula_is_kept_as_it_was_written(tmp_path: Path) -> None:
     from compd.model.effects import FittedEffect
     from compd.model.library import find_effect

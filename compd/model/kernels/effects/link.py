@@ -15,6 +15,7 @@ from compd.model.structures import EffectMachine, EffectRow
 PPM = 1e-6
 UM = 1e-3  # mm
 SAG_LENGTH_MM = 500.0  # the length at which a link's sag is stated
+OPENS_AT = math.sqrt(8.0)  # force over preload at which one of two seats opens: (2 d)^(3/2) over d^(3/2)
 
 
 @helper
@@ -70,8 +71,22 @@ def elasticity(
 
 
 @helper
-def _hertz(force_N: float) -> float:
-    return math.copysign(np.cbrt(force_N * force_N), force_N)
+def _hertz(force_N: float, preload_N: float) -> float:
+    """Approach, in N^(2/3), of a ball between two seats that a preload presses on it.
+
+    A seat pushes by a^(3/2) for its approach a. With d = preload^(2/3) and x the ball's displacement
+
+        F = (d + x)^(3/2) - (d - x)^(3/2)  for |x| <= d,  and  (d + x)^(3/2)  beyond, where the other seat is open.
+
+    With w^2 = 1 - (x / d)^2 the first is a cubic equation, w^3 + 3 w^2 = 4 - (F / preload)^2 / 2, which the cosine of
+    a third of an angle solves.
+    """
+    size_N = abs(force_N)
+    if size_N >= OPENS_AT * preload_N:
+        return math.copysign(np.cbrt(size_N * size_N) - np.cbrt(preload_N * preload_N), force_N)
+    angle = 2 / 3 * math.asin(size_N / (OPENS_AT * preload_N))
+    share = 2 * math.sqrt(2 * math.cos(angle)) * math.sin(angle / 2)
+    return math.copysign(np.cbrt(preload_N * preload_N) * share, force_N)
 
 
 @helper
@@ -86,7 +101,8 @@ def contact(
     axial_N = np.empty(row.links)
     set_axial_forces(row, machine, quantities, axial_N)
     for i in range(row.links):
-        basis[i, 0] = UM * (_hertz(axial_N[i]) - _hertz(axial_force_at_zero(machine, quantities[3:6], i)))
+        at_zero = _hertz(axial_force_at_zero(machine, quantities[3:6], i), constants[0])
+        basis[i, 0] = UM * (_hertz(axial_N[i], constants[0]) - at_zero)
 
 
 @helper

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.effect_fit import fit, initial_effect
+from compd.comparison.nuisance import fit_along, nuisance_columns
 from compd.comparison.recording_comparison import compare
 from tests.support.measured import SIGMA_UM, aligned, hidden
 from tests.support.pose_recordings import SIGMA_URAD, hexapod, poses
@@ -67,3 +69,29 @@ def test_the_attitude_alone_finds_an_effect(tmp_path: Path) -> None:
     after = compare(recording, result.fitted)
     assert after.attitude_rms_urad == pytest.approx(SIGMA_URAD, rel=0.15)
     assert after.attitude_rms_urad < compare(recording).attitude_rms_urad
+
+
+@pytest.mark.parametrize(
+    ("declared", "counts"),
+    [({}, True), ({"sigma_um": 5}, False), ({"sigma_urad": 20}, True), ({"sigma_um": 5, "sigma_urad": 20}, True)],
+)
+def test_the_attitude_counts_unless_the_noise_of_the_position_alone_is_declared(
+    tmp_path: Path, declared: dict[str, int], counts: bool
+) -> None:
+    path = poses(tmp_path, moved=True)
+    sidecar = yaml.safe_load(path.with_suffix(".yaml").read_text())
+    reference = {name: value for name, value in sidecar["reference"].items() if "sigma" not in name}
+    path.with_suffix(".yaml").write_text(yaml.safe_dump(sidecar | {"reference": reference | declared}))
+    assert aligned(path, hexapod()).with_attitude is counts
+
+
+def test_what_the_frame_takes_away_does_not_weigh_lengths_against_attitudes(tmp_path: Path) -> None:
+    """The attitudes are far off and say little; a frame that begins elsewhere leaves the same."""
+    recording = opened(tmp_path, moved=True)
+    use = np.ones(150, dtype=bool)
+    left_um = np.random.default_rng(5).normal(0, [1.0] * 3 + [300.0] * 3, (150, 6))
+    columns_um = nuisance_columns(recording, ())
+    away_um = columns_um @ (20.0 / np.sqrt(np.mean(columns_um**2, axis=(0, 1))))
+    begins_um = (left_um, left_um + away_um)
+    near, far = (residual_um - fit_along(recording, (), residual_um, use).total_um for residual_um in begins_um)
+    assert np.abs(far - near).max() < 1e-3
