@@ -50,8 +50,17 @@ def add_to_model(
     before = compare(aligned, model.fitted, model.covariance)
     kept = _as_counted(model.fitted, aligned.rows)
     result = search_constants(aligned, kept, counted_from(effect, aligned.rows), before.floor.by_axis_um)
-    extended = replace(model, declared=(*model.declared, declared))
+    extended = replace(
+        model, declared=(*model.declared, declared), plausible={**model.plausible, **_stated(effect, aligned)}
+    )
     return _changed(extended, model, refine(result, before.floor.by_axis_um), before, "add", effect.id, criteria)
+
+
+def _stated(effect: Effect, aligned: AlignedRecording) -> dict[str, dict[str, tuple[float, float]]]:
+    """The ranges that a person stated for this effect, by its id and the numbers' names; empty for none."""
+    stated = {one.parameter for one in aligned.ranges if one.effect == effect.id}
+    columns = [column for column in effect.columns(aligned.rows.links) if column.parameter.name in stated]
+    return {effect.id: {c.name: (c.parameter.low, c.parameter.high) for c in columns}} if columns else {}
 
 
 def remove_effect(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -26,6 +27,7 @@ from compd.comparison import (
 from compd.configuration import Machine
 from compd.model_changes import refit_model
 from compd.model_file import ModelFile
+from compd.parameter_ranges import read_range
 
 # Called with the number of finished rows, block after block.
 Progress = Callable[[int], None]
@@ -54,10 +56,16 @@ def open_long(
     machine: Machine | None = None,
     progress: Progress = _silent,
     criteria: ComparisonCriteria = ComparisonCriteria(),
+    *,
+    rows: int | None = None,
+    ranges: Sequence[str] = (),
+    hold: Sequence[str] = (),
 ) -> LongRecording:
     """Draw the sample of a recording; arguments and errors as of `open_sample`."""
+    stated = tuple(map(read_range, ranges))
     stream = open_stream(path, machine)
-    return LongRecording(stream, draw_sample(stream, criteria=criteria, progress=progress))
+    sample = draw_sample(stream, rows, criteria, progress, hold)
+    return LongRecording(stream, replace(sample, aligned=replace(sample.aligned, ranges=stated)))
 
 
 def open_whole_or_sample(path: Path, machine: Machine | None = None) -> tuple[AlignedRecording, int]:
@@ -79,6 +87,7 @@ def compare_stream(
     machine: Machine | None = None,
     criteria: ComparisonCriteria = ComparisonCriteria(),
     progress: Progress = _silent,
+    hold: Sequence[str] = (),
 ) -> StreamedComparison:
     """Compare a recording of any length with the model of its machine, in constant memory; nothing is fitted.
 
@@ -96,6 +105,8 @@ def compare_stream(
         As for `open_recording`.
     progress : callable
         Called with the number of rows that are done, after each block: twice the recording's rows at the end.
+    hold : sequence of str
+        As for `open_recording`.
 
     Returns
     -------
@@ -120,7 +131,7 @@ def compare_stream(
     >>> round(comparison.rms_um, 2)
     0.82
     """
-    stream, sample = open_long(Path(path), machine, progress, criteria)
+    stream, sample = open_long(Path(path), machine, progress, criteria, hold=hold)
     file = opened_model(model, sample.aligned)
     return compare_blocks(
         stream, sample, file.fitted, file.covariance, progress=lambda done: progress(sample.rows + done)
@@ -134,6 +145,8 @@ def open_sample(
     rows: int | None = None,
     criteria: ComparisonCriteria = ComparisonCriteria(),
     progress: Progress = _silent,
+    ranges: Sequence[str] = (),
+    hold: Sequence[str] = (),
 ) -> AlignedRecording:
     """Open a sample of a recording of any length, spread evenly; `diagnose`, `compare` and `add_effect` take it.
 
@@ -150,6 +163,8 @@ def open_sample(
         As for `open_recording`.
     progress : callable
         Called with the number of rows that are done, after each block.
+    ranges, hold : sequences of str
+        As for `open_recording`.
 
     Returns
     -------
@@ -166,7 +181,7 @@ def open_sample(
     >>> compd.open_sample("monday.csv", rows=100).recording.rows
     95
     """
-    return draw_sample(open_stream(Path(path), machine), rows, criteria, progress).aligned
+    return open_long(Path(path), machine, progress, criteria, rows=rows, ranges=ranges, hold=hold).sample.aligned
 
 
 def fit_stream(

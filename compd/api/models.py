@@ -15,6 +15,7 @@ from compd.model.effects import Effect
 from compd.model.library import find_effect, gather_effects, load_library, named_effect
 from compd.model_changes import Refinement, add_to_model, unrefined
 from compd.model_file import ModelFile, read_model_file, read_stored
+from compd.parameter_ranges import check_ranges
 from compd.recording import EXTERNAL
 
 
@@ -112,6 +113,7 @@ def add_effect(
     resolved = _resolve_effect(effect, gather_effects(effects))
     declared = resolved.declared if isinstance(resolved.declared, str) else dict(resolved.declared)
     aligned = opened_recording(recording)
+    check_ranges(aligned.ranges, [*gather_effects(effects).values(), resolved])
     on_machine = aligned.on_machine(resolved)
     return add_to_model(opened_model(model, aligned), declared or resolved.id, on_machine, aligned, refine, criteria)
 

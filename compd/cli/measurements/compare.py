@@ -78,15 +78,13 @@ def _compare(path: Path, machine: Path | None, model: Path | None, hold: list[st
         from compd.comparison import open_recording
 
         return compare_recording(open_recording(path, machine, hold=hold or ()), model)
-    if hold:
-        raise typer.BadParameter(f"{path.name} is too long for the memory: --hold takes shorter recordings")
     from compd.api import compare_stream
     from compd.cli.progress import count_shown
     from compd.table_file import row_count
 
     # two passes: for the sample, then row by row
     with count_shown(2 * row_count(path), f"comparing {path.name}") as progress:
-        return compare_stream(path, model, machine=machine, progress=progress)
+        return compare_stream(path, model, machine=machine, progress=progress, hold=hold or ())
 
 
 def print_comparisons(comparisons: list[Comparison]) -> None:

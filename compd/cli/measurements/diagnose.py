@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -44,16 +44,14 @@ def diagnose(
     from compd.api import diagnose as diagnose_recording
     from compd.cli.progress import steps_shown
     from compd.diagnosis import evaluate_holdout
-    from compd.parameter_ranges import read_range
     from compd.report import print_diagnosis
 
     if html is not None:
         from compd.report import check_page_path
 
         check_page_path(html, overwrite)
-    sealed = [_open(path, machine, hold)[0] for path in recordings[1:]]
-    aligned, all_rows = _open(recordings[0], machine, hold)
-    aligned = replace(aligned, ranges=tuple(map(read_range, ranges or ())))
+    sealed = [_open(path, machine, (), hold or ())[0] for path in recordings[1:]]
+    aligned, all_rows = _open(recordings[0], machine, ranges or (), hold or ())
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]
@@ -74,18 +72,16 @@ def diagnose(
         typer.echo(f"The same as pictures: {html}")
 
 
-def _open(path: Path, machine: Path | None, hold: list[str] | None) -> tuple[AlignedRecording, int]:
+def _open(path: Path, machine: Path | None, ranges: Sequence[str], hold: Sequence[str]) -> tuple[AlignedRecording, int]:
     """The recording and 0; for one too long for the memory a sample, and the number of its rows."""
     from compd.comparison import is_long, open_recording
 
     if not is_long(path):
-        return open_recording(path, machine, hold=hold or ()), 0
-    if hold:
-        raise typer.BadParameter(f"{path.name} is too long for the memory: --hold takes shorter recordings")
+        return open_recording(path, machine, ranges=ranges, hold=hold), 0
     from compd.api import open_sample
     from compd.cli.progress import count_shown
     from compd.table_file import row_count
 
     rows = row_count(path)
     with count_shown(rows, f"drawing a sample of {path.name}") as progress:
-        return open_sample(path, machine, progress=progress), rows
+        return open_sample(path, machine, progress=progress, ranges=ranges, hold=hold), rows

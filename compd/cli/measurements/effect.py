@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.cli.options import EffectsOption, MachineOption, OverwriteOption
+from compd.cli.options import EffectsOption, HoldOption, MachineOption, OverwriteOption, RangesOption
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -85,12 +86,14 @@ def add(
     model: ModelOption,
     machine: MachineOption = None,
     effects: EffectsOption = None,
+    ranges: RangesOption = None,
+    hold: HoldOption = None,
     dry_run: DryRunOption = False,
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
     from compd.api import add_effect
 
-    aligned, refine = _open(recording, machine)
+    aligned, refine = _open(recording, machine, ranges or (), hold or ())
     before = _read_model(model, aligned) if model.exists() else None
     changed = add_effect(before, name, aligned, effects=effects or (), refine=refine)
     _finish(model, before, changed, aligned, f"added {changed.steps[-1].effect}", dry_run)
@@ -102,24 +105,29 @@ def remove(
     recording: RecordingOption,
     model: ModelOption,
     machine: MachineOption = None,
+    hold: HoldOption = None,
     dry_run: DryRunOption = False,
 ) -> None:
     """Take an effect out of a model and fit the others again."""
     from compd.model_changes import remove_effect
 
-    aligned, refine = _open(recording, machine)
+    aligned, refine = _open(recording, machine, hold=hold or ())
     before = _read_model(model, aligned)
     _finish(model, before, remove_effect(before, name, aligned, refine), aligned, f"removed {name}", dry_run)
 
 
 @effect.command()
 def fit(
-    recording: RecordingOption, model: ModelOption, machine: MachineOption = None, dry_run: DryRunOption = False
+    recording: RecordingOption,
+    model: ModelOption,
+    machine: MachineOption = None,
+    hold: HoldOption = None,
+    dry_run: DryRunOption = False,
 ) -> None:
     """Fit all effects of a model again, on another recording."""
     from compd.model_changes import refit_model
 
-    aligned, refine = _open(recording, machine)
+    aligned, refine = _open(recording, machine, hold=hold or ())
     before = _read_model(model, aligned)
     _finish(model, before, refit_model(before, aligned, refine), aligned, "fitted again", dry_run)
 
@@ -140,20 +148,22 @@ def _declared_id(declared: Declaration) -> str:
     return declared if isinstance(declared, str) else str(declared["id"])
 
 
-def _open(path: Path, machine: Path | None) -> tuple[AlignedRecording, Refinement]:
+def _open(
+    path: Path, machine: Path | None, ranges: Sequence[str] = (), hold: Sequence[str] = ()
+) -> tuple[AlignedRecording, Refinement]:
     """The recording; for one too long for the memory a sample, and the function that fits to all its rows."""
     from compd.comparison import is_long, open_recording
     from compd.model_changes import unrefined
 
     if not is_long(path):
-        return open_recording(path, machine), unrefined
+        return open_recording(path, machine, ranges=ranges, hold=hold), unrefined
     from compd.api import open_long
     from compd.cli.progress import count_shown
     from compd.table_file import row_count
 
     rows = row_count(path)
     with count_shown(rows, f"drawing a sample of {path.name}") as progress:
-        long = open_long(path, machine, progress)
+        long = open_long(path, machine, progress, ranges=ranges, hold=hold)
     aligned = long.sample.aligned
 
     def refine(result: FitResult, sigma_um: FloatArray) -> FitResult:

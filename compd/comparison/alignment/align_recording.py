@@ -12,13 +12,13 @@ from compd.comparison.alignment.external_machine import external_observations
 from compd.comparison.alignment.fixed_ends import place_balls, place_pins
 from compd.comparison.alignment.measured_attitude import attitude_mm, measured_attitude, target_turn
 from compd.comparison.alignment.registration import Registration, register
-from compd.comparison.alignment.target_place import PlacedTarget, place_target
+from compd.comparison.alignment.target_place import HELD, PlacedTarget, place_target
 from compd.comparison.alignment.velocity import velocities
 from compd.comparison.criteria import ComparisonCriteria, SpeedCriteria
 from compd.compensation import scales_of_command
 from compd.configuration import Configuration
 from compd.display_unit import ATTITUDE_LABELS
-from compd.errors import Problem, RecordingError
+from compd.errors import CompdError, Problem, RecordingError
 from compd.machine_builder import build_model
 from compd.model import MachineModel, observe
 from compd.model.effects import Observations
@@ -72,9 +72,12 @@ def align_observations(
     """As `align_recording`, for rows that are observed already.
 
     part_of : of a block of a long recording the sample of it that places the instrument's frame, or the fixed ends.
-    held : numbers of the registration that are not fitted along; see `HELD`.
+    held : numbers of the registration that are not fitted along; see `HELD`. Raises CompdError for one that this
+        recording does not fit in any case.
     """
     assert recording.reference is not None
+    if held and part_of is None:
+        _check_held(recording, model, held)
     if recording.reference_link_mm is not None:
         labels = tuple(f"link {i}" for i in recording.reference_links)
         links = tuple(i - 1 for i in recording.reference_links)
@@ -148,6 +151,26 @@ def align_observations(
         target=target,
         held=held if part_of is None else part_of.held,
     )
+
+
+def _check_held(recording: Recording, model: MachineModel | None, held: frozenset[str]) -> None:
+    """Raise CompdError for a held number that is not fitted along."""
+    assert recording.reference is not None
+    instrument = recording.reference.frame == "instrument" and recording.reference_link_mm is None
+    attitude = recording.reference_rotation_rad is not None and model is not None
+    fitted = HELD["frame"] if instrument else frozenset[str]()
+    fitted |= HELD["target.place"] if instrument and attitude else frozenset()
+    fitted |= HELD["target.attitude"] if attitude else frozenset()
+    if idle := held - fitted:
+        raise CompdError(
+            Problem(
+                where=str(recording.path),
+                what="has nothing of a registration that these numbers are of: holding them changes nothing",
+                value=", ".join(sorted(idle)),
+                allowed=", ".join(sorted(fitted)) or "none: the reference is in the machine's frame, without attitudes",
+                next_step="leave them out of what is held",
+            )
+        )
 
 
 def _at_fixed_ends(aligned: AlignedRecording, end: IntArray) -> AlignedRecording:

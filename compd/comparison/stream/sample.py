@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.comparison.alignment.align_recording import align_observations, recorded_observations, session_starts
 from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.alignment.target_place import held_numbers
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.stream.recording_stream import Block, RecordingStream
 from compd.comparison.thinning import SEED
@@ -45,13 +46,16 @@ def draw_sample(
     most_rows: int | None = None,
     criteria: ComparisonCriteria = ComparisonCriteria(),
     progress: Callable[[int], None] = lambda rows: None,
+    hold: Sequence[str] = (),
 ) -> Sample:
     """Draw the sample: of every so many rows one, and of its visit as many rows as noise is estimated from.
 
     most_rows : how many rows it has, about; None for `sample_rows` of the criteria.
     progress : called with the number of rows that are done, after each block.
-    Raises RecordingError with the problems of the recording.
+    hold : parts of the registration that are not fitted along, as of `open_recording`.
+    Raises CompdError for a name of none of them, RecordingError with the problems of the recording.
     """
+    held = held_numbers(hold)
     most_rows = criteria.sample_rows if most_rows is None else most_rows
     model = None
     if stream.configuration is not None:
@@ -87,7 +91,7 @@ def draw_sample(
     rows = observations[0].extended_by(*observations[1:])
     rows = replace(rows, session_start=session_starts(recording))
     geometry_hash = "" if stream.configuration is None else stream.configuration.geometry_hash
-    aligned = align_observations(recording, model, rows, geometry_hash, criteria)
+    aligned = align_observations(recording, model, rows, geometry_hash, criteria, held=held)
     return Sample(aligned, count, dict(sessions), dict(left_out), np.array(starts_s), begin_s, end_s)
 
 

@@ -11,6 +11,8 @@ import yaml
 
 import compd
 from compd.comparison import AlignedRecording
+from compd.errors import CompdError
+from compd.machine_kinds import KINDS, machine_text
 from compd.model.library import load_library
 from compd.model_changes import add_to_model, remove_effect
 from compd.model_file import ModelFile
@@ -74,3 +76,18 @@ def test_the_range_is_that_of_the_rows_that_were_fitted(tmp_path: Path) -> None:
     low, high = model.fitted_range[LINKS[0]]
     assert (low, high) == pytest.approx((temperature[used].min(), temperature[used].max()), abs=1e-9)
     assert list(model.fitted_range) == LINKS
+
+
+def test_a_stated_range_goes_into_the_model_file(tmp_path: Path) -> None:
+    """What a person stated for one machine holds where the model is adopted, too."""
+    recording, machine = tmp_path / "zeros.csv", tmp_path / "hexa.yaml"
+    machine.write_text(machine_text("hexa", "6-ups", KINDS["6-ups"].usual).replace("machined", "ground"))
+    compd.simulate_campaign(machine, recording, seed=3, effects=["link_zero=200"])
+    aligned = compd.open_recording(recording, machine, ranges=["link_zero.z=-0.5..0.5mm"])
+    model = compd.add_effect(None, "link_zero", aligned)
+    assert model.plausible == {"link_zero": {f"z_{i}": (-500.0, 500.0) for i in range(1, 7)}}
+    model.write(tmp_path / "model.yaml")
+    read = compd.open_model(tmp_path / "model.yaml", machine)
+    assert all(number.plausible for number in read.numbers())
+    with pytest.raises(CompdError, match="no effect's parameter"):
+        compd.add_effect(None, "link_zero", compd.open_recording(recording, machine, ranges=["link_zero.q=0..1mm"]))

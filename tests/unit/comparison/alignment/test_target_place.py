@@ -9,6 +9,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+import compd
 from compd.comparison import open_recording
 from compd.comparison.recording_comparison import compare
 from compd.errors import CompdError, RecordingError
@@ -121,3 +122,25 @@ def test_poses_at_rest_need_no_time(tmp_path: Path) -> None:
     # what depends on when, or in which order, rows were taken is not there
     assert {"time", "order", "motion"}.isdisjoint(aligned.rows.available)
     assert {"time", "order", "motion"} <= timed.rows.available
+
+
+def test_a_sample_of_a_long_recording_holds_the_same(tmp_path: Path) -> None:
+    path = elsewhere(tmp_path)
+    held = compd.open_sample(path, hexapod(), hold=["target.place"], ranges=["link_zero.z=-1..1mm"])
+    assert held.registration_columns.shape[2] == 9
+    assert [str(stated) for stated in held.ranges] == ["link_zero.z=-1..1mm"]
+    assert compd.compare_stream(path, machine=hexapod(), hold=["target.place"]).rms_um > 1e3
+    with pytest.raises(CompdError, match="no part of a registration"):
+        compd.open_sample(path, hexapod(), hold=["targets"])
+
+
+def test_holding_what_the_recording_does_not_fit_is_refused(tmp_path: Path) -> None:
+    path = elsewhere(tmp_path)
+    sidecar = path.with_suffix(".yaml")
+    in_machine = sidecar.read_text().replace("frame: instrument", "frame: machine")
+    assert in_machine != sidecar.read_text()
+    sidecar.write_text(in_machine)
+    with pytest.raises(CompdError, match="holding them changes nothing") as caught:
+        open_recording(path, hexapod(), hold=["frame.x", "target.place", "target.a"])
+    assert "frame.x, target.x, target.y, target.z" in str(caught.value)
+    assert "target.a, target.b, target.c" in str(caught.value), "what it fits"
