@@ -10,6 +10,7 @@ from compd.diagnosis.candidates.plausibility import estimate_parameters, is_unde
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, ParameterEstimate, Status
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
+from compd.diagnosis.undetermined import undetermined_text
 from compd.text import number_text
 
 
@@ -36,7 +37,12 @@ def candidate_results(
 
 def why_nothing_else(problem: DiagnosisProblem) -> str:
     """Why effects cannot be seen that do nothing but what is fitted along in any case."""
-    if (ends := problem.aligned.ends) is None:
+    if (ends := problem.aligned.ends) is None and problem.aligned.target is not None:
+        return (
+            "moves these rows as the instrument's frame or the target's place does, which are fitted along; "
+            "`--hold target.place` leaves the place out"
+        )
+    if ends is None:
         return "makes nothing on these rows but a constant, which is fitted along"
     fixed = "fixed balls" if ends.of_lengths else "pins"
     return f"makes nothing on these rows but a shift of the {fixed}, which is fitted along"
@@ -73,6 +79,8 @@ def _result_alone(
         status, why = "partial", f"only with implausible numbers: {_values(implausible[:3])}"
     elif is_undetermined(candidate.limits, np.sqrt(np.diag(covariance))):
         status, why = "not_testable", "its numbers stay less certain than their plausible ranges are wide"
+        if combination := undetermined_text(problem, losses, member):
+            why += f": {combination}"
     elif gain < losses.price(member):
         status, why = "no_gain", f"takes {100 * max(fraction, 0.0):.0f} % of the error away: not worth a name"
     elif steps:

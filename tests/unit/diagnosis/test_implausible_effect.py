@@ -47,6 +47,9 @@ def test_the_number_and_the_question_are_in_the_headline(recorded: Path) -> None
     assert heading.endswith("link_zero would take 99 %, with an implausible number")
     assert len(heading) <= WIDTH
     assert "--range link_zero.z=LOW..HIGH" in " ".join(" ".join(lines).split())
+    why = {candidate.effect: candidate.why for candidate in diagnosis.candidates if candidate.status == "not_testable"}
+    assert why["tool_expansion"].endswith("a acts like tool_offset d_z"), "its combination is named"
+    assert "k_1, k_2, k_3, k_4, k_5 and k_6 together move these rows too little" in why["scale_gain"]
     asked = diagnosis.as_json()["asked"]
     assert (asked["effect"], asked["plausible"]) == ("link_zero", [-5.0, 5.0])
 

@@ -83,6 +83,7 @@ NUMBERS = {
     "comparison/stream/time_envelope.py": {"TIMES": WORDS},
     "comparison/thinning.py": {"SEED": SEED},
     "diagnosis/implausible_effect.py": {"_FREE": CONDITIONING},
+    "diagnosis/undetermined.py": {"_NAMED_SHARE": WORDS, "MAX_NAMED": WORDS, "_ALIKE": WORDS},
     "diagnosis/candidates/constant.py": {"MM_PER_UM": DEFINITION, "MIN_OUTSIDE": ROUNDING},
     "diagnosis/descriptions/empirical_terms.py": {
         "MIN_VALUES": DEFINITION,
