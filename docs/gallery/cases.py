@@ -69,7 +69,8 @@ CASES = (
         verdict="ambiguous",
         look_at="Contacts in the joints that give way and links that stretch both follow the link's force, and this "
         "measurement has too few different loads to separate them where the error is small. The verdict names both "
-        "effects, and lists the rows to measure next. [Tell two effects apart](../how-to/tell-two-effects-apart.md) goes on from here.",
+        "effects, and lists the rows to measure next. [Tell two effects apart](../how-to/tell-two-effects-apart.md) "
+        "goes on from here.",
     ),
     Case(
         name="platform-expansion",
