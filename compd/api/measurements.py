@@ -87,7 +87,7 @@ def plan_measurement(
     >>> rivals = ("link_elasticity", "joint_contact")
     >>> plan = compd.plan_measurement("loads.csv", rivals, rows=20, force_N=100.0)
     >>> print(f"{plan.before:.0f} -> {plan.separation:.0f}")  # standard deviations of the noise
-    30 -> 36
+    20 -> 26
     >>> plan.write("next.csv")
     """
     if len(rivals) < 2 or len(set(rivals)) < len(rivals):
