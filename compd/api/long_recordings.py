@@ -57,15 +57,17 @@ def open_long(
     progress: Progress = _silent,
     criteria: ComparisonCriteria = ComparisonCriteria(),
     *,
-    rows: int | None = None,
     ranges: Sequence[str] = (),
     hold: Sequence[str] = (),
 ) -> LongRecording:
     """Draw the sample of a recording; arguments and errors as of `open_sample`."""
-    stated = tuple(map(read_range, ranges))
     stream = open_stream(path, machine)
-    sample = draw_sample(stream, rows, criteria, progress, hold)
-    return LongRecording(stream, replace(sample, aligned=replace(sample.aligned, ranges=stated)))
+    sample = draw_sample(stream, criteria=criteria, progress=progress, hold=hold)
+    return LongRecording(stream, replace(sample, aligned=_with_ranges(sample.aligned, ranges)))
+
+
+def _with_ranges(aligned: AlignedRecording, ranges: Sequence[str]) -> AlignedRecording:
+    return replace(aligned, ranges=tuple(map(read_range, ranges)))
 
 
 def open_whole_or_sample(path: Path, machine: Machine | None = None) -> tuple[AlignedRecording, int]:
@@ -163,7 +165,9 @@ def open_sample(
         As for `open_recording`.
     progress : callable
         Called with the number of rows that are done, after each block.
-    ranges, hold : sequences of str
+    ranges : sequence of str
+        As for `open_recording`.
+    hold : sequence of str
         As for `open_recording`.
 
     Returns
@@ -181,7 +185,8 @@ def open_sample(
     >>> compd.open_sample("monday.csv", rows=100).recording.rows
     95
     """
-    return open_long(Path(path), machine, progress, criteria, rows=rows, ranges=ranges, hold=hold).sample.aligned
+    sample = draw_sample(open_stream(Path(path), machine), rows, criteria, progress, hold)
+    return _with_ranges(sample.aligned, ranges)
 
 
 def fit_stream(

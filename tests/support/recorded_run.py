@@ -45,9 +45,8 @@ class Run:
             "links": machine.configuration.geometry.links,
             "computed_by": dict(kernel_versions()),
         }
-        self.watch = {"class": "WATCH", "what": "readings", "columns": self.transcript.columns}
-        if self.transcript.model_columns:
-            self.watch["model_columns"] = self.transcript.model_columns
+        described = {"columns": self.transcript.columns, **self.transcript.from_setpoints}
+        self.watch = {"class": "WATCH", "what": "readings", **described}
 
     def quiet(self, cycles):
         """Nothing but noise: (line, message, setpoint) of each cycle."""

@@ -26,7 +26,7 @@ def recorder(service):
     """A client that watches READINGS; of these only the orders come here."""
     context = service.requests.context
     context.messages = replace(
-        context.messages, readings=type("Readings", (), {"columns": [], "model_columns": [], "line": None})
+        context.messages, readings=type("Readings", (), {"columns": [], "from_setpoints": {}, "line": None})
     )
     peer = service.unix()
     assert peer.ask({"class": "WATCH", "what": "readings"})["class"] == "WATCH"
