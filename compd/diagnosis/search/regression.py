@@ -13,6 +13,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.statistics import ridge_inverse, solve_ridge
@@ -188,6 +189,16 @@ class NormalEquations:
         theta = covariance @ score
         left = float(self.data.squares[folds].sum()) - 2 * float(theta @ score) + float(theta @ normal @ theta)
         return theta, covariance, left / self.data.value_count
+
+    def bounded_loss(self, index: IntArray, limits: FloatArray) -> float:
+        """Mean square left by the parameters within limits (p, 2) that fit all rows best."""
+        folds = self.data.split_of_fold == 0
+        normal = self.gram[folds][:, index[:, None], index].sum(axis=0)
+        score = self.score[folds][:, index].sum(axis=0)
+        root = np.linalg.cholesky(normal + np.diag(self.ridge[index])).T
+        theta = lsq_linear(root, np.linalg.solve(root.T, score), (limits[:, 0], limits[:, 1])).x
+        left = float(self.data.squares[folds].sum()) - 2 * float(theta @ score) + float(theta @ normal @ theta)
+        return left / self.data.value_count
 
 
 def normal_equations(data: RegressionData, candidates: Sequence[Regressors]) -> tuple[NormalEquations, list[IntArray]]:
