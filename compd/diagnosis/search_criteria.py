@@ -18,7 +18,7 @@ class SearchCriteria:
         reason="effects of a fiftieth of the noise still show in them",
     )
     max_members: int = threshold(
-        12,
+        9,
         unit="effects and descriptions",
         meaning="a set has so many members at most",
         reason="a choice: it bounds the time; the price of each ends a search before",
