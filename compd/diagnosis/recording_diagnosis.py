@@ -25,7 +25,14 @@ from compd.diagnosis.candidates.plausibility import estimate_parameters
 from compd.diagnosis.candidates.proxies import proxy_candidates
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
-from compd.diagnosis.findings import CandidateResult, ConstantFinding, DiagnosisStep, Rival, UntestedEffect
+from compd.diagnosis.findings import (
+    CandidateResult,
+    ConstantFinding,
+    DiagnosisStep,
+    Rival,
+    UnknownStates,
+    UntestedEffect,
+)
 from compd.diagnosis.implausible_effect import implausible_effect
 from compd.diagnosis.intercepts import beside, with_intercepts
 from compd.diagnosis.proposed_measurement import propose_measurement
@@ -190,6 +197,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         gross=gross_rows(problem.gross, aligned.recording.row, criteria.gross),
         untested=_untested(problem, explanation, steps),
         asked=asked,
+        start=_states(problem, explanation),
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
         criteria=criteria,
@@ -199,6 +207,13 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         next_measurement=propose_measurement(problem, explanation, diagnosis),
         summary=summary(diagnosis),
     )
+
+
+def _states(problem: DiagnosisProblem, explanation: Explanation) -> UnknownStates | None:
+    if (start := explanation.start) is None:
+        return None
+    before_um, after_um = (problem.unit_um * float(np.sqrt(loss)) for loss in (start.before, start.after))
+    return UnknownStates(start.lag.effect.id, problem.states, before_um, after_um)
 
 
 def _verdict(

@@ -184,7 +184,10 @@ def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: 
     if not gross.runs:
         return [f"{count}: {rows}"]
     runs = join_words([f"{first} to {last}" for first, last in gross.runs])
-    texts = [count, f"look at what happened in rows {runs} (a bump, a slipped target, a lost step)"]
+    share = float(np.nansum(size[[row in in_runs for row in recording.row[np.isin(recording.row, gross.rows)]]] ** 2))
+    share /= max(float(np.nansum(comparison.residual_um**2)), 1e-300)
+    held = f", which hold {percent_text(share)} of the squared error" if np.isfinite(share) else ""
+    texts = [count, f"look at what happened in rows {runs}{held} (a bump, a slipped target, a lost step)"]
     return [*texts, f"single bad readings: {rows}"] if single else texts
 
 

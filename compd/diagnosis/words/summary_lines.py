@@ -51,6 +51,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         LabelledText("Asked", tuple(question(diagnosis))),
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
         LabelledText("Follows", tuple(_follows(diagnosis, fall))),
+        LabelledText("Start", tuple(_start(diagnosis, fall))),
         LabelledText("Left", tuple(_left(diagnosis, fall))),
         LabelledText("Gross", tuple(gross_texts(diagnosis.gross, diagnosis.after, fall.unit))),
         LabelledText("Sure", tuple(_sure(diagnosis))),
@@ -151,6 +152,14 @@ def _follows(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
 def _explains(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     rows = ", rows left out" if fall.left_out else ""
     return [f"{fall.share_text(fall.after)}: {fall.text(fall.after)}{rows}"] if diagnosis.steps else []
+
+
+def _start(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    """What is fitted along of a lag that was out of equilibrium when sessions began."""
+    if (start := diagnosis.start) is None:
+        return []
+    errors = fall_text([start.before_um, start.after_um], fall.unit)
+    return [f"{start.effect} was not in equilibrium at first: {start.numbers} numbers more ({errors}), no cause"]
 
 
 def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
