@@ -144,6 +144,12 @@ class Criteria:
         meaning="a split in which one fold holds more of what a candidate does cannot test it",
         reason="a choice: what is left in the other folds determines no parameter",
     )
+    swing_share: float = threshold(
+        0.3,
+        unit="share of a temperature's range",
+        meaning="by so much a temperature has to turn to count as heated or cooled again",
+        reason="a choice: less is the control of a heater, or a draught",
+    )
     disturbance: float = threshold(
         0.28,
         unit="standard deviations of the noise, rms per coordinate",

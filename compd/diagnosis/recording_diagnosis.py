@@ -43,6 +43,7 @@ from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
 from compd.diagnosis.search.rivals import find_rivals
 from compd.diagnosis.search.significance import Family, OrthogonalComplement, p_values
 from compd.diagnosis.search.subset_losses import SubsetLosses
+from compd.diagnosis.thermal_evidence import seen_once
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.diagnosis.words.summary import summary
@@ -232,7 +233,12 @@ def _verdict(
     if not found and problem.may_be_noise(explanation.reduced_chi_squared - unnamed):
         if not steps:
             return "adequate"
-        return "ambiguous" if any(step.rivals for step in steps) else "identified"
+        if any(step.rivals for step in steps):
+            return "ambiguous"
+        effects = [step.effect for step in steps]
+        return (
+            "likely" if seen_once(problem.aligned, problem.comparison.used, effects, problem.criteria) else "identified"
+        )
     if steps:
         return "partial"
     if not found and (not problem.floor_known or all(c.status == "not_testable" for c in candidates)):

@@ -24,9 +24,9 @@ from compd.text import nan_to_null
 if TYPE_CHECKING:
     import pandas as pd
 
-Verdict = Literal["adequate", "identified", "ambiguous", "partial", "unexplained", "not_testable"]
-# Version of the words and keys of `Diagnosis.as_json`: 2 has the word `partial` and the key `constant`.
-VERDICT_VERSION = 2
+Verdict = Literal["adequate", "identified", "likely", "ambiguous", "partial", "unexplained", "not_testable"]
+# Version of the words and keys of `Diagnosis.as_json`: 2 has the word `partial` and the key `constant`, 3 `likely`.
+VERDICT_VERSION = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,6 +37,8 @@ class Diagnosis:
     ----------
     verdict : str
         ``"adequate"``: nothing is missing. ``"identified"``: the effects of `steps` are what is missing.
+        ``"likely"``: they explain it, but a thermal one was seen in one warm-up only; another session, a sealed
+        recording or a second cycle of heating and cooling makes it identified.
         ``"ambiguous"``: they explain it, but the recording cannot tell at least one of them from a rival.
         ``"partial"``: they explain a part; the rest is above the noise, or the noise is not known.
         ``"unexplained"``: no effect of the library gains; `depends_on` says what the error follows.

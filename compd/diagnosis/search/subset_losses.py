@@ -224,8 +224,10 @@ class SubsetLosses:
         """(B,) sums of squares that two sets leave in each block of rows, in the splits that test both."""
         testable: BoolArray = np.asarray(self._testable[[*members, *without]].all(axis=0))
         block = self.data.block
-        first, second = (np.bincount(block, self._row_losses(each, testable)) for each in (members, without))
-        return first, second
+        of_set = [
+            np.bincount(block, self._row_losses(each, testable)).astype(np.float64) for each in (members, without)
+        ]
+        return of_set[0], of_set[1]
 
     def nuisance_with(self, members: Iterable[int]) -> Regressors:
         """The nuisance columns and those of some candidates."""
