@@ -167,7 +167,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     losses, aligned, criteria = explanation.losses, problem.aligned, problem.criteria
     before = compare(aligned, problem.comparison.fitted, covariance, outlier=problem.gross)
     before = replace(before, floor=problem.comparison.floor)
-    p_value_by_effect = _p_values(losses, explanation.members)
+    explanation, p_value_by_effect = _without_chance(explanation)
     after = before
     if explanation.named:
         links = aligned.rows.links
@@ -286,6 +286,18 @@ def _rivals(explanation: Explanation, member: int) -> tuple[Rival, ...]:
         others = find_rivals(explanation.losses, explanation.named, member)
         rivals += tuple(rival for rival in others if rival.name not in known)
     return rivals
+
+
+def _without_chance(explanation: Explanation) -> tuple[Explanation, dict[str, float]]:
+    """The explanation without the effects that noise alone does as well as, and the p-value of each effect."""
+    losses = explanation.losses
+    while True:
+        p_values = _p_values(losses, explanation.members)
+        weak = [k for k in explanation.effects if p_values[losses.name(k)] > losses.criteria.p_value]
+        if not weak:
+            return explanation, p_values
+        weakest = max(weak, key=lambda k: p_values[losses.name(k)])
+        explanation = replace(explanation, members=tuple(k for k in explanation.members if k != weakest))
 
 
 def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float]:
