@@ -53,7 +53,8 @@ class Recording:
     path, sha256 : the table's file; hash of it, its sidecar and its ball plate, for provenance.
     sidecar : what the sidecar says; `machine` and `reference` are short for its own.
     row : (N,) row as a spreadsheet shows it, the header being row 1.
-    time_s : (N,) seconds from the start, strictly rising, never nan; without `has_time` the number of the row.
+    time_s : (N,) s on the file's clock, strictly rising, never nan; without `has_time` the number of the row.
+    begin_s : the file's first time, of a block or of chosen rows too; effects and descriptions count from it.
     has_time : whether the file has the time of each row; an external model's rows may be in order without it.
     session, visit, point : (N,) int or None if the column is absent; -1 where the cell is empty.
         Text ids of points are numbered in sorted order; `point_labels` has the texts, empty where ids are numbers.
@@ -118,6 +119,7 @@ class Recording:
     point_labels: tuple[str, ...] = ()
     commanded_mm: FloatArray | None = None
     commanded_rotation_rad: FloatArray | None = None
+    begin_s: float = 0.0
 
     @property
     def machine(self) -> str:
@@ -138,6 +140,11 @@ class Recording:
     def rows(self) -> int:
         """N."""
         return len(self.time_s)
+
+    @property
+    def elapsed_s(self) -> FloatArray:
+        """(N,) time since the file's first row, s: what effects take, so that no result depends on a clock's origin."""
+        return self.time_s - self.begin_s
 
     def select(self, index: IntArray | slice) -> Recording:
         """The rows of this index (R,), in its order; of a slice without a copy."""

@@ -82,6 +82,7 @@ class RecordingBuilder:
         self._count = RowCount()
         self._last_row = FIRST_ROW - 1
         self._last_time_s = -math.inf
+        self._begin_s: float | None = None
         self._largest_joint_um = 0.0
 
     def build(self, table: Table | None, table_problems: ProblemList, last: bool = True) -> Recording:
@@ -164,6 +165,8 @@ class RecordingBuilder:
         timed = ~np.isnan(table.columns["time_s"])
         kept = np.argsort(table.columns["time_s"], kind="stable")[: int(timed.sum())]
         columns = {name: values[kept] for name, values in table.columns.items()}
+        if self._begin_s is None and len(kept):
+            self._begin_s = float(columns["time_s"][0])
         left_out = {"time_s is empty": int((~timed).sum()), "empty row": self._blank_rows(table)}
 
         def stack(names: Iterable[str]) -> FloatArray | None:
@@ -228,6 +231,7 @@ class RecordingBuilder:
             columns=columns,
             warnings=warnings,
             point_labels=table.labels.get("point", ()),
+            begin_s=self._begin_s or 0.0,
         )
 
     def _blank_rows(self, table: Table) -> int:

@@ -263,7 +263,7 @@ def _observations(
         joint_mm=joint_mm,
         frame_mm=frame_mm,
         quantities=recording.quantities,
-        time_s=recording.time_s,
+        time_s=recording.elapsed_s,
         session_start=starts,
         movement=movement,
         quantities_at_zero=recording.sidecar.quantities_at_zero,

@@ -162,7 +162,7 @@ def _system(sample: Sample, start: FitResult, sigma_um: FloatArray) -> _System:
     count = aligned.registration_columns.shape[2]
     nuisance: list[FloatArray] = [amounts[:count]]
     amounts = amounts[count:]
-    sampled = session_places(sample.starts_s, aligned.rows.time_s[aligned.rows.session_start])
+    sampled = session_places(sample.starts_s, aligned.recording.time_s[aligned.rows.session_start])
     keys: dict[str, Sequence[StateKey]] = {}
     for effect in start.fitted:
         states = initial_states(aligned.rows, effect.effect, effect.constants)
@@ -202,7 +202,7 @@ def _normals(
         aligned = align_block(block, sample.aligned)
         rows, carried = advance_effects(effects, aligned.rows, system.keys, hand_over.take())
         hand_over.give(carried)
-        session = session_places(sample.starts_s, aligned.rows.time_s)
+        session = session_places(sample.starts_s, aligned.recording.time_s)
         normals, used = _block_normals(aligned, effects, rows, system, nuisance, cluster, session)
         return normals, quantity_ranges(effects, aligned.rows, used), aligned.recording.rows
 

@@ -94,7 +94,7 @@ def fixed_terms(comparison: Comparison, starts_s: FloatArray) -> FixedTerms:
         effect.effect.id: initial_states(aligned.rows, effect.effect, effect.constants) for effect in comparison.fitted
     }
     keys = {id_: sorted({state.key for state in of_effect}) for id_, of_effect in states.items() if of_effect}
-    sampled = session_places(starts_s, aligned.rows.time_s[aligned.rows.session_start])
+    sampled = session_places(starts_s, aligned.recording.time_s[aligned.rows.session_start])
     by_effect, total = effect_deltas(comparison.fitted, aligned.rows)
     terms: dict[str, NuisanceTerms] = {}
     for name, added in {NOTHING: total, **deltas_without(aligned, by_effect)}.items():
