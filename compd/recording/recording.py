@@ -21,6 +21,7 @@ from compd.columns import (
 from compd.display_unit import MM_PER_RAD
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
+from compd.data_fault import DataFault
 from compd.recording.reference import Reference
 from compd.recording.sidecar import Sidecar
 from compd.units import UM_PER_MM
@@ -82,6 +83,7 @@ class Recording:
     left_out : reason -> rows of the file that are no row here (no time; empty row between others).
     columns : name -> (N,) every column as in the file, in the file's unit.
     warnings : what can be used but should be looked at.
+    faults : data that are wrong or look so. Cells that these take as empty are so in `quantities`, not in `columns`.
     """
 
     path: Path
@@ -120,6 +122,7 @@ class Recording:
     commanded_mm: FloatArray | None = None
     commanded_rotation_rad: FloatArray | None = None
     begin_s: float = 0.0
+    faults: tuple[DataFault, ...] = ()
 
     @property
     def machine(self) -> str:
@@ -146,6 +149,12 @@ class Recording:
         """(N,) time since the file's first row, s: what effects take, so that no result depends on a clock's origin."""
         return self.time_s - self.begin_s
 
+    @cached_property
+    def unused(self) -> BoolArray:
+        """(N,) rows that do not count, by a person or because their data are wrong."""
+        faulty = [row for fault in self.faults if fault.consequence == "rows left out" for row in fault.rows]
+        return self.excluded | np.isin(self.row, faulty)
+
     def select(self, index: IntArray | slice) -> Recording:
         """The rows of this index (R,), in its order; of a slice without a copy."""
         chosen: dict[str, Any] = {}
@@ -167,7 +176,8 @@ class Recording:
                 joined[column.name] = np.concatenate(values)
             elif column.name in ("quantities", "columns"):
                 joined[column.name] = {name: np.concatenate([each[name] for each in values]) for name in values[0]}
-        return replace(self, **joined)
+        faults = tuple(dict.fromkeys(fault for part in parts for fault in part.faults))
+        return replace(self, **joined, faults=faults)
 
     @property
     def gauge_columns(self) -> tuple[str, ...]:
@@ -237,6 +247,9 @@ class Recording:
         left_out: dict[str, int] = {}
         reason = np.full(self.rows, "", dtype=object)
         lacking = {"excluded by a person": self.excluded}
+        for fault in self.faults:
+            if fault.consequence == "rows left out":
+                lacking[fault.reason] = lacking.get(fault.reason, False) | np.isin(self.row, fault.rows)
         lacking |= {f"{name} is empty": np.isnan(self.columns[name]) for name in needed}
         for text, rows in lacking.items():
             new = rows & (reason == "")

@@ -37,6 +37,8 @@ def check(
     loaded, _ = read_with_machine(path, machine, needs_reference=False)
     for warning in loaded.warnings:
         typer.echo(f"warning: {warning}")
+    for fault in loaded.faults:
+        typer.echo(f"look: {fault.text}")
     for line in _summary(loaded):
         typer.echo(line)
 

@@ -1,0 +1,61 @@
+"""What is wrong with data whatever the model is: rows or cells that no machine can have made, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from compd.text import join_words
+
+# What becomes of the rows that a fault names.
+Consequence = Literal["rows left out", "cells empty", "used"]
+_CONSEQUENCES: dict[Consequence, str] = {
+    "rows left out": "not used",
+    "cells empty": "taken as empty",
+    "used": "used as it stands; look, and leave it out if it is wrong",
+}
+# Stretches of rows that a sentence names.
+_MAX_STRETCHES = 4
+
+
+@dataclass(frozen=True)
+class DataFault:
+    """Rows of a recording whose data are wrong, or look so.
+
+    reason : in few words, for counts of rows: "the reference repeats itself".
+    rows : as a spreadsheet shows them, rising.  columns : of the cells that are meant; empty for whole rows.
+    what : what the cells show, with columns as the subject where there are some.
+    consequence : whether the rows do not count, or the cells only, or a person is asked.
+    """
+
+    reason: str
+    rows: tuple[int, ...]
+    columns: tuple[str, ...]
+    what: str
+    consequence: Consequence
+
+    @property
+    def text(self) -> str:
+        """The fault in a sentence: where, what, and what becomes of it."""
+        subject = f"{join_words(self.columns)} " if self.columns else ""
+        return f"{stretches_text(self.rows)}: {subject}{self.what} ({_CONSEQUENCES[self.consequence]})"
+
+
+def stretches_text(rows: Sequence[int]) -> str:
+    """Rising rows for a person: "row 5", "rows 102 to 141", "rows 5, 9 to 12 and 7 more"."""
+    stretches = row_stretches(rows)
+    shown = [str(first) if first == last else f"{first} to {last}" for first, last in stretches[:_MAX_STRETCHES]]
+    more = sum(last - first + 1 for first, last in stretches[_MAX_STRETCHES:])
+    return f"row{'s' * (len(rows) > 1)} {join_words([*shown, *([f'{more} more'] if more else [])])}"
+
+
+def row_stretches(rows: Collection[int]) -> list[tuple[int, int]]:
+    """First and last row of each stretch without a gap."""
+    stretches: list[tuple[int, int]] = []
+    for row in sorted(rows):
+        if stretches and row == stretches[-1][1] + 1:
+            stretches[-1] = (stretches[-1][0], row)
+        else:
+            stretches.append((row, row))
+    return stretches
