@@ -25,7 +25,7 @@ class DataFault:
 
     reason : in few words, for counts of rows: "the reference repeats itself".
     rows : as a spreadsheet shows them, rising.  columns : of the cells that are meant; empty for whole rows.
-    what : what the cells show, with columns as the subject where there are some.
+    what : what the cells show, as the predicate of the column, or of `the reference` where there are several.
     consequence : whether the rows do not count, or the cells only, or a person is asked.
     """
 
@@ -38,7 +38,9 @@ class DataFault:
     @property
     def text(self) -> str:
         """The fault in a sentence: where, what, and what becomes of it."""
-        subject = f"{join_words(self.columns)} " if self.columns else ""
+        kinds = {name.partition("_")[0] for name in self.columns}
+        whole = len(self.columns) > 1 and len(kinds) == 1
+        subject = f"the {kinds.pop()} " if whole else "".join(f"{name} " for name in self.columns)
         return f"{stretches_text(self.rows)}: {subject}{self.what} ({_CONSEQUENCES[self.consequence]})"
 
 

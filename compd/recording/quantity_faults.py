@@ -118,7 +118,8 @@ def _jumps_back(values: FloatArray) -> BoolArray:
     for begin, end in _stretches(wild):
         # a value that something leads up to, or away from, is on its way
         steps_there = [abs(steps[edge]) for edge in (begin - 1, end - 1) if 0 <= edge < len(steps)]
-        if end - begin > 2 or min(steps_there) <= limit:
+        beyond = [abs(steps[edge]) for edge in (begin - 2, end) if 0 <= edge < len(steps)]
+        if end - begin > 2 or min(steps_there) <= max(limit, MIN_JUMP * max(beyond)):
             wild[begin:end] = False
     return wild if 0 < wild.sum() <= max(2.0, MAX_WILD_SHARE * len(values)) else np.zeros_like(wild)
 

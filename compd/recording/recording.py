@@ -18,10 +18,10 @@ from compd.columns import (
     joint_columns,
     scale_columns,
 )
+from compd.data_fault import DataFault
 from compd.display_unit import MM_PER_RAD
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
-from compd.data_fault import DataFault
 from compd.recording.reference import Reference
 from compd.recording.sidecar import Sidecar
 from compd.units import UM_PER_MM

@@ -49,21 +49,21 @@ def reference_faults(columns: Mapping[str, FloatArray], row: IntArray, same_fram
         empty = _no_reading(pair) & ~wrong
         if empty.any():
             value = f"{pair.reference_mm[np.flatnonzero(empty)[0]][0]:.10g}"
-            what = f"{'are all' if len(pair.reference) > 1 else 'is'} {value}: the instrument had no reading"
+            what = f"is {value}{' on all axes' if len(pair.reference) > 1 else ''}: the instrument had no reading"
             faults.append(_left_out("no reading of the reference", row[empty], pair.reference, what))
             wrong |= empty
         frozen, places, first = _frozen(pair, ~wrong)
         if frozen.any():
             what = (
-                f"{_hold(pair.reference)} the same digits at {places} different places, those of row {row[first]}: "
-                "the instrument repeats itself"
+                f"holds the digits of row {row[first]} at {places} different places of the machine: the instrument "
+                "repeats itself"
             )
             faults.append(_left_out("the reference repeats itself", row[frozen], pair.reference, what))
             wrong |= frozen
         standing, first = _unfollowed(pair, ~wrong)
         if standing.any():
             what = (
-                f"{_hold(pair.own)} the digits of row {row[first]} while the reference moves by "
+                f"holds the digits of row {row[first]} while the reference moves by "
                 f"{_moved_mm(pair, standing):.3g} mm: the machine's own position was not recorded"
             )
             faults.append(_left_out("the machine's own position repeats itself", row[standing], pair.own, what))
@@ -73,10 +73,6 @@ def reference_faults(columns: Mapping[str, FloatArray], row: IntArray, same_fram
 
 def _left_out(reason: str, rows: IntArray, columns: tuple[str, ...], what: str) -> DataFault:
     return DataFault(reason, tuple(sorted(rows.tolist())), columns, what, "rows left out")
-
-
-def _hold(columns: tuple[str, ...]) -> str:
-    return "hold" if len(columns) > 1 else "holds"
 
 
 def _pairs(columns: Mapping[str, FloatArray], same_frame: bool) -> Iterable[_Pair]:
@@ -122,8 +118,17 @@ def _missed(pair: _Pair) -> tuple[FloatArray, FloatArray]:
 
 def _place_mm(pair: _Pair) -> float:
     """How far apart places are that the reference must tell apart."""
-    steps = [np.diff(np.unique(values[np.isfinite(values)])) for values in pair.reference_mm.T]
-    return max(PLACE_MM, MIN_DIGITS * max((float(step.min()) for step in steps if len(step)), default=0.0))
+    return max(PLACE_MM, MIN_DIGITS * max(map(_last_digit_mm, pair.reference_mm.T)))
+
+
+def _last_digit_mm(values_mm: FloatArray) -> float:
+    """The step of which all differences of values (N,) are multiples; 0 where there is none."""
+    different = np.unique(values_mm[np.isfinite(values_mm)])
+    if len(different) < 2:
+        return 0.0
+    step = float(np.diff(different).min())
+    counts = (different - different[0]) / step
+    return step if (np.abs(counts - np.round(counts)) < 1e-3).all() else 0.0
 
 
 def _no_reading(pair: _Pair) -> BoolArray:
@@ -190,7 +195,9 @@ def _is_missed(pair: _Pair, begin: int, end: int, place_mm: float) -> bool:
     if len(missed) < 2 or np.ptp(pair.reference_mm[rest][np.isfinite(pair.reference_mm[rest])]) == 0:
         return False
     scale = float(trimmed_scale((missed - np.median(missed))[:, None])[0])
-    return bool(np.nanmax(pair.own_mm[begin:end]) - np.nanmin(pair.own_mm[begin:end]) > max(MIN_SIGMAS * scale, place_mm))
+    return bool(
+        np.nanmax(pair.own_mm[begin:end]) - np.nanmin(pair.own_mm[begin:end]) > max(MIN_SIGMAS * scale, place_mm)
+    )
 
 
 def _unfollowed(pair: _Pair, use: BoolArray) -> tuple[BoolArray, int]:

@@ -211,11 +211,7 @@ def _sentence(text: str) -> str:
 
 def _excluded(comparison: Comparison) -> PageTable:
     rows = [[reason, str(count)] for reason, count in comparison.left_out.items()]
-    numbers = comparison.outlier_rows
-    if numbers:
-        more = comparison.outlier_count - 40
-        shown = ", ".join(map(str, numbers[:40])) + (f" and {more} more" if more > 0 else "")
-        rows.append([f"beyond all noise: rows {shown}", str(comparison.outlier_count)])
+    rows += [[fault.text, str(len(fault.rows))] for fault in comparison.faults]
     return PageTable(("reason", "rows"), rows or [["none", "0"]])
 
 

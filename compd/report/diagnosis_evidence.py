@@ -15,7 +15,7 @@ from compd.diagnosis import (
     EmpiricalFinding,
     ErrorFall,
     change_text,
-    gross_texts,
+    data_texts,
     parameter_texts,
     short_name,
     untested_here,
@@ -141,8 +141,8 @@ def constant_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable | None:
 
 
 def gross_rows_text(diagnosis: Diagnosis, fall: ErrorFall) -> str:
-    """Number and list of unexplained rows."""
-    return "; ".join(gross_texts(diagnosis.gross, diagnosis.after, fall.unit, GROSS_ROWS))
+    """What is wrong with the data; number and list of unexplained rows."""
+    return "; ".join(data_texts(diagnosis, fall.unit, GROSS_ROWS))
 
 
 def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:

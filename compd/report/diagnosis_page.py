@@ -73,8 +73,8 @@ def plot_time(diagnosis: Diagnosis, fall: ErrorFall) -> Figure:
 
 
 def _places(recording: Recording) -> FloatArray:
-    """(N,) hours; rows in a recording without time."""
-    return recording.time_s / SECONDS_PER_HOUR if recording.has_time else recording.row.astype(np.float64)
+    """(N,) hours from the first row; rows in a recording without time."""
+    return recording.elapsed_s / SECONDS_PER_HOUR if recording.has_time else recording.row.astype(np.float64)
 
 
 def _add_rows(figure: Figure, k: int, x: FloatArray, values: FloatArray, rows: IntArray) -> None:
@@ -132,7 +132,9 @@ def _time_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
         return []
     caption = "The error that is left; dashed lines are changes."
     if diagnosis.gross.rows:
-        caption += f" Crosses at the edge lie beyond it: {gross_rows_text(diagnosis, fall)}."
+        caption += (
+            f" Crosses at the edge lie beyond it. What is wrong with the data: {gross_rows_text(diagnosis, fall)}."
+        )
     return [Panel("Over time", caption, plot_time(diagnosis, fall))]
 
 

@@ -47,9 +47,9 @@ def print_diagnosis(console: Console, diagnosis: Diagnosis, holdouts: Sequence[H
         _print_pairs(console, step_rows(number, diagnosis, fall))
     _print_findings(console, diagnosis, fall)
     _print_constant(console, diagnosis, fall)
-    if diagnosis.gross.rows:
-        _heading(console, "Rows that do not count:")
-        _paragraph(console, gross_rows_text(diagnosis, fall))
+    if gross := gross_rows_text(diagnosis, fall):
+        _heading(console, "What is wrong with the data:")
+        _paragraph(console, gross)
     _print_candidates(console, diagnosis, fall)
     _print_next(console, diagnosis)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
+from compd.columns import is_sensitivity
 from compd.comparison.alignment.external_machine import external_change, external_prediction
 from compd.comparison.alignment.fixed_ends import FixedEnds
 from compd.comparison.alignment.measured_attitude import (
@@ -290,6 +291,12 @@ class AlignedRecording:
         if all(values is self.rows.quantities[name] for name, values in quantities.items()):
             return self
         return replace(self, rows=replace(self.rows, quantities=quantities))
+
+    @cached_property
+    def conditions(self) -> FloatArray:
+        """(N, K) what was recorded beside the reference: where the machine was, and every quantity."""
+        quantities = [values for name, values in self.rows.quantities.items() if not is_sensitivity(name)]
+        return np.column_stack([self.rows.tip_M_mm, self.rows.scale_mm, *quantities])
 
     @cached_property
     def usable(self) -> UsableRows:

@@ -153,7 +153,7 @@ def _system(sample: Sample, start: FitResult, sigma_um: FloatArray) -> _System:
     aligned = sample.aligned
     whitened = start.residual_um / sigma_um
     known: BoolArray = np.asarray(np.isfinite(whitened).all(axis=1))
-    limits = outlier_limits(whitened, known, aligned.recording.visit, aligned.criteria)
+    limits = outlier_limits(whitened, known, aligned.recording.visit, aligned.criteria, aligned.conditions)
     columns_um = nuisance_columns(aligned, start.fitted)
     _, total = effect_deltas(start.fitted, aligned.rows)
     taken_um = (aligned.measured_mm - aligned.predicted_mm(total)) * UM_PER_MM - start.residual_um

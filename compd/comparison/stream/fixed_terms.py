@@ -89,7 +89,8 @@ def fixed_terms(comparison: Comparison, starts_s: FloatArray) -> FixedTerms:
     """From the comparison of the sample.  starts_s : (S,) when the sessions of the whole recording start."""
     aligned, used = comparison.aligned, comparison.used
     known: BoolArray = np.asarray(np.isfinite(comparison.residual_um).all(axis=1))
-    limits = outlier_limits(comparison.residual_um, known, aligned.recording.visit, comparison.criteria)
+    visit, conditions = aligned.recording.visit, aligned.conditions
+    limits = outlier_limits(comparison.residual_um, known, visit, comparison.criteria, conditions)
     states = {
         effect.effect.id: initial_states(aligned.rows, effect.effect, effect.constants) for effect in comparison.fitted
     }

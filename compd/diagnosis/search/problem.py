@@ -144,9 +144,8 @@ class DiagnosisProblem:
         """What each row counts beside some candidates alone."""
         columns = [self.nuisance, *(candidate.columns_um / self.sigma_um[:, None] for candidate in candidates)]
         visit, noise = self.aligned.recording.visit, 1.0 if self.floor_known else 0.0
-        return weigh_rows(
-            columns, self.residual, self.known, visit, noise, self.criteria, self.aligned.criteria.huber_sigmas
-        )
+        huber, conditions = self.aligned.criteria.huber_sigmas, self.aligned.conditions
+        return weigh_rows(columns, self.residual, self.known, visit, noise, self.criteria, huber, conditions)
 
 
 def build_problem(
@@ -174,9 +173,8 @@ def build_problem(
     if weights is None:
         everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
         noise = 1.0 if comparison.floor.known else 0.0
-        weights = weigh_rows(
-            everything, residual, known, aligned.recording.visit, noise, criteria, aligned.criteria.huber_sigmas
-        )
+        visit, huber, conditions = aligned.recording.visit, aligned.criteria.huber_sigmas, aligned.conditions
+        weights = weigh_rows(everything, residual, known, visit, noise, criteria, huber, conditions)
     rows = known & ~weights.gross
     root = np.sqrt(weights.weight[rows])
     data = RegressionData(

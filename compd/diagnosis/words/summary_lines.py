@@ -12,6 +12,7 @@ from compd.diagnosis.words.phrases import (
     chance_clause,
     change_text,
     constant_text,
+    fault_texts,
     followed_text,
     gross_texts,
     is_best_a_change,
@@ -32,6 +33,8 @@ WIDTH = 80
 # Effects, rivals and untested effects that are said here.
 MAX_NAMED = 3
 NO_RIVAL = "no other effect that was tried does as well"
+# Faults of the data that are said here.
+MAX_FAULTS = 2
 # A probability above this is said before the numbers.
 DOUBTFUL = 0.01
 # With so many other texts the one is left out that says nothing.
@@ -52,6 +55,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
         LabelledText("Follows", tuple(_follows(diagnosis, fall))),
         LabelledText("Left", tuple(_left(diagnosis, fall))),
+        LabelledText("Data", tuple(fault_texts(diagnosis.after, MAX_FAULTS))),
         LabelledText("Gross", tuple(gross_texts(diagnosis.gross, diagnosis.after, fall.unit))),
         LabelledText("Sure", tuple(_sure(diagnosis))),
         LabelledText("Or else", tuple(_or_else(diagnosis))),

@@ -37,7 +37,7 @@ def faults_of(columns: dict[str, np.ndarray], same_frame: bool = True) -> list[D
 def test_rows_that_repeat_a_reading_at_other_places_are_left_out_and_the_reading_itself_counts(machine: str) -> None:
     (fault,) = faults_of(with_reference(columns_of(machine), slice(10, 40)))
     assert fault.rows == tuple(range(13, 42))
-    assert "the same digits at 11 different places, those of row 12" in fault.text
+    assert "the reference holds the digits of row 12 at 11 different places" in fault.text
     assert fault.consequence == "rows left out"
 
 
