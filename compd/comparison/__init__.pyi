@@ -8,7 +8,6 @@ from .effect_fit import FitResult as FitResult
 from .effect_fit import fit as fit
 from .effect_fit import initial_effect as initial_effect
 from .initial_states import initial_state_columns as initial_state_columns
-from .lone_visits import lone_distance as lone_distance
 from .neighbour_block import neighbour_blocks as neighbour_blocks
 from .nuisance import nuisance_beside as nuisance_beside
 from .nuisance import nuisance_columns as nuisance_columns
@@ -28,3 +27,4 @@ from .stream.sample import Sample as Sample
 from .stream.sample import draw_sample as draw_sample
 from .stream.streamed_comparison import StreamedComparison as StreamedComparison
 from .thinning import thinned as thinned
+from .undetermined_numbers import determined as determined

@@ -214,6 +214,8 @@ def _finish(
             "" if number.searched else plausible + ("" if number.plausible else ": [red]outside[/]"),
         )
     console.print(keep_words_whole(table, console.width))
+    for remark in changed.warnings:
+        typer.echo(f"look: {remark.where}: {remark.what}; {remark.allowed}")
     typer.echo(after.verdict)
 
 

@@ -27,6 +27,7 @@ from compd.comparison.alignment.registration import (
 )
 from compd.comparison.alignment.target_place import HELD, PlacedTarget
 from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.lone_visits import lone_distance
 from compd.display_unit import ATTITUDE_LABELS, ATTITUDE_UNIT, MM_PER_RAD, in_place_unit
 from compd.errors import CompdError
 from compd.model import (
@@ -297,6 +298,13 @@ class AlignedRecording:
         """(N, K) what was recorded beside the reference: where the machine was, and every quantity."""
         quantities = [values for name, values in self.rows.quantities.items() if not is_sensitivity(name)]
         return np.column_stack([self.rows.tip_M_mm, self.rows.scale_mm, *quantities])
+
+    def lone_distance(self, distance: FloatArray, use: BoolArray) -> float:
+        """Beyond which the repeats of a visit do not confirm each other; inf where no visit is a lone one.
+
+        distance : (N,) of each row from what is known, in robust standard deviations.  use : (N,) rows that count.
+        """
+        return lone_distance(distance, use, self.recording.visit, self.conditions, self.criteria)
 
     @cached_property
     def usable(self) -> UsableRows:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtr, chdtrc, gammaln
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.comparison import ComparisonCriteria, lone_distance
+from compd.comparison import ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.findings import GrossRows
 from compd.diagnosis.search_criteria import GrossCriteria
@@ -39,7 +39,7 @@ def weigh_rows(
     noise: float,
     criteria: Criteria,
     huber: float = ComparisonCriteria.huber_sigmas,
-    conditions: FloatArray | None = None,
+    lone_distance: Callable[[FloatArray, BoolArray], float] | None = None,
 ) -> RowWeights:
     """Weigh rows by what a robust fit of some columns and a constant leaves of them.
 
@@ -49,7 +49,7 @@ def weigh_rows(
     noise : standard deviation of the noise, 1 of a whitened residual; 0 where it is not known. A row that another one
         of its visit confirms within 5 sqrt(2) of it is not gross: the machine really was there. A lone visit is.
     huber : of the robust fit, as of `huber_weights`.
-    conditions : (N, K) what was recorded beside the reference, as of `lone_distance`.
+    lone_distance : beyond which the repeats of a visit do not confirm each other, `AlignedRecording.lone_distance`.
 
     With d the rms over the coordinates of a row's residual in robust standard deviations, its weight is
     min(1, 2 / d) (Huber, Robust Statistics (1981), chapter 7), over the mean of min(d^2, 2 d) for normal noise.
@@ -75,7 +75,8 @@ def weigh_rows(
     far = (distance > criteria.gross_sigmas).any(axis=1)
     gross = far & ~_confirmed(left, judged, visit, criteria.gross_sigmas * np.sqrt(2.0) * (noise or scale))
     farthest = distance.max(axis=1)
-    gross |= farthest > lone_distance(farthest, judged, visit, conditions)
+    if lone_distance is not None:
+        gross |= farthest > lone_distance(farthest, judged)
     size = np.sqrt(np.mean(distance**2, axis=1))
     full = criteria.full_weight_sigmas
     weight = np.minimum(1.0, full / np.maximum(size, full)) / consistency(m, full)

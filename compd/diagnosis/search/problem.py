@@ -144,8 +144,8 @@ class DiagnosisProblem:
         """What each row counts beside some candidates alone."""
         columns = [self.nuisance, *(candidate.columns_um / self.sigma_um[:, None] for candidate in candidates)]
         visit, noise = self.aligned.recording.visit, 1.0 if self.floor_known else 0.0
-        huber, conditions = self.aligned.criteria.huber_sigmas, self.aligned.conditions
-        return weigh_rows(columns, self.residual, self.known, visit, noise, self.criteria, huber, conditions)
+        huber, lone = self.aligned.criteria.huber_sigmas, self.aligned.lone_distance
+        return weigh_rows(columns, self.residual, self.known, visit, noise, self.criteria, huber, lone)
 
 
 def build_problem(
@@ -173,8 +173,8 @@ def build_problem(
     if weights is None:
         everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
         noise = 1.0 if comparison.floor.known else 0.0
-        visit, huber, conditions = aligned.recording.visit, aligned.criteria.huber_sigmas, aligned.conditions
-        weights = weigh_rows(everything, residual, known, visit, noise, criteria, huber, conditions)
+        visit, huber, lone = aligned.recording.visit, aligned.criteria.huber_sigmas, aligned.lone_distance
+        weights = weigh_rows(everything, residual, known, visit, noise, criteria, huber, lone)
     rows = known & ~weights.gross
     root = np.sqrt(weights.weight[rows])
     data = RegressionData(
