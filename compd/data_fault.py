@@ -24,7 +24,7 @@ class DataFault:
     """Rows of a recording whose data are wrong, or look so.
 
     reason : in few words, for counts of rows: "the reference repeats itself".
-    rows : as a spreadsheet shows them, rising.  columns : of the cells that are meant; empty for whole rows.
+    rows : as a spreadsheet shows them, rising; empty where all are meant.  columns : of the cells that are meant; empty for whole rows.
     what : what the cells show, as the predicate of the column, or of `the reference` where there are several.
     consequence : whether the rows do not count, or the cells only, or a person is asked.
     """
@@ -41,7 +41,8 @@ class DataFault:
         kinds = {name.partition("_")[0] for name in self.columns}
         whole = len(self.columns) > 1 and len(kinds) == 1
         subject = f"the {kinds.pop()} " if whole else "".join(f"{name} " for name in self.columns)
-        return f"{stretches_text(self.rows)}: {subject}{self.what} ({_CONSEQUENCES[self.consequence]})"
+        where = f"{stretches_text(self.rows)}: " if self.rows else ""
+        return f"{where}{subject}{self.what} ({_CONSEQUENCES[self.consequence]})"
 
 
 def stretches_text(rows: Sequence[int]) -> str:

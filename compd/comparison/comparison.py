@@ -13,6 +13,7 @@ from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, TextArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.column_faults import column_faults
 from compd.comparison.contributions import Contribution
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.noise_floor import NoiseFloor
@@ -166,7 +167,7 @@ class Comparison:
                 min_sigmas=criteria.disagreement_sigmas,
                 max_share=criteria.max_lone_share / 2,
             )
-        return (*recording.faults, *faults)
+        return (*column_faults(self.aligned), *recording.faults, *faults)
 
     @property
     def named_faults(self) -> tuple[DataFault, ...]:

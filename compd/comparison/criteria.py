@@ -79,6 +79,31 @@ class ComparisonCriteria:
         meaning="a visit with a place or a quantity so far beyond all others is not an outlier as a whole",
         reason="a choice: what happens in a single visit under load, or in a corner, is to be explained",
     )
+    slope_share: float = threshold(
+        0.05,
+        unit="share of the slope",
+        meaning="a column of the reference seems to be in another unit where its slope against the model differs from "
+        "that unit's by less",
+        reason="a choice: a model that is wrong by more is looked at for other reasons",
+    )
+    most_beside_slope: float = threshold(
+        0.1,
+        unit="share of a coordinate's median distance from its middle",
+        meaning="a coordinate that leaves more beside a line against the model has no slope",
+        reason="a choice: what a reversed sign or another unit leaves is the error of the machine",
+    )
+    min_slope_rows: int = threshold(
+        8,
+        unit="rows",
+        meaning="fewer rows have no slope",
+        reason="a choice: a line through fewer is chance",
+    )
+    min_slope_spread: float = threshold(
+        0.05,
+        unit="share of the largest singular value",
+        meaning="points nearer to a plane tell no mirror image",
+        reason="a choice: in a plane half a turn mirrors",
+    )
     fewest_visits: int = threshold(
         10,
         unit="visits",

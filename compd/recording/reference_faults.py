@@ -85,8 +85,8 @@ def _pairs(columns: Mapping[str, FloatArray], same_frame: bool) -> Iterable[_Pai
 
     def pair(reference: Iterable[str], own: Iterable[str], aligned: bool) -> _Pair:
         reference, own = tuple(reference), tuple(own)
-        stacked = [np.column_stack([columns[name] for name in each]) for each in (reference, own)]
-        return _Pair(reference, own, *stacked, aligned)
+        reference_mm, own_mm = (np.column_stack([columns[name] for name in each]) for each in (reference, own))
+        return _Pair(reference, own, reference_mm, own_mm, aligned)
 
     modelled = [axis for axis in axes if axis in models]
     if len(axes) > 1 and (modelled or scales):

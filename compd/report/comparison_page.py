@@ -211,7 +211,7 @@ def _sentence(text: str) -> str:
 
 def _excluded(comparison: Comparison) -> PageTable:
     rows = [[reason, str(count)] for reason, count in comparison.left_out.items()]
-    rows += [[fault.text, str(len(fault.rows))] for fault in comparison.faults]
+    rows += [[fault.text, str(len(fault.rows) or comparison.rows)] for fault in comparison.faults]
     return PageTable(("reason", "rows"), rows or [["none", "0"]])
 
 

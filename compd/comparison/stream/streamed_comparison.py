@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.comparison.column_faults import column_faults
 from compd.comparison.comparison import Comparison, Size
 from compd.comparison.row_faults import OUTLIER
 from compd.comparison.stream.residual_totals import ResidualTotals
@@ -91,7 +92,7 @@ class StreamedComparison(Comparison):
         """Of the recording as it was read; and the rows that no noise explains."""
         rows = tuple(self.outlier_rows)
         found = DataFault(OUTLIER, rows, (), "far from all else, which no noise explains", "rows left out")
-        return (*self.aligned.recording.faults, *([found] if rows else []))
+        return (*column_faults(self.aligned), *self.aligned.recording.faults, *([found] if rows else []))
 
     @property
     def sample_rows(self) -> int:
