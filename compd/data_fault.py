@@ -9,10 +9,11 @@ from typing import Literal
 from compd.text import join_words
 
 # What becomes of the rows that a fault names.
-Consequence = Literal["rows left out", "cells empty", "used"]
+Consequence = Literal["rows left out", "cells empty", "used", "mend the column"]
 _CONSEQUENCES: dict[Consequence, str] = {
     "rows left out": "not used",
     "cells empty": "taken as empty",
+    "mend the column": "used as it stands; mend the column",
     "used": "used as it stands; look, and leave it out if it is wrong",
 }
 # Stretches of rows that a sentence names.
@@ -24,7 +25,8 @@ class DataFault:
     """Rows of a recording whose data are wrong, or look so.
 
     reason : in few words, for counts of rows: "the reference repeats itself".
-    rows : as a spreadsheet shows them, rising; empty where all are meant.  columns : of the cells that are meant; empty for whole rows.
+    rows : as a spreadsheet shows them, rising; empty where all are meant.
+    columns : of the cells that are meant; empty for whole rows.
     what : what the cells show, as the predicate of the column, or of `the reference` where there are several.
     consequence : whether the rows do not count, or the cells only, or a person is asked.
     """

@@ -12,7 +12,7 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.criteria import ComparisonCriteria
 from compd.data_fault import DataFault
 from compd.text import join_words
-from compd.units import REFERENCE_UNITS, UNIT_KINDS, UM_PER_MM
+from compd.units import REFERENCE_UNITS, UM_PER_MM, UNIT_KINDS
 
 # Units that are mistaken for one another; of others a slope as large has another cause.
 _MISTAKEN = ("nm", "um", "cm", "m", "inch", "urad", "mrad", "rad", "deg", "arcsec")
@@ -34,17 +34,29 @@ def column_faults(aligned: AlignedRecording) -> list[DataFault]:
     if reversed_columns:
         names = join_words([each.column for each in reversed_columns])
         if aligned.registered:
-            what = "the sign of one axis of the reference, or of all three, seems reversed: it mirrors what the model says"
+            what = "the sign of one axis of the reference, or of all three, seems reversed: it is a mirror image"
         else:
             models = join_words([each.model for each in reversed_columns])
             slope = join_words([f"{each.slope:.3g}" for each in reversed_columns])
             what = f"the sign of {names} seems reversed: its slope against {models} is {slope}"
-        faults.append(DataFault("a sign that seems reversed", (), (), what, "used"))
+        faults.append(DataFault("a sign that seems reversed", (), (), what, "mend the column"))
     for each in slopes:
-        if unit := _unit_of_slope(abs(each.slope), REFERENCE_UNITS[aligned.unit], aligned.criteria):
-            what = f"{each.column} seems to be in {unit}: its slope against {each.model} is {each.slope:.5g}"
-            faults.append(DataFault("a unit that seems to be another", (), (), what, "used"))
+        sides = _sides(aligned, each)
+        if sides:
+            what = f"{' or '.join(sides)}: the slope of {each.column} against {each.model} is {each.slope:.5g}"
+            faults.append(DataFault("a unit that seems to be another", (), (), what, "mend the column"))
     return faults
+
+
+def _sides(aligned: AlignedRecording, each: _Slope) -> list[str]:
+    """Which column seems to be in another unit, of the two that make a slope."""
+    if each.slope == 0:
+        return []
+    ending, criteria, size = REFERENCE_UNITS[aligned.unit], aligned.criteria, abs(each.slope)
+    columns = {each.column: _unit_of_slope(size, ending, criteria)}
+    if aligned.model is None and not aligned.registered:
+        columns[each.model] = _unit_of_slope(1 / size, ending, criteria)
+    return [f"{name} seems to be in {unit}" for name, unit in columns.items() if unit]
 
 
 def _unit_of_slope(slope: float, ending: str, criteria: ComparisonCriteria) -> str:

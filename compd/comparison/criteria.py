@@ -60,11 +60,11 @@ class ComparisonCriteria:
         reason="a normal error is as large once in two million: in no recording by chance",
     )
     lone_ratio: float = threshold(
-        10.0,
+        6.0,
         unit="1",
         meaning="a visit is an outlier as a whole, whatever its repeats say, where it lies so many times as far off as "
         "the next, and nothing that was recorded is different there",
-        reason="a choice: of twenty visits under one cause the largest is seldom twice the next, and what is fifty "
+        reason="a choice: of twenty visits under one cause the largest is seldom twice the next, and what is thirty "
         "standard deviations off is worth a look in any case",
     )
     max_lone_share: float = threshold(

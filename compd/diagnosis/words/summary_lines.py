@@ -50,12 +50,12 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     found = tuple(_found(diagnosis, fall))
     names = tuple(clause.partition(": ")[0] for clause in found)
     others = [
+        LabelledText("Data", tuple(fault_texts(diagnosis.after, MAX_FAULTS))),
         LabelledText("Changed", tuple(_changed(diagnosis, fall))),
         LabelledText("Asked", tuple(question(diagnosis))),
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
         LabelledText("Follows", tuple(_follows(diagnosis, fall))),
         LabelledText("Left", tuple(_left(diagnosis, fall))),
-        LabelledText("Data", tuple(fault_texts(diagnosis.after, MAX_FAULTS))),
         LabelledText("Gross", tuple(gross_texts(diagnosis.gross, diagnosis.after, fall.unit))),
         LabelledText("Sure", tuple(_sure(diagnosis))),
         LabelledText("Or else", tuple(_or_else(diagnosis))),
