@@ -15,11 +15,11 @@ from compd.comparison import (
     Comparison,
     FitResult,
     compare,
-    determined,
     fit,
     initial_effect,
     search_constants,
 )
+from compd.determined_fit import determined
 from compd.diagnosis import Criteria, library_pool, with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effects import Effect, FittedEffect, Observations, counted_from, recounted

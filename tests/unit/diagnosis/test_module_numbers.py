@@ -48,12 +48,6 @@ NUMBERS = {
     "comparison/nuisance.py": {"MIN_SHARE": CONDITIONING, "SCATTER_ROUNDS": ITERATION},
     "comparison/row_faults.py": {"_AGREE_SHARE": WORDS},
     "comparison/shape_search.py": {"FINE": ITERATION},
-    "comparison/undetermined_numbers.py": {
-        "_SHARE": WORDS,
-        "_RANK_CUT": CONDITIONING,
-        "_EVEN": DEFINITION,
-        "_MAX_NAMED": WORDS,
-    },
     "statistics/last_digit.py": {"PER_STEP": DEFINITION, "STEPS_UM": DEFINITION},
     "statistics/least_squares.py": {
         "RANK_CUT": CONDITIONING,

@@ -9,9 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.effect_fit import FitResult
-from compd.comparison.nuisance import nuisance_beside
+from compd.comparison import AlignedRecording, FitResult, nuisance_beside
 from compd.errors import CompdError, Problem
 from compd.statistics import column_norms
 from compd.text import join_words
