@@ -192,6 +192,7 @@ def _sure(diagnosis: Diagnosis) -> list[str]:
     session = [f"{join_words(names)} seen in one session only: measure on another day"] if names else []
     p_values = [step.p_value for step in steps] or ([] if finding is None else [finding.p_value])
     chance = [clause for clause in (chance_clause(p_values),) if clause]
+    implausible += [f"{step.effect.id}: {remark}" for step in steps for remark in step.effect.remarks]
     doubtful = chance if max(p_values, default=0.0) > DOUBTFUL else []
     others = [text for text in numbers if text not in implausible]
     return [*implausible, *doubtful, *session, *others, *(chance if not doubtful else [])]
