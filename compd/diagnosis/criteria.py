@@ -126,6 +126,12 @@ class Criteria:
         reason="a choice: ranges are from handbooks, and round, and an effect of nearly the right form misses its "
         "number by as much",
     )
+    bounded_price: float = threshold(
+        0.06,
+        unit=_LOG,
+        meaning="parameters outside their ranges are plausible where others within leave so little more",
+        reason="half an effect's price: parameters that nearly cancel are known only in their sum",
+    )
     p_value: float = threshold(
         0.05,
         unit="probability",

@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.diagnosis.candidates.candidates import Candidate
-from compd.diagnosis.candidates.plausibility import is_plausible, is_undetermined
+from compd.diagnosis.candidates.plausibility import is_plausible, is_undetermined, with_slack
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.search.regression import NormalEquations, RegressionData, Regressors, normal_equations
 
@@ -161,8 +161,10 @@ class SubsetLosses:
     def is_plausible(self, members: Sequence[int]) -> bool:
         """Whether every parameter of every effect is plausible, and at least one of each is determined.
 
-        A cause may be weaker than is usual: plausible ranges reach to nought.
+        A cause may be weaker than is usual: plausible ranges reach to nought. Parameters that nearly cancel may be far
+        outside together; they are plausible where parameters within the ranges leave little more.
         """
+        within = True
         for k, (theta, covariance) in zip(members, self.estimates(members), strict=True):
             candidate = self.candidates[k]
             if candidate.kind not in ("effect", "proxy", "change"):
@@ -171,11 +173,23 @@ class SubsetLosses:
             allowed = candidate.allowed(self.criteria.rough_factor)
             for (low, high), value, error in zip(allowed, theta, std, strict=True):
                 limits = (min(low, 0.0), max(high, 0.0))
-                if not is_plausible(limits, float(value), float(error), self.criteria):
-                    return False
+                within &= is_plausible(limits, float(value), float(error), self.criteria)
             if is_undetermined(candidate.limits, std):
                 return False
-        return True
+        return within or self._fits_within(members)
+
+    def _fits_within(self, members: Sequence[int]) -> bool:
+        """Whether parameters within the ranges of several effects leave hardly more than those without limits."""
+        if len(members) < 2:
+            return False
+        index = self.index(members)
+        nothing_known = np.tile([-np.inf, np.inf], (len(self._nuisance_index), 1))
+        limits = [self.candidates[k].allowed(self.criteria.rough_factor) for k in members]
+        bounded = self.equations.bounded_loss(
+            index, np.concatenate([nothing_known, *(with_slack(limit, self.criteria) for limit in limits)])
+        )
+        _, _, left = self.equations.estimate(index)
+        return self.log_loss(bounded) - self.log_loss(left) <= self.criteria.bounded_price
 
     def gain(self, members: Sequence[int], without: Sequence[int]) -> tuple[float, float]:
         """How much less a set leaves than another on rows left out, and the standard error of that; per value.
