@@ -336,7 +336,7 @@ class Comparison:
             "rows_excluded": excluded,
             "excluded_by_reason": {**self.left_out, **self._outlier_count()},
             "outlier_rows": self.outlier_rows,
-            "data_faults": [fault.text for fault in self.faults],
+            **({"data_faults": [fault.text for fault in self.faults]} if self.faults else {}),
             "contributions": {source: part._asdict() for source, part in self.contributions.items()},
             "prediction_std_um": {
                 "total": rms(self.uncertainty.total_um[self.used][:, self.aligned.lengths]),
