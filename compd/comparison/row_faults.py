@@ -28,18 +28,24 @@ def outlier_faults(
     away_um = residual_um - np.median(residual_um[used], axis=0)
     left = outlier.copy()
     in_visit = np.zeros(len(row), dtype=np.int64) - 1 if visit is None else visit
-    for number in np.unique(in_visit[outlier & (in_visit >= 0)]):
-        rows = np.flatnonzero(outlier & (in_visit == number))
-        if len(rows) < 2 or used[in_visit == number].any():
+    lone: list[int] = []
+    for number in np.unique(in_visit[outlier & (in_visit >= 0)]).tolist():
+        rows = outlier & (in_visit == number)
+        if rows.sum() < 2 or used[in_visit == number].any():
             continue
-        size_um = np.abs(away_um[rows]).max()
-        if np.ptp(away_um[rows], axis=0).max() <= _AGREE_SHARE * size_um:
-            what = (
-                f"all {len(rows)} repeats of visit {number} agree and lie {format_error(size_um, unit)} from all else: "
-                "another point, or another moment, was measured"
-            )
-            faults.append(_left_out("a visit that lies far from all else", row[rows], what))
-            left[rows] = False
+        if np.ptp(away_um[rows], axis=0).max() <= _AGREE_SHARE * np.abs(away_um[rows]).max():
+            lone.append(number)
+    if lone:
+        rows = outlier & np.isin(in_visit, lone)
+        size = format_error(float(np.abs(away_um[rows]).max()), unit)
+        what = (
+            f"the {rows.sum()} repeats of visit {lone[0]} agree and lie {size} from all else"
+            if len(lone) == 1
+            else f"{len(lone)} visits, of which the repeats agree, lie up to {size} from all else"
+        )
+        what += ": another point, or another moment, was measured"
+        faults.append(_left_out("visits that lie far from all else", row[rows], what))
+        left &= ~rows
     beside = left & np.isin(in_visit, in_visit[used & (in_visit >= 0)])
     if beside.any():
         size_um = max(

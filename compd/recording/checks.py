@@ -10,8 +10,8 @@ A recording that breaks a rule is refused:
 - `approach_<i>` is 1 or -1, or empty where it is not known.
 - At least two rows have all that is needed: the gauges, and a value of the reference.
 
-A value beyond a limit is used all the same, with a warning: its unit is probably not the one that the column's name
-ends in.
+A value beyond a limit gets a warning, and counts all the same: its unit is probably not the one that the column's
+name ends in. What no machine can have made is found by `reference_faults` and `quantity_faults`.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ def check_time(table: Table, problems: ProblemList) -> None:
 
 
 def _check_limits(table: Table, problems: ProblemList) -> None:
-    """Warn of values that are implausible for their unit; they are used nevertheless."""
+    """Warn of values that are implausible for their unit."""
     for name, values in table.columns.items():
         if (limit := limit_of(name)) is None:
             continue
@@ -213,7 +213,7 @@ def _check_limits(table: Table, problems: ProblemList) -> None:
             problems,
             "implausible for its unit",
             f"{limit.low:g} to {limit.high:g}: {limit.why}",
-            "look; it is used as it stands",
+            "look",
             warn=True,
         )
 

@@ -204,10 +204,11 @@ def _unfollowed(pair: _Pair, use: BoolArray) -> tuple[BoolArray, int]:
     """(N,) rows that repeat the digits of the machine's own position while the reference goes from place to place;
     and the row that is repeated first."""
     standing, first = np.zeros(len(use), dtype=bool), -1
-    if not pair.aligned or len(pair.reference) == 1:
+    if len(pair.reference) == 1:
         return standing, first
-    _, scale = _missed(pair)
-    limit_mm = max(MIN_UNFOLLOWED_MM, MIN_SIGMAS * float(np.max(scale)))
+    limit_mm = MIN_UNFOLLOWED_MM
+    if pair.aligned:
+        limit_mm = max(limit_mm, MIN_SIGMAS * float(np.max(_missed(pair)[1])))
     for begin, end in _runs(pair.own_mm, use):
         if end - begin < MIN_RUN or end - begin > MAX_SHARE * len(use):
             continue

@@ -50,8 +50,16 @@ def test_a_visit_whose_repeats_agree_far_from_all_else_does_not_count(tmp_path: 
     changed["reference_z_mm"][30:33] += off_mm
     found = comparison(tmp_path, changed)
     (text,) = texts(found)
-    assert text.startswith("rows 32 to 34: all 3 repeats of visit 10 agree and lie ")
+    assert text.startswith("rows 32 to 34: the 3 repeats of visit 10 agree and lie ")
     assert np.flatnonzero(~found.used).tolist() == [30, 31, 32]
+
+
+def test_visits_are_told_together(tmp_path: Path) -> None:
+    changed = columns()
+    changed["reference_z_mm"][30:33] += 5.0
+    changed["reference_x_mm"][60:63] -= 2.0
+    (text,) = texts(comparison(tmp_path, changed))
+    assert text.startswith("rows 32 to 34 and 62 to 64: 2 visits, of which the repeats agree, lie up to ")
 
 
 def test_a_visit_under_a_load_that_no_other_has_is_to_be_explained(tmp_path: Path) -> None:

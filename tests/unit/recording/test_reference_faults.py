@@ -112,10 +112,12 @@ def test_the_first_point_may_be_the_zero() -> None:
     assert faults_of(columns) == []
 
 
-def test_a_position_that_is_not_recorded_any_more_is_told() -> None:
-    columns = columns_of()
-    for axis in "xyz":
-        columns[f"model_{axis}_mm"][30:50] = columns[f"model_{axis}_mm"][30]
+@pytest.mark.parametrize("machine", ["model", "scales"])
+def test_a_position_that_is_not_recorded_any_more_is_told(machine: str) -> None:
+    columns = columns_of(machine)
+    own = tuple(name for name in columns if not name.startswith("reference"))
+    for name in own:
+        columns[name][30:50] = columns[name][30]
     (fault,) = faults_of(columns)
-    assert fault.columns == ("model_x_mm", "model_y_mm", "model_z_mm")
+    assert fault.columns == own
     assert fault.rows == tuple(range(33, 52))
