@@ -12,9 +12,12 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.data_fault import DataFault
 from compd.statistics import last_digit_um, trimmed_scale
 from compd.text import join_words
+from compd.units import unit_of
 
-# What changes little from row to row: a jump there and back is none of theirs.
-_SLOW = re.compile(r"(?:temperature|pressure|humidity)_\w+")
+# What changes little from row to row, by its name or its unit: a jump there and back is none of theirs.
+_SLOW = re.compile(r"(?:temperature|pressure|humidity)_\w+|\w+_(?:degC|hPa)")
+# Loads may be put on for a single row.
+_LOADS = frozenset({"N", "mN", "kN", "kgf", "kg", "g", "Nm"})
 # Fewer known values say nothing of each other.
 MIN_VALUES = 12
 # Rows around, by whose median a value is judged; it holds against two wild ones in a row.
@@ -55,7 +58,7 @@ def quantity_faults(quantities: Mapping[str, FloatArray], row: IntArray) -> list
         if len(known) < MIN_VALUES or np.ptp(values[known]) == 0:
             continue
         slow = _SLOW.fullmatch(name) is not None
-        of_known, sure = _sentinels(values[known], slow)
+        of_known, sure = _sentinels(values[known], slow, unit_of(name) in _LOADS)
         if not of_known.any() and slow:
             of_known, sure = _jumps_back(values[known]), True
         if of_known.any():
@@ -79,7 +82,7 @@ def without_wild(name: str, values: FloatArray, row: IntArray, faults: list[Data
     return np.where(np.isin(row, rows), np.nan, values) if rows else values
 
 
-def _sentinels(values: FloatArray, slow: bool) -> tuple[BoolArray, bool]:
+def _sentinels(values: FloatArray, slow: bool, load: bool) -> tuple[BoolArray, bool]:
     """(K,) values that stand for no reading, and whether that is sure.
 
     The farthest value from the median, with all that have its digits; then the next.
@@ -101,7 +104,7 @@ def _sentinels(values: FloatArray, slow: bool) -> tuple[BoolArray, bool]:
         if gap <= (MIN_RANGES_SLOW if slow or special else MIN_RANGES) * (high - low):
             break
         wild |= new
-        sure = sure and (slow or special or new.sum() > 1)
+        sure = sure and (not load or special or new.sum() > 1)
     return wild, sure
 
 

@@ -54,6 +54,13 @@ def test_of_any_other_quantity_what_devices_write_for_no_reading_counts_as_empty
     assert (fault.rows, fault.consequence) == ((42,), "cells empty")
 
 
+def test_an_angle_far_from_all_others_counts_as_empty() -> None:
+    angle = np.random.default_rng(2).uniform(-80.0, 80.0, N)
+    angle[40] = 3600.0
+    (fault,) = faults_of(angle, "j2_deg")
+    assert (fault.rows, fault.consequence) == ((42,), "cells empty")
+
+
 def test_a_load_in_one_row_is_asked_about_and_used() -> None:
     force = np.random.default_rng(2).normal(0.0, 0.1, N)
     force[40] = 53.71
