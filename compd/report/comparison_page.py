@@ -186,7 +186,11 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
             f"Rms residual in cells of the workspace; white where nothing was measured.{of_sample}",
             plot_workspace_map(comparison),
         ),
-        Panel("Rows that do not count", "Kept in the file, not used for any number here.", _excluded(comparison)),
+        Panel(
+            "Rows that do not count",
+            "Kept in the file; what is not used counts for no number here.",
+            _excluded(comparison),
+        ),
     ]
     return [Panel(prefix + panel.title, panel.caption, panel.content) for panel in panels]
 

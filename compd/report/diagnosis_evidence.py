@@ -140,9 +140,9 @@ def constant_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable | None:
     return PageTable(("", "a constant in every row"), rows)
 
 
-def gross_rows_text(diagnosis: Diagnosis, fall: ErrorFall) -> str:
+def wrong_data(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     """What is wrong with the data; number and list of unexplained rows."""
-    return "; ".join(data_texts(diagnosis, fall.unit, GROSS_ROWS))
+    return data_texts(diagnosis, fall.unit, GROSS_ROWS)
 
 
 def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
