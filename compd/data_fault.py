@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from compd.text import join_words
@@ -36,6 +36,11 @@ class DataFault:
     columns: tuple[str, ...]
     what: str
     consequence: Consequence
+
+    def without(self, rows: Collection[int]) -> DataFault | None:
+        """The fault without some rows; None where no row is left."""
+        left = tuple(row for row in self.rows if row not in rows)
+        return replace(self, rows=left) if left else None
 
     @property
     def text(self) -> str:

@@ -204,6 +204,7 @@ class RecordingBuilder:
             *reference_faults(counted, row[counting], same_frame),
             *quantity_faults({name: counted[name] for name in covariates}, row[counting]),
         ]
+        faults = [left for fault in faults if (left := fault.without(sidecar.trusted)) is not None]
         if sidecar.reference is not None and sidecar.reference.radius_mm is not None:
             distance_mm = np.full(len(kept), sidecar.reference.radius_mm)
         return Recording(

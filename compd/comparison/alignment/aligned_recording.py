@@ -304,6 +304,7 @@ class AlignedRecording:
 
         distance : (N,) of each row from what is known, in robust standard deviations.  use : (N,) rows that count.
         """
+        use = use & ~np.isin(self.recording.row, list(self.recording.sidecar.trusted))
         return lone_distance(distance, use, self.recording.visit, self.conditions, self.criteria)
 
     @cached_property

@@ -165,3 +165,15 @@ def test_a_number_that_no_row_shows_is_as_uncertain_as_its_range_is_wide(tmp_pat
     assert (other.value, other.standard_error) == (0.0, pytest.approx(24 / 12**0.5))
     assert np.isfinite(changed.covariance).all()
     assert [remark.what for remark in changed.warnings] == ["b: no row shows this"]
+
+
+def test_rows_that_a_person_vouches_for_count(tmp_path: Path) -> None:
+    changed = columns()
+    for axis in "xyz":
+        changed[f"reference_{axis}_mm"][30:40] = changed[f"reference_{axis}_mm"][30]
+    path = write_external(tmp_path, changed, {"quantity": "tool_position", "frame": "machine", "sigma_um": 1.0})
+    with path.with_suffix(".yaml").open("a") as sidecar:
+        sidecar.write("trusted_rows:\n- {rows: 33-38, reason: it was so}\n")
+    aligned = open_recording(path)
+    assert aligned.recording.row[~aligned.usable.mask].tolist() == [39, 40, 41]
+    assert aligned.recording.faults[0].rows == (39, 40, 41)
