@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, rms
 from compd.comparison import (
     AlignedRecording,
     Comparison,
@@ -25,7 +25,14 @@ from compd.diagnosis.candidates.plausibility import estimate_parameters
 from compd.diagnosis.candidates.proxies import proxy_candidates
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
-from compd.diagnosis.findings import CandidateResult, ConstantFinding, DiagnosisStep, Rival, UntestedEffect
+from compd.diagnosis.findings import (
+    CandidateResult,
+    ConstantFinding,
+    DiagnosisStep,
+    Rival,
+    UnknownStates,
+    UntestedEffect,
+)
 from compd.diagnosis.implausible_effect import implausible_effect
 from compd.diagnosis.intercepts import beside, with_intercepts
 from compd.diagnosis.proposed_measurement import propose_measurement
@@ -36,6 +43,7 @@ from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
 from compd.diagnosis.search.rivals import find_rivals
 from compd.diagnosis.search.significance import Family, OrthogonalComplement, p_values
 from compd.diagnosis.search.subset_losses import SubsetLosses
+from compd.diagnosis.thermal_evidence import seen_once
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.diagnosis.words.summary import summary
@@ -159,7 +167,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     losses, aligned, criteria = explanation.losses, problem.aligned, problem.criteria
     before = compare(aligned, problem.comparison.fitted, covariance, outlier=problem.gross)
     before = replace(before, floor=problem.comparison.floor)
-    p_value_by_effect = _p_values(losses, explanation.members)
+    explanation, p_value_by_effect = _without_chance(explanation)
     after = before
     if explanation.named:
         links = aligned.rows.links
@@ -168,11 +176,11 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         result = fit(aligned, initial, problem.sigma_um, outlier=problem.gross)
         result = with_disturbances(result, aligned, problem.sigma_um, problem.pool.candidates, criteria)
         after = compare(aligned, result.fitted, result.covariance, outlier=problem.gross)
-        after = replace(after, floor=before.floor)
+        after = replace(after, floor=before.floor if _noise_grows(before, after) == 1.0 else after.floor)
     named = dict(zip(explanation.named, after.fitted[len(before.fitted) :], strict=True))
     steps = _steps(problem, explanation, named, p_value_by_effect)
     candidates = candidate_results(problem, losses, steps, p_value_by_effect)
-    verdict = _verdict(problem, explanation, steps, candidates)
+    verdict = _verdict(problem, explanation, steps, candidates, _noise_grows(before, after))
     above = verdict in ("partial", "unexplained", "not_testable")
     asked = implausible_effect(problem, explanation) if above else None
     depends_on = describe_remainder(problem, explanation) if above else ()
@@ -190,6 +198,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         gross=gross_rows(problem.gross, aligned.recording.row, criteria.gross),
         untested=_untested(problem, explanation, steps),
         asked=asked,
+        start=_states(problem, explanation),
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
         criteria=criteria,
@@ -201,23 +210,46 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     )
 
 
+def _noise_grows(before: Comparison, after: Comparison) -> float:
+    """By how much the variance of the noise grows with the effects that were found: a thermometer's noise is noise."""
+    if not (before.floor.known and after.floor.known) or before.floor.source != after.floor.source:
+        return 1.0
+    quantities_um = rms(after.uncertainty.quantities_um[after.used][:, after.aligned.lengths])
+    return 1.0 + (quantities_um / before.floor.um) ** 2
+
+
+def _states(problem: DiagnosisProblem, explanation: Explanation) -> UnknownStates | None:
+    if (start := explanation.start) is None:
+        return None
+    before_um, after_um = (problem.unit_um * float(np.sqrt(loss)) for loss in (start.before, start.after))
+    return UnknownStates(start.lag.effect.id, problem.states, before_um, after_um)
+
+
 def _verdict(
     problem: DiagnosisProblem,
     explanation: Explanation,
     steps: Sequence[DiagnosisStep],
     candidates: Sequence[CandidateResult],
+    grown: float,
 ) -> Verdict:
     """At the floor nothing, one or several effects are missing; above it, or where it is not known, the rest remains.
 
     Beside effects that are named the unnamed ones may leave what their standard errors allow for. Where the noise is
     not known, whether something is missing can be told only by finding it.
+
+    grown : by how much the variance of the noise grows by that of the quantities from which effects are computed.
     """
     found = bool(explanation.described)
     unnamed = problem.criteria.disturbance**2 if steps else 0.0
-    if not found and problem.may_be_noise(explanation.reduced_chi_squared - unnamed):
+    if not found and problem.may_be_noise(explanation.reduced_chi_squared / grown - unnamed):
         if not steps:
             return "adequate"
-        return "ambiguous" if any(step.rivals for step in steps) else "identified"
+        if any(step.rivals for step in steps):
+            return "ambiguous"
+        effects = [step.effect for step in steps]
+        return (
+            "likely" if seen_once(problem.aligned, problem.comparison.used, effects, problem.criteria) else "identified"
+        )
     if steps:
         return "partial"
     if not found and (not problem.floor_known or all(c.status == "not_testable" for c in candidates)):
@@ -265,6 +297,18 @@ def _rivals(explanation: Explanation, member: int) -> tuple[Rival, ...]:
         others = find_rivals(explanation.losses, explanation.named, member)
         rivals += tuple(rival for rival in others if rival.name not in known)
     return rivals
+
+
+def _without_chance(explanation: Explanation) -> tuple[Explanation, dict[str, float]]:
+    """The explanation without the effects that noise alone does as well as, and the p-value of each effect."""
+    losses = explanation.losses
+    while True:
+        p_values = _p_values(losses, explanation.members)
+        weak = [k for k in explanation.effects if p_values[losses.name(k)] > losses.criteria.p_value]
+        if not weak:
+            return explanation, p_values
+        weakest = max(weak, key=lambda k: p_values[losses.name(k)])
+        explanation = replace(explanation, members=tuple(k for k in explanation.members if k != weakest))
 
 
 def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float]:

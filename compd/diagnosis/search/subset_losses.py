@@ -176,7 +176,20 @@ class SubsetLosses:
                 within &= is_plausible(limits, float(value), float(error), self.criteria)
             if is_undetermined(candidate.limits, std):
                 return False
-        return within or self._fits_within(members)
+        return (within or self._fits_within(members)) and not self._has_twins(members)
+
+    def _has_twins(self, members: Sequence[int]) -> bool:
+        """Whether two effects do the same with opposite signs and nearly cancel: they are one cause, or none."""
+        kinds = [self.candidates[k].kind for k in members]
+        if kinds.count("effect") < 2:
+            return False
+        ordered = sorted(members, key=lambda k: self.candidates[k].kind == "effect")
+        effects = [k for k in ordered if self.candidates[k].kind == "effect"]
+        products = self.equations.products_beside(self.index(ordered), [len(self._indices[k]) for k in effects])
+        size = np.sqrt(np.maximum(np.diag(products), 1e-300))
+        together = size**2 + (size**2)[:, None] + 2 * products
+        opposite = products < -self.criteria.twin_cosine * np.outer(size, size)
+        return bool((opposite & (together < self.criteria.twin_share * np.minimum.outer(size, size) ** 2)).any())
 
     def _fits_within(self, members: Sequence[int]) -> bool:
         """Whether parameters within the ranges of several effects leave hardly more than those without limits."""
@@ -198,12 +211,36 @@ class SubsetLosses:
 
             std = sqrt(B / (B - 1) sum_b (d_b - mean d)^2),  d_b = sum of the differences in block b
         """
-        testable: BoolArray = np.asarray(self._testable[[*members, *without]].all(axis=0))
-        difference = self._row_losses(without, testable) - self._row_losses(members, testable)
-        by_block = np.bincount(self.data.block, difference)
+        more, less = self._block_losses(members, without)
+        by_block = less - more
         count = len(by_block)
         spread = float(np.sqrt(count / max(count - 1, 1) * ((by_block - by_block.mean()) ** 2).sum()))
         return float(by_block.sum()) / self.data.value_count, spread / self.data.value_count
+
+    def is_sure(self, members: Sequence[int], without: Sequence[int]) -> bool:
+        """Whether a set leaves less than another by more than may be chance: in squares, or as a share in most blocks.
+
+        Where one block holds most of the squares, as the start of a warm-up does, squares say nothing of the others.
+        The share of block b is log(L_b' / L_b) of its losses, neither below the floor, with the standard error of its
+        mean over the blocks.
+        """
+        gain, std = self.gain(members, without)
+        if gain >= self.criteria.least_sigmas * std:
+            return True
+        more, less = self._block_losses(members, without)
+        least = self._least_loss * np.bincount(self.data.block) * self.data.y.shape[1]
+        share = np.log(np.maximum(less, least) / np.maximum(more, least))
+        std = float(share.std(ddof=1)) / np.sqrt(len(share)) if len(share) > 1 else np.inf
+        return gain > 0 and float(share.mean()) >= self.criteria.least_sigmas * std
+
+    def _block_losses(self, members: Sequence[int], without: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+        """(B,) sums of squares that two sets leave in each block of rows, in the splits that test both."""
+        testable: BoolArray = np.asarray(self._testable[[*members, *without]].all(axis=0))
+        block = self.data.block
+        of_set = [
+            np.bincount(block, self._row_losses(each, testable)).astype(np.float64) for each in (members, without)
+        ]
+        return of_set[0], of_set[1]
 
     def nuisance_with(self, members: Iterable[int]) -> Regressors:
         """The nuisance columns and those of some candidates."""

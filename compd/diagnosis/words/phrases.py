@@ -16,6 +16,7 @@ from compd.diagnosis.findings import (
     ImplausibleEffect,
     UntestedEffect,
 )
+from compd.diagnosis.thermal_evidence import seen_once
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effects import Effect
 from compd.model.formula import FormulaDeclaration
@@ -36,6 +37,11 @@ MAX_RIVALS = 3
 MAX_ROWS = 4
 
 IMPLAUSIBLE = "IMPLAUSIBLE"
+NOT_DETERMINED = "NOT DETERMINED"
+# An effect that does so many times more than the error was is taken back by others.
+CANCELLING = 10.0
+# Numbers that a sentence of doubt names.
+MAX_DOUBTS = 2
 
 
 def physics_clause(effect: Effect) -> str:
@@ -67,13 +73,52 @@ def parameter_texts(step: DiagnosisStep, links: int) -> dict[str, str]:
             text = estimates_text(numbers, std, values[0].unit)
         else:
             text = estimates_text([min(numbers), max(numbers)], std, values[0].unit, " to ")
+        usual = f"{parameter.low:g} to {parameter.high:g} is usual"
         if not all(value.plausible for value in values):
-            text += f", {IMPLAUSIBLE}: {parameter.low:g} to {parameter.high:g} is usual"
+            text += f", {IMPLAUSIBLE}: {usual}"
+        elif not all(value.determined for value in values):
+            text += f", {NOT_DETERMINED} by these rows: {usual}"
+        elif any(value.outside for value in values):
+            text += f", outside: {usual}"
         texts[name] = text
     units = {constant.name: constant.unit for constant in step.effect.constants}
     for name, value in step.fitted.constants.items():
         texts[name] = f"{number_text(value, units.get(name, ''), 3)}, searched"
     return texts
+
+
+def doubts(diagnosis: Diagnosis) -> list[str]:
+    """What speaks against the numbers of the effects that were found: outside their ranges, or not determined."""
+    outside, undetermined = [], []
+    for step in diagnosis.steps:
+        for number in step.parameters:
+            name = number.name if number.name == step.effect.id else f"{number.name} of {step.effect.id}"
+            if not number.determined:
+                undetermined.append(name)
+            elif number.outside:
+                value = estimate_text(number.value, number.std, number.unit)
+                outside.append(f"{name} is {value}, and {number.low:g} to {number.high:g} is usual")
+    clauses = [_some(outside, "; ")] if outside else []
+    clauses += [text for text in (_cancelling_text(diagnosis),) if text]
+    return [*clauses, *([f"these rows do not determine {_some(undetermined, ', ')}"] if undetermined else [])]
+
+
+def _cancelling_text(diagnosis: Diagnosis) -> str:
+    """Which effects do many times more than the whole error was, so that others or the constant take it back."""
+    before, after = diagnosis.before, diagnosis.after
+    sizes = {step.effect.id: after.contributions[step.effect.id].share_rms_um for step in diagnosis.steps}
+    large = [name for name, size in sizes.items() if size > CANCELLING * before.rms_um]
+    if not large:
+        return ""
+    unit = before.aligned.unit
+    moved = join_words([f"{name} ({number_text(sizes[name], unit)})" for name in large])
+    takes = "others or the constant take" if len(large) == 1 else "they, others or the constant take"
+    return f"of what {moved} would do, {takes} back all but {number_text(before.rms_um, unit)}: the numbers go together"
+
+
+def _some(texts: Sequence[str], between: str) -> str:
+    more = f" and {len(texts) - MAX_DOUBTS} more" if len(texts) > MAX_DOUBTS else ""
+    return between.join(texts[:MAX_DOUBTS]) + more
 
 
 def chance_clause(p_values: Sequence[float]) -> str:
@@ -189,7 +234,10 @@ def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: 
     if not gross.runs:
         return [f"{count}: {rows}"]
     runs = join_words([f"{first} to {last}" for first, last in gross.runs])
-    texts = [count, f"look at what happened in rows {runs} (a bump, a slipped target, a lost step)"]
+    share = float(np.nansum(size[[row in in_runs for row in recording.row[np.isin(recording.row, gross.rows)]]] ** 2))
+    share /= max(float(np.nansum(comparison.residual_um**2)), 1e-300)
+    held = f", which hold {percent_text(share)} of the squared error" if np.isfinite(share) else ""
+    texts = [count, f"look at what happened in rows {runs}{held} (a bump, a slipped target, a lost step)"]
     return [*texts, f"single bad readings: {rows}"] if single else texts
 
 
@@ -247,15 +295,11 @@ def thermal_in_one_session(diagnosis: Diagnosis) -> list[str]:
 
     All that warms up in a session rises together, and with time: one session alone proves no thermal cause.
     """
+    finding = best_description(diagnosis)
+    if diagnosis.steps or finding is None:
+        effects = [step.effect for step in diagnosis.steps]
+        return seen_once(diagnosis.after.aligned, diagnosis.after.used, effects, diagnosis.criteria)
     session = diagnosis.after.aligned.recording.session
     if session is not None and len(np.unique(session[diagnosis.after.used & (session >= 0)])) > 1:
         return []
-    finding = best_description(diagnosis)
-    if diagnosis.steps or finding is None:
-        return [step.effect.id for step in diagnosis.steps if _is_thermal(step.effect)]
     return [name for name in (finding.covariate, *finding.beside) if name.startswith(("temperature", "time"))]
-
-
-def _is_thermal(effect: Effect) -> bool:
-    """Whether a temperature, or time as its stand-in, drives the effect."""
-    return any(need.startswith("temperature") for need in effect.needs) or effect.needs == ("time",)

@@ -10,6 +10,7 @@ from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import error_fall
 from compd.diagnosis.words.phrases import (
     change_text,
+    doubts,
     followed_text,
     question_text,
     rivals_text,
@@ -18,11 +19,19 @@ from compd.diagnosis.words.phrases import (
 )
 from compd.text import join_words, number_text
 
+# What confirms a thermal cause.
+CONFIRM = "measure on another day, or let it cool down and warm up again"
 CANNOT_KNOW = "how much of it is noise cannot be known"
 
 
 def summary(diagnosis: Diagnosis) -> str:
-    """The verdict in one or two sentences, which claim no more than it does."""
+    """The verdict in a few sentences, which claim no more than it does."""
+    against = doubts(diagnosis)
+    return f"{_verdict(diagnosis)} But {'; '.join(against)}." if against else _verdict(diagnosis)
+
+
+def _verdict(diagnosis: Diagnosis) -> str:
+    """The verdict in one or two sentences."""
     fall = error_fall(diagnosis)
     before, after = number_text(fall.before, fall.unit), number_text(fall.after, fall.unit)
     noise = f"where {fall.noise_text}" if fall.noise_known else CANNOT_KNOW
@@ -35,12 +44,16 @@ def summary(diagnosis: Diagnosis) -> str:
         case "identified":
             them = "it" if len(diagnosis.steps) == 1 else "them"
             return f"What is missing is {names}: with {them} the error of {before} falls to {after}, {noise}."
+        case "likely":
+            them, be = ("it", "is") if len(diagnosis.steps) == 1 else ("them", "are")
+            falls = f"{names} {be} likely what is missing: with {them} the error of {before} falls to {after}, {noise}."
+            return f"{falls} One warm-up proves no cause: {CONFIRM}."
         case "ambiguous":
             pairs = "; ".join(rivals_text(step) for step in diagnosis.steps if step.rivals)
             falls = f"With {names} the error of {before} falls to {after}, {noise}."
             return f"{falls} But these rows cannot tell apart: {pairs}."
         case "adequate" | "not_testable":
-            tried = "that was tried lowers it" if was_any_tried(diagnosis) else "can be tested on this recording"
+            tried = "that was tried surely lowers it" if was_any_tried(diagnosis) else "can be tested on this recording"
             return " ".join([f"The error is {before}, {noise}. No effect {tried}.", *question(diagnosis)])
     if diagnosis.steps:
         verb = "explains" if len(diagnosis.steps) == 1 else "explain"

@@ -8,10 +8,12 @@ from compd.diagnosis.words.advice import advice
 from compd.diagnosis.words.error_fall import ErrorFall, error_fall
 from compd.diagnosis.words.phrases import (
     IMPLAUSIBLE,
+    NOT_DETERMINED,
     best_description,
     chance_clause,
     change_text,
     constant_text,
+    doubts,
     fault_texts,
     followed_text,
     gross_texts,
@@ -24,7 +26,7 @@ from compd.diagnosis.words.phrases import (
     untested_here,
     was_any_tried,
 )
-from compd.diagnosis.words.summary import CANNOT_KNOW, question
+from compd.diagnosis.words.summary import CANNOT_KNOW, CONFIRM, question
 from compd.text import LabelledText, fall_text, fit_lines, join_words, number_text, percent_text
 
 # What a terminal shows without scrolling, and its usual width.
@@ -55,6 +57,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         LabelledText("Asked", tuple(question(diagnosis))),
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
         LabelledText("Follows", tuple(_follows(diagnosis, fall))),
+        LabelledText("Start", tuple(_start(diagnosis, fall))),
         LabelledText("Left", tuple(_left(diagnosis, fall))),
         LabelledText("Gross", tuple(gross_texts(diagnosis.gross, diagnosis.after, fall.unit))),
         LabelledText("Sure", tuple(_sure(diagnosis))),
@@ -85,6 +88,8 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
             )
         case "identified":
             text = f"What is missing is {{}}: {fall.text(fall.after)}"
+        case "likely":
+            text = f"{{}} {be} missing, seen in one warm-up only: {fall.text(fall.after)}"
         case "ambiguous":
             ids = [
                 join_words([step.effect.id, *(rival.name for rival in step.rivals)], "or") for step in diagnosis.steps
@@ -92,11 +97,13 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
             count += " or rivals" if len(ids) > 1 else " or a rival"
             text = f"{{}} {be} missing; these rows cannot tell"
         case "adequate" | "not_testable" if was_any_tried(diagnosis):
-            text = "no effect that was tried lowers the error; the noise is not known"
+            text = "no effect that was tried surely lowers the error; the noise is not known"
         case "not_testable":
             text = "no effect can be tested; nothing that drives one was varied"
         case _:
             text = _above_the_noise(diagnosis, fall)
+    if doubts(diagnosis):
+        text = f"{text.partition(';')[0]}; see what speaks against its numbers"
     texts = [text.format(join_words(ids)), text.format(count)]
     if (asked := diagnosis.asked) is not None:
         takes = f"would take {percent_text(fall.share_of(asked.heldout_rms_um))}, with an implausible number"
@@ -157,6 +164,14 @@ def _explains(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     return [f"{fall.share_text(fall.after)}: {fall.text(fall.after)}{rows}"] if diagnosis.steps else []
 
 
+def _start(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    """What is fitted along of a lag that was out of equilibrium when sessions began."""
+    if (start := diagnosis.start) is None:
+        return []
+    errors = fall_text([start.before_um, start.after_um], fall.unit)
+    return [f"{start.effect} was not in equilibrium at first: {start.numbers} numbers more ({errors}), no cause"]
+
+
 def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     """The error that is left beside the noise, and what the difference means."""
     described = next(iter(diagnosis.depends_on), None) if not diagnosis.steps else None
@@ -167,7 +182,7 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     if not fall.noise_known:
         return [f"{text}; {CANNOT_KNOW}", *remarks]
     at_floor = left**2 <= diagnosis.criteria.most_at_floor * fall.noise**2
-    if diagnosis.verdict in ("adequate", "identified", "ambiguous") or at_floor:
+    if diagnosis.verdict in ("adequate", "identified", "likely", "ambiguous") or at_floor:
         meaning = "only noise is left"
     elif diagnosis.steps and is_best_a_change(diagnosis):
         meaning = "some of it goes with the change"
@@ -187,9 +202,9 @@ def _sure(diagnosis: Diagnosis) -> list[str]:
         for step in steps
         for name, text in parameter_texts(step, links).items()
     ]
-    implausible = [text for text in numbers if IMPLAUSIBLE in text]
+    implausible = [text for text in numbers if any(word in text for word in (IMPLAUSIBLE, NOT_DETERMINED, "outside:"))]
     names = thermal_in_one_session(diagnosis)
-    session = [f"{join_words(names)} seen in one session only: measure on another day"] if names else []
+    session = [f"{join_words(names)} seen in one warm-up only: {CONFIRM}"] if names else []
     p_values = [step.p_value for step in steps] or ([] if finding is None else [finding.p_value])
     chance = [clause for clause in (chance_clause(p_values),) if clause]
     implausible += [f"{step.effect.id}: {remark}" for step in steps for remark in step.effect.remarks]
