@@ -130,10 +130,11 @@ def _by_quantities_mm(aligned: AlignedRecording, fitted: Sequence[FittedEffect])
     for effect in fitted if stated else ():
         with_noise, _ = evaluate_basis(effect.effect, drawn, effect.constants, None)
         without, _ = evaluate_basis(effect.effect, rows, effect.constants, None)
-        added: FloatArray = (with_noise - without) @ effect.theta
-        moved_mm += aligned.propagated(effect.effect, added[..., None])[..., 0]
+        added: FloatArray = np.einsum("rsp,p->rs", with_noise - without, effect.theta)
+        changes: FloatArray = aligned.propagated(effect.effect, added[:, :, np.newaxis])
+        moved_mm = moved_mm + changes[:, :, 0]
     known = moved_mm[np.isfinite(moved_mm).all(axis=1)]
-    return np.sqrt(np.mean(known**2, axis=0)) if len(known) else np.zeros(moved_mm.shape[1])
+    return np.asarray(np.sqrt(np.mean(known**2, axis=0)) if len(known) else np.zeros(len(aligned.labels)))
 
 
 def monte_carlo(
