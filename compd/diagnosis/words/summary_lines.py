@@ -108,6 +108,8 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
     if (asked := diagnosis.asked) is not None:
         takes = f"would take {percent_text(fall.share_of(asked.heldout_rms_um))}, with an implausible number"
         texts = [f"{asked.effect} {takes}", f"an effect {takes}"]
+    if wrong := [fault for fault in diagnosis.after.faults if fault.consequence == "mend the column"]:
+        texts = [wrong[0].what.partition(":")[0], "columns of the recording seem wrong"]
     headings = [f"{diagnosis.verdict}: {text}" for text in texts]
     return headings[len(headings[0]) > WIDTH]
 

@@ -100,6 +100,18 @@ def test_wrong_data_are_named_and_the_verdict_stays(
     assert not any(line.startswith("Gross:") for line in lines)
 
 
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(-1.0, "the sign of reference_y_mm seems reversed"), (1000.0, "reference_y_mm seems to be in um")],
+)
+def test_a_column_that_seems_wrong_is_in_the_headline(tmp_path: Path, factor: float, words: str) -> None:
+    changed = columns()
+    changed["reference_y_mm"] *= factor
+    lines = summary_lines(diagnosed(tmp_path, changed))
+    assert words in lines[0]
+    assert any(line.startswith("Next:    mend the column first") for line in lines)
+
+
 def test_the_origin_of_time_changes_nothing(tmp_path: Path) -> None:
     def drifting(origin_s: float) -> Diagnosis:
         made = columns()
