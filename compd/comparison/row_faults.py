@@ -87,13 +87,14 @@ def disagreeing_visits(
     begins = np.flatnonzero(np.diff(visit[rows], prepend=-1))
     spread_um = np.maximum.reduceat(residual_um[rows], begins) - np.minimum.reduceat(residual_um[rows], begins)
     wide = np.flatnonzero((spread_um > min_sigmas * np.sqrt(2.0) * noise_um).any(axis=1))
-    if not 0 < len(wide) <= max(1, max_share * len(begins)):
-        return []
     counts = np.diff(np.append(begins, len(rows)))
+    repeated = counts > 1
+    if not 0 < len(wide) <= max(1, max_share * repeated.sum()):
+        return []
     faults = []
     for v in wide:
         of_visit = rows[begins[v] : begins[v] + counts[v]]
-        usual_um = float(np.median(spread_um.max(axis=1)))
+        usual_um = float(np.median(spread_um[repeated].max(axis=1)))
         what = (
             f"the repeats of visit {visit[of_visit[0]]} differ by {format_error(spread_um[v].max(), unit)}, those of "
             f"others by {format_error(usual_um, unit)}"

@@ -4,7 +4,7 @@ hangs."""
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -71,6 +71,24 @@ def quantity_faults(quantities: Mapping[str, FloatArray], row: IntArray) -> list
         elif slow and (hanging := _hanging(values[known])).any():
             value = f"{values[known][hanging][0]:.10g}"
             what = f"is {value} all the time, where else it changes from row to row: does the gauge hang?"
+            rows = tuple(sorted(row[known[hanging]].tolist()))
+            faults.append(DataFault(f"{name} hangs", rows, (name,), what, "used"))
+    return faults
+
+
+def hanging_reference(columns: Mapping[str, FloatArray], row: IntArray, told: Sequence[DataFault]) -> list[DataFault]:
+    """Columns of the reference that hang while the machine may stand: asked about.
+
+    told : faults of the reference that were found already; their rows are not told twice.
+    """
+    rows_told = {r for fault in told for r in fault.rows}
+    faults: list[DataFault] = []
+    for name, values in columns.items():
+        known = np.flatnonzero(np.isfinite(values) & ~np.isin(row, list(rows_told)))
+        if not re.fullmatch(r"reference_(?:[xyz]|link_\d+|distance)_\w+", name) or len(known) < MIN_VALUES:
+            continue
+        if (hanging := _hanging(values[known])).any():
+            what = f"is {values[known][hanging][0]:.10g} all the time, where else it changes: does the instrument hang?"
             rows = tuple(sorted(row[known[hanging]].tolist()))
             faults.append(DataFault(f"{name} hangs", rows, (name,), what, "used"))
     return faults

@@ -37,7 +37,7 @@ from compd.recording.checks import (
     largest_joint_um,
 )
 from compd.recording.layout import Layout, machine_problems, read_layout
-from compd.recording.quantity_faults import quantity_faults, without_wild
+from compd.recording.quantity_faults import hanging_reference, quantity_faults, without_wild
 from compd.recording.quaternion import with_rotation_vectors
 from compd.recording.recording import Recording
 from compd.recording.reference_faults import reference_faults
@@ -200,8 +200,11 @@ class RecordingBuilder:
         same_frame = sidecar.reference is not None and sidecar.reference.frame == "machine"
         counting = ~excluded[kept]
         counted = {name: values[counting] for name, values in columns.items()}
+        of_reference = reference_faults(counted, row[counting], same_frame)
+        hanging = hanging_reference(counted, row[counting], of_reference)
         faults = [
-            *reference_faults(counted, row[counting], same_frame),
+            *of_reference,
+            *hanging,
             *quantity_faults({name: counted[name] for name in covariates}, row[counting]),
         ]
         faults = [left for fault in faults if (left := fault.without(sidecar.trusted)) is not None]

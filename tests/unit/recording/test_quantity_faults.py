@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compd.data_fault import DataFault
-from compd.recording.quantity_faults import quantity_faults, without_wild
+from compd.recording.quantity_faults import hanging_reference, quantity_faults, without_wild
 
 N = 120
 ROW = np.arange(N) + 2
@@ -91,3 +91,13 @@ def test_a_thermometer_that_hangs_is_asked_about() -> None:
     (fault,) = faults_of(values)
     assert fault.rows == tuple(range(22, 72))
     assert (fault.consequence, "does the gauge hang?" in fault.text) == ("used", True)
+
+
+def test_a_reference_that_hangs_while_the_machine_stands_is_asked_about() -> None:
+    height = np.round(np.linspace(0.0, 0.09, N) + np.random.default_rng(5).normal(0.0, 1e-3, N), 4)
+    assert hanging_reference({"reference_z_mm": height}, ROW, []) == []
+    height[30:70] = height[30]
+    (fault,) = hanging_reference({"reference_z_mm": height}, ROW, [])
+    assert fault.rows == tuple(range(32, 72))
+    assert "does the instrument hang?" in fault.text
+    assert hanging_reference({"reference_z_mm": height}, ROW, [fault]) == []
