@@ -10,7 +10,16 @@ from typing import TypeAlias
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison import AlignedRecording, Comparison, FitResult, compare, fit, initial_effect, search_constants
+from compd.comparison import (
+    AlignedRecording,
+    Comparison,
+    FitResult,
+    compare,
+    fit,
+    initial_effect,
+    search_constants,
+)
+from compd.determined_fit import determined
 from compd.diagnosis import Criteria, library_pool, with_disturbances
 from compd.errors import Problem, StateError
 from compd.model.effects import Effect, FittedEffect, Observations, counted_from, recounted
@@ -158,6 +167,7 @@ def _changed(
     others = library_pool(
         aligned, list(map(aligned.on_machine, load_library().values())), fitted_ids, criteria.candidates
     )
+    result, remarks = determined(aligned, result)
     result = with_disturbances(result, aligned, before.floor.by_axis_um, others.candidates, criteria)
     after = compare(aligned, result.fitted, result.covariance)
     step = ModelStep(
@@ -180,7 +190,7 @@ def _changed(
         geometry=aligned.geometry_hash,  # all numbers were fitted on it
         fitted_range=result.ranges,
         plausible={id_: ranges for id_, ranges in model.plausible.items() if id_ in fitted_ids},
-        warnings=(),
+        warnings=remarks,
     )
 
 

@@ -10,7 +10,7 @@ from compd.comparison import compare as compare_aligned
 from compd.diagnosis import Criteria, Diagnosis
 from compd.diagnosis import diagnose as diagnose_aligned
 from compd.model.effects import can_concern
-from compd.model.library import gather_effects, load_library
+from compd.model.library import beside_library, gather_effects
 from compd.parameter_ranges import check_ranges
 
 
@@ -112,9 +112,12 @@ def diagnose(
     aligned = opened_recording(recording)
     file = opened_model(model, aligned)
     given = gather_effects(effects)
-    rows = aligned.rows
-    library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
-    check_ranges(aligned.ranges, [*load_library().values(), *given.values()])
-    candidates = [aligned.on_machine(effect) for effect in (*library, *given.values())]
+    rows, every = aligned.rows, beside_library(given)
+    check_ranges(aligned.ranges, every)
+    candidates = [
+        aligned.on_machine(effect)
+        for effect in every
+        if effect.id in given or can_concern(effect, rows.available, rows.links)
+    ]
     progress = progress or (lambda status: None)
     return diagnose_aligned(aligned, file.fitted, file.covariance, candidates, progress, criteria)

@@ -13,11 +13,14 @@ from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, TextArray, rms
 from compd.comparison.alignment.aligned_recording import AlignedRecording
+from compd.comparison.column_faults import column_faults
 from compd.comparison.contributions import Contribution
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.noise_floor import NoiseFloor
 from compd.comparison.prediction_uncertainty import Uncertainty
 from compd.comparison.residual_trends import Trend
+from compd.comparison.row_faults import OUTLIER, disagreeing_visits, outlier_faults
+from compd.data_fault import DataFault
 from compd.display_unit import ATTITUDE_UNIT, format_error, residual_ending
 from compd.model import GaugeNoise
 from compd.model.effects import FittedEffect
@@ -28,9 +31,8 @@ from compd.text import nan_to_null
 if TYPE_CHECKING:
     import pandas as pd
 
-# Why a row does not count, beside the reasons of the recording itself.
+# Why a row does not count, beside the reasons of the recording itself, and OUTLIER.
 NO_QUANTITY = "a quantity that an effect needs is empty"
-OUTLIER = "beyond all noise"
 # Trends that a notebook shows.
 MAX_TRENDS = 4
 
@@ -146,6 +148,31 @@ class Comparison:
     def outlier_rows(self) -> list[int]:
         """These rows, as a spreadsheet shows them."""
         return [int(row) for row in self.aligned.recording.row[self.outlier]]
+
+    @cached_property
+    def faults(self) -> tuple[DataFault, ...]:
+        """What is wrong with the data, or looks so: each with its rows, and whether these count."""
+        recording, criteria = self.aligned.recording, self.criteria
+        residual_um, unit = self.residual_um[:, self.aligned.lengths], self.aligned.unit
+        faults = outlier_faults(recording.row, recording.visit, residual_um, self.outlier, self.used, unit)
+        if self.floor.source == "repeats":
+            noise_um = self.floor.by_axis_um[self.aligned.lengths]
+            faults += disagreeing_visits(
+                recording.row,
+                recording.visit,
+                residual_um,
+                self.used,
+                noise_um,
+                unit,
+                min_sigmas=criteria.disagreement_sigmas,
+                max_share=criteria.max_lone_share / 2,
+            )
+        return (*column_faults(self.aligned), *recording.faults, *faults)
+
+    @property
+    def named_faults(self) -> tuple[DataFault, ...]:
+        """Those of `faults` of which more is known than that the rows are beyond all noise."""
+        return tuple(fault for fault in self.faults if fault.reason != OUTLIER)
 
     @property
     def basis(self) -> str:
@@ -309,6 +336,7 @@ class Comparison:
             "rows_excluded": excluded,
             "excluded_by_reason": {**self.left_out, **self._outlier_count()},
             "outlier_rows": self.outlier_rows,
+            **({"data_faults": [fault.text for fault in self.faults]} if self.faults else {}),
             "contributions": {source: part._asdict() for source, part in self.contributions.items()},
             "prediction_std_um": {
                 "total": rms(self.uncertainty.total_um[self.used][:, self.aligned.lengths]),

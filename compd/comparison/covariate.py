@@ -42,7 +42,7 @@ class Covariate(NamedTuple):
 def covariates(aligned: AlignedRecording) -> list[Covariate]:
     """Time, the tip's place, every measured quantity, gradients of temperature, each link's length and direction."""
     recording, quantities = aligned.recording, aligned.rows.quantities
-    result = [Covariate("time", "h", recording.time_s / 3600.0)] if recording.has_time else []
+    result = [Covariate("time", "h", recording.elapsed_s / 3600.0)] if recording.has_time else []
     result += [
         Covariate(axis, place_unit(aligned.unit), in_place_unit(column, aligned.unit))
         for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True)

@@ -59,6 +59,63 @@ class ComparisonCriteria:
         "its visit lies within sqrt(2) times as many standard deviations of the repeats",
         reason="a normal error is as large once in two million: in no recording by chance",
     )
+    lone_ratio: float = threshold(
+        6.0,
+        unit="1",
+        meaning="a visit is an outlier as a whole, whatever its repeats say, where it lies so many times as far off as "
+        "the next, and nothing that was recorded is different there",
+        reason="a choice: of twenty visits under one cause the largest is seldom twice the next, and what is thirty "
+        "standard deviations off is worth a look in any case",
+    )
+    max_lone_share: float = threshold(
+        0.1,
+        unit="share of the visits",
+        meaning="more visits that lie far off together are something to be explained",
+        reason="a choice: one mistake in ten visits is a careless measurement, more is a cause",
+    )
+    outside_share: float = threshold(
+        0.1,
+        unit="share of the range of all other rows",
+        meaning="a visit with a place or a quantity so far beyond all others is not an outlier as a whole",
+        reason="a choice: what happens in a single visit under load, or in a corner, is to be explained",
+    )
+    slope_share: float = threshold(
+        0.05,
+        unit="share of the slope",
+        meaning="a column of the reference seems to be in another unit where its slope against the model differs from "
+        "that unit's by less",
+        reason="a choice: a model that is wrong by more is looked at for other reasons",
+    )
+    most_beside_slope: float = threshold(
+        0.1,
+        unit="share of a coordinate's median distance from its middle",
+        meaning="a coordinate that leaves more beside a line against the model has no slope",
+        reason="a choice: what a reversed sign or another unit leaves is the error of the machine",
+    )
+    min_slope_rows: int = threshold(
+        8,
+        unit="rows",
+        meaning="fewer rows have no slope",
+        reason="a choice: a line through fewer is chance",
+    )
+    min_slope_spread: float = threshold(
+        0.05,
+        unit="share of the largest singular value",
+        meaning="points nearer to a plane tell no mirror image",
+        reason="a choice: in a plane half a turn mirrors",
+    )
+    fewest_visits: int = threshold(
+        10,
+        unit="visits",
+        meaning="of fewer none is an outlier as a whole",
+        reason="a choice: with fewer, one may be the only one under a condition that nobody recorded",
+    )
+    disagreement_sigmas: float = threshold(
+        15.0,
+        unit="standard deviations of the difference of two repeats",
+        meaning="repeats of a visit that differ by more are told, where few visits do",
+        reason="a choice: the largest of a thousand normal differences is four, of a heavy-tailed one eight",
+    )
     fewest_pairs: int = threshold(
         8,
         unit="pairs of rows",

@@ -128,7 +128,8 @@ def fit(
         )
         if outlier is not None:
             break
-        found = outlier_rows(residual_um / sigma_um, usable, aligned.recording.visit, aligned.criteria)
+        visit, conditions = aligned.recording.visit, aligned.conditions
+        found = outlier_rows(residual_um / sigma_um, usable, visit, aligned.criteria, conditions)
         # a set of outliers that comes back would alternate for ever
         if (found == left_out).all() or found.tobytes() in earlier:
             break

@@ -125,7 +125,9 @@ def _without_nuisance(
     outlier = np.zeros(len(known), dtype=bool)
     for _ in range(NUISANCE_ROUNDS):
         along = fit_along(aligned, fitted, residual_um, known & ~outlier)
-        new_outlier = outlier_rows(residual_um - along.total_um, known, aligned.recording.visit, criteria)
+        new_outlier = outlier_rows(
+            residual_um - along.total_um, known, aligned.recording.visit, criteria, aligned.conditions
+        )
         if (new_outlier == outlier).all():
             break
         outlier = new_outlier

@@ -23,7 +23,7 @@ from .verdict import Diagnosis as Diagnosis
 from .words.error_fall import ErrorFall as ErrorFall
 from .words.error_fall import error_fall as error_fall
 from .words.phrases import change_text as change_text
-from .words.phrases import gross_texts as gross_texts
+from .words.phrases import data_texts as data_texts
 from .words.phrases import parameter_texts as parameter_texts
 from .words.phrases import short_name as short_name
 from .words.phrases import untested_here as untested_here

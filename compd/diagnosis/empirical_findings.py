@@ -58,6 +58,7 @@ class _Remainder:
         losses, named = explanation.losses, explanation.named
         self._data = replace(problem.data, nuisance=losses.nuisance_with(named))
         self._loss = losses.loss(named)
+        self._begin_s = problem.aligned.recording.begin_s
 
     def loss_with(self, fits: Sequence[EmpiricalFit]) -> float:
         """Cross-validated loss with some terms together."""
@@ -117,7 +118,7 @@ class _Remainder:
             formula_effects=(),
             parameters=(dict(zip(names, theta.tolist(), strict=True)),),
             effect=candidate.effect.id,
-            time_s=candidate.time_s if isinstance(candidate, ChangeCandidate) else float("nan"),
+            time_s=self._begin_s + candidate.time_s if isinstance(candidate, ChangeCandidate) else float("nan"),
             constants=tuple(
                 NonlinearConstant(covariate, name, value, units[name]) for name, value in candidate.constants.items()
             ),
@@ -163,7 +164,9 @@ class _Remainder:
                 for fit in fits
                 if fit.constant is not None
             ),
-            time_s=main_fit.constant if main.form == "step" and main_fit.constant is not None else math.nan,
+            time_s=self._begin_s + main_fit.constant
+            if main.form == "step" and main_fit.constant is not None
+            else math.nan,
         )
 
     def _losses(self, families: Sequence[Sequence[EmpiricalFit]]) -> FloatArray:

@@ -167,6 +167,7 @@ class Diagnosis:
             "final_rms_um": self.after.rms_um,
             "final_floor_ratio": self.after.floor_ratio,
             "outlier_rows": self.after.aligned.recording.row[self.after.outlier].tolist(),
+            **({"data_faults": [fault.text for fault in self.after.faults]} if self.after.faults else {}),
             "rows_used": int(self.after.used.sum()),
         }
         finite: dict[str, Any] = nan_to_null(data)

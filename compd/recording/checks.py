@@ -10,8 +10,8 @@ A recording that breaks a rule is refused:
 - `approach_<i>` is 1 or -1, or empty where it is not known.
 - At least two rows have all that is needed: the gauges, and a value of the reference.
 
-A value beyond a limit is used all the same, with a warning: its unit is probably not the one that the column's name
-ends in.
+A value beyond a limit gets a warning, and counts all the same: its unit is probably not the one that the column's
+name ends in. What no machine can have made is found by `reference_faults` and `quantity_faults`.
 """
 
 from __future__ import annotations
@@ -85,8 +85,6 @@ LIMITS: tuple[Limit, ...] = tuple(
 )
 # Least change (um) of a set of comparators: those of +-1 mm resolve 0.01 to 0.1 um, so that less is probably in mm.
 _MIN_JOINT_UM = 0.05
-# Distance (mm) of places that every reference instrument tells apart.
-_PLACE_MM = 0.1
 
 
 def limit_of(name: str) -> Limit | None:
@@ -118,7 +116,6 @@ def check_values(table: Table, problems: ProblemList) -> None:
         next_step = "give the whole distance, with the nominal length, and not its change"
         _report(table, DISTANCE_COLUMN, wrong, problems, "no distance", "more than 0", next_step)
     _check_limits(table, problems)
-    check_frozen_reference(table, problems)
 
 
 class RowCount:
@@ -202,64 +199,8 @@ def check_time(table: Table, problems: ProblemList) -> None:
         report(backwards, "time runs backwards", "rows are taken in the order of time", next_step, warn=True)
 
 
-def check_frozen_reference(table: Table, problems: ProblemList) -> None:
-    """Warn of rows in a row with the very same digits of the reference, while the machine is at different places.
-
-    What the machine's place is, the model's or the scales' columns say. A single axis may show the same digits at
-    different places; two or three, or the link itself, do not.
-    """
-    for reference, place in _reference_and_place(table.columns):
-        digits = np.column_stack([table.columns[name] for name in reference])
-        where_mm = np.column_stack([table.columns[name] for name in place])
-        same = np.concatenate([[False], (digits[1:] == digits[:-1]).all(axis=1), [False]])
-        begins, ends = np.flatnonzero(~same[:-1] & same[1:]), np.flatnonzero(same[:-1] & ~same[1:]) + 1
-        rows: list[int] = []
-        places = 0
-        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
-            number = _different_places(where_mm[begin:end])
-            if number > 1:
-                rows += table.row[begin:end].tolist()
-                places += number
-        if rows:
-            shown = f"rows {rows[0]} to {rows[-1]}" if rows[-1] - rows[0] == len(rows) - 1 else rows_text(rows)
-            problems.warn(
-                f"columns {', '.join(reference)}, {shown}",
-                f"the same digits at {places} different places: the instrument repeats itself",
-                ", ".join(f"{value:.10g}" for value in digits[np.flatnonzero(table.row == rows[0])[0]]),
-                "digits that differ where the machine has moved",
-                "look; exclude these rows in the sidecar",
-            )
-
-
-def _reference_and_place(columns: Iterable[str]) -> list[tuple[list[str], list[str]]]:
-    """Columns of a reference, and those of the machine's own position."""
-    names = list(columns)
-    scales = [name for name in names if re.fullmatch(r"scale_\d+_mm", name)]
-    axes = [axis for axis in "xyz" if f"reference_{axis}_mm" in names]
-    model = [f"model_{axis}_mm" for axis in axes if f"model_{axis}_mm" in names]
-    pairs = [
-        ([name], [f"scale_{match[1]}_mm"])
-        for name in names
-        if (match := re.fullmatch(r"reference_link_(\d+)_mm", name)) and f"scale_{match[1]}_mm" in scales
-    ]
-    if len(axes) > 1 and (model or scales):
-        pairs.append(([f"reference_{axis}_mm" for axis in axes], model or scales))
-    return pairs
-
-
-def _different_places(where_mm: FloatArray) -> int:
-    """Number of cells of a grid of `_PLACE_MM` with these rows (N, d); 1 if all are within one cell's width.
-
-    Rows with an empty cell say nothing of where they are.
-    """
-    known = where_mm[np.isfinite(where_mm).all(axis=1)]
-    if len(known) < 2 or np.ptp(known, axis=0).max(initial=0) <= _PLACE_MM:
-        return 1
-    return len(np.unique(np.round(known / _PLACE_MM), axis=0))
-
-
 def _check_limits(table: Table, problems: ProblemList) -> None:
-    """Warn of values that are implausible for their unit; they are used nevertheless."""
+    """Warn of values that are implausible for their unit."""
     for name, values in table.columns.items():
         if (limit := limit_of(name)) is None:
             continue
@@ -272,7 +213,7 @@ def _check_limits(table: Table, problems: ProblemList) -> None:
             problems,
             "implausible for its unit",
             f"{limit.low:g} to {limit.high:g}: {limit.why}",
-            "look; it is used as it stands",
+            "look",
             warn=True,
         )
 

@@ -10,6 +10,7 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
+from compd.data_fault import row_stretches
 from compd.errors import CompdError, Problem, RecordingError
 from compd.files import write_files
 from compd.recording.sidecar import Sidecar, read_sidecar
@@ -48,7 +49,7 @@ def include_rows(recording: Path, rows: Collection[int]) -> None:
 
 def rows_text(rows: Collection[int]) -> str:
     """Rows in few words: "17-20,25"."""
-    return ",".join(str(first) if first == last else f"{first}-{last}" for first, last in _stretches(rows))
+    return ",".join(str(first) if first == last else f"{first}-{last}" for first, last in row_stretches(rows))
 
 
 def rows_of_text(text: str, where: str) -> list[int]:
@@ -108,7 +109,7 @@ def _rows_of(entry: Any) -> list[int]:
 
 
 def _entry(rows: Sequence[int], reason: str) -> CommentedMap:
-    stretches = _stretches(rows)
+    stretches = row_stretches(rows)
     entry = CommentedMap()
     if len(rows) == 1:
         entry["row"] = rows[0]
@@ -120,17 +121,6 @@ def _entry(rows: Sequence[int], reason: str) -> CommentedMap:
     entry["reason"] = reason
     entry.fa.set_flow_style()
     return entry
-
-
-def _stretches(rows: Collection[int]) -> list[tuple[int, int]]:
-    """First and last row of each stretch without a gap."""
-    stretches: list[tuple[int, int]] = []
-    for row in sorted(rows):
-        if stretches and row == stretches[-1][1] + 1:
-            stretches[-1] = (stretches[-1][0], row)
-        else:
-            stretches.append((row, row))
-    return stretches
 
 
 def _write(recording: Path, document: CommentedMap, before: str) -> None:

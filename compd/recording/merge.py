@@ -217,8 +217,11 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
             reference_contents[sigma_key(reference.unit)] = sigma[0] if len(sigma) == 1 else sigma
     rows_before = 0
     excluded: dict[int, str] = {}
+    trusted: dict[int, str] = {}
     for recording in recordings:
         excluded |= {rows_before + row: reason for row, reason in recording.exclusions_by_position().items()}
+        own = recording.sidecar.trusted
+        trusted |= {rows_before + k + 2: own[row] for k, row in enumerate(recording.row.tolist()) if row in own}
         rows_before += recording.rows
     sources = [
         {
@@ -238,4 +241,5 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
         {"merge": sources},
         folds=first.folds,
         quantities_at_zero=first.quantities_at_zero,
+        trusted=trusted,
     )

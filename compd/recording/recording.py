@@ -18,6 +18,7 @@ from compd.columns import (
     joint_columns,
     scale_columns,
 )
+from compd.data_fault import DataFault
 from compd.display_unit import MM_PER_RAD
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
@@ -53,7 +54,8 @@ class Recording:
     path, sha256 : the table's file; hash of it, its sidecar and its ball plate, for provenance.
     sidecar : what the sidecar says; `machine` and `reference` are short for its own.
     row : (N,) row as a spreadsheet shows it, the header being row 1.
-    time_s : (N,) seconds from the start, strictly rising, never nan; without `has_time` the number of the row.
+    time_s : (N,) s on the file's clock, strictly rising, never nan; without `has_time` the number of the row.
+    begin_s : the file's first time, of a block or of chosen rows too; effects and descriptions count from it.
     has_time : whether the file has the time of each row; an external model's rows may be in order without it.
     session, visit, point : (N,) int or None if the column is absent; -1 where the cell is empty.
         Text ids of points are numbered in sorted order; `point_labels` has the texts, empty where ids are numbers.
@@ -81,6 +83,7 @@ class Recording:
     left_out : reason -> rows of the file that are no row here (no time; empty row between others).
     columns : name -> (N,) every column as in the file, in the file's unit.
     warnings : what can be used but should be looked at.
+    faults : data that are wrong or look so. Cells that these take as empty are so in `quantities`, not in `columns`.
     """
 
     path: Path
@@ -118,6 +121,8 @@ class Recording:
     point_labels: tuple[str, ...] = ()
     commanded_mm: FloatArray | None = None
     commanded_rotation_rad: FloatArray | None = None
+    begin_s: float = 0.0
+    faults: tuple[DataFault, ...] = ()
 
     @property
     def machine(self) -> str:
@@ -138,6 +143,17 @@ class Recording:
     def rows(self) -> int:
         """N."""
         return len(self.time_s)
+
+    @property
+    def elapsed_s(self) -> FloatArray:
+        """(N,) time since the file's first row, s: what effects take, so that no result depends on a clock's origin."""
+        return self.time_s - self.begin_s
+
+    @cached_property
+    def unused(self) -> BoolArray:
+        """(N,) rows that do not count, by a person or because their data are wrong."""
+        faulty = [row for fault in self.faults if fault.consequence == "rows left out" for row in fault.rows]
+        return self.excluded | np.isin(self.row, faulty)
 
     def select(self, index: IntArray | slice) -> Recording:
         """The rows of this index (R,), in its order; of a slice without a copy."""
@@ -160,7 +176,8 @@ class Recording:
                 joined[column.name] = np.concatenate(values)
             elif column.name in ("quantities", "columns"):
                 joined[column.name] = {name: np.concatenate([each[name] for each in values]) for name in values[0]}
-        return replace(self, **joined)
+        faults = tuple(dict.fromkeys(fault for part in parts for fault in part.faults))
+        return replace(self, **joined, faults=faults)
 
     @property
     def gauge_columns(self) -> tuple[str, ...]:
@@ -230,6 +247,9 @@ class Recording:
         left_out: dict[str, int] = {}
         reason = np.full(self.rows, "", dtype=object)
         lacking = {"excluded by a person": self.excluded}
+        for fault in self.faults:
+            if fault.consequence == "rows left out":
+                lacking[fault.reason] = lacking.get(fault.reason, False) | np.isin(self.row, fault.rows)
         lacking |= {f"{name} is empty": np.isnan(self.columns[name]) for name in needed}
         for text, rows in lacking.items():
             new = rows & (reason == "")

@@ -37,8 +37,10 @@ from compd.recording.checks import (
     largest_joint_um,
 )
 from compd.recording.layout import Layout, machine_problems, read_layout
+from compd.recording.quantity_faults import hanging_reference, quantity_faults, without_wild
 from compd.recording.quaternion import with_rotation_vectors
 from compd.recording.recording import Recording
+from compd.recording.reference_faults import reference_faults
 from compd.recording.sidecar import Sidecar, read_sidecar
 from compd.tables import FIRST_ROW, ProblemList, Table, rows_text
 from compd.travel_direction import RowDirections
@@ -82,6 +84,7 @@ class RecordingBuilder:
         self._count = RowCount()
         self._last_row = FIRST_ROW - 1
         self._last_time_s = -math.inf
+        self._begin_s: float | None = None
         self._largest_joint_um = 0.0
 
     def build(self, table: Table | None, table_problems: ProblemList, last: bool = True) -> Recording:
@@ -164,6 +167,8 @@ class RecordingBuilder:
         timed = ~np.isnan(table.columns["time_s"])
         kept = np.argsort(table.columns["time_s"], kind="stable")[: int(timed.sum())]
         columns = {name: values[kept] for name, values in table.columns.items()}
+        if self._begin_s is None and len(kept):
+            self._begin_s = float(columns["time_s"][0])
         left_out = {"time_s is empty": int((~timed).sum()), "empty row": self._blank_rows(table)}
 
         def stack(names: Iterable[str]) -> FloatArray | None:
@@ -191,13 +196,25 @@ class RecordingBuilder:
             position = self._plate.positions_of_mm(ball)
         commanded_mm = np.stack([columns.get(name, np.full(len(kept), np.nan)) for name in COMMANDED_COLUMNS], axis=1)
         distance_mm = columns.get(DISTANCE_COLUMN)
+        covariates, row = {name: columns[name] for name in layout.covariates}, table.row[kept]
+        same_frame = sidecar.reference is not None and sidecar.reference.frame == "machine"
+        counting = ~excluded[kept]
+        counted = {name: values[counting] for name, values in columns.items()}
+        of_reference = reference_faults(counted, row[counting], same_frame)
+        hanging = hanging_reference(counted, row[counting], of_reference)
+        faults = [
+            *of_reference,
+            *hanging,
+            *quantity_faults({name: counted[name] for name in covariates}, row[counting]),
+        ]
+        faults = [left for fault in faults if (left := fault.without(sidecar.trusted)) is not None]
         if sidecar.reference is not None and sidecar.reference.radius_mm is not None:
             distance_mm = np.full(len(kept), sidecar.reference.radius_mm)
         return Recording(
             path=table.path,
             sha256=self._sha256,
             sidecar=sidecar,
-            row=table.row[kept],
+            row=row,
             time_s=columns["time_s"],
             session=session,
             visit=ids("visit"),
@@ -209,7 +226,7 @@ class RecordingBuilder:
             commanded_rotation_rad=stack(COMMANDED_ATTITUDE_COLUMNS) if layout.commanded else None,
             approach=approach,
             approach_measured=layout.approach,
-            quantities={name: columns[name] for name in layout.covariates},
+            quantities={name: without_wild(name, values, row, faults) for name, values in covariates.items()},
             reference_axes=layout.axes,
             reference_mm=position,
             reference_rotation_rad=stack(ATTITUDE_COLUMNS),
@@ -228,6 +245,8 @@ class RecordingBuilder:
             columns=columns,
             warnings=warnings,
             point_labels=table.labels.get("point", ()),
+            begin_s=self._begin_s or 0.0,
+            faults=tuple(faults),
         )
 
     def _blank_rows(self, table: Table) -> int:

@@ -182,6 +182,14 @@ SECTIONS: Mapping[str, Any] = {
         BeforeValidator(_checked_exclusions),
         Field(description="rows that a person left out, each with the reason"),
     ],
+    "trusted_rows": Annotated[
+        tuple[Exclusion, ...],
+        BeforeValidator(_checked_exclusions),
+        Field(
+            description="rows that a person vouches for, each with the reason, in the same form: they count, whatever "
+            "looks wrong in them"
+        ),
+    ],
     "provenance": Annotated[
         dict[Any, Any],
         BeforeValidator(_mapping_or_nothing),
@@ -213,6 +221,7 @@ class Sidecar:
     provenance, notes : how the recording came to be; kept, never interpreted.
     format : number of the format that the file was written in.
     quantities_at_zero : by name, from which effects count; None if the sidecar does not say.
+    trusted : spreadsheet row -> reason why it counts although it looks wrong.
     """
 
     path: Path
@@ -224,6 +233,7 @@ class Sidecar:
     format: int = FORMAT
     folds: tuple[str, ...] = ()
     quantities_at_zero: Mapping[str, float] | None = None
+    trusted: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def external(self) -> bool:
@@ -286,18 +296,23 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
                 next_step="delete it",
             )
         )
-    exclusions: tuple[Exclusion, ...] = sections["excluded_rows"] or ()
     return Sidecar(
         path,
         sections["machine"] or "",
         reference,
-        {row: exclusion.reason for exclusion in exclusions for row in (*exclusion.row, *exclusion.rows)},
+        _reasons(sections["excluded_rows"]),
         sections["provenance"] or {},
         sections["notes"] or "",
         sections["format"] or FORMAT,
         sections["folds"] or (),
         sections["quantities_at_zero"],
+        _reasons(sections["trusted_rows"]),
     )
+
+
+def _reasons(entries: Sequence[Exclusion] | None) -> dict[int, str]:
+    """Row -> reason, of entries of `excluded_rows` or `trusted_rows`."""
+    return {row: entry.reason for entry in entries or () for row in (*entry.row, *entry.rows)}
 
 
 def sidecar_contents(
@@ -308,10 +323,11 @@ def sidecar_contents(
     notes: str = "",
     folds: Sequence[str] = (),
     quantities_at_zero: Mapping[str, float] | None = None,
+    trusted: Mapping[int, str] | None = None,
 ) -> dict[str, Any]:
     """Contents of a sidecar as plain data, without keys that have no value.
 
-    excluded : spreadsheet row -> reason, as `Sidecar.excluded`.
+    excluded, trusted : spreadsheet row -> reason, as `Sidecar.excluded`.
     """
     contents = {
         "machine": machine,
@@ -319,6 +335,7 @@ def sidecar_contents(
         "folds": list(folds),
         "quantities_at_zero": None if quantities_at_zero is None else dict(quantities_at_zero),
         "excluded_rows": [{"row": row, "reason": reason} for row, reason in (excluded or {}).items()],
+        "trusted_rows": [{"row": row, "reason": reason} for row, reason in (trusted or {}).items()],
         "provenance": provenance,
         "notes": notes,
     }

@@ -186,7 +186,11 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
             f"Rms residual in cells of the workspace; white where nothing was measured.{of_sample}",
             plot_workspace_map(comparison),
         ),
-        Panel("Rows that do not count", "Kept in the file, not used for any number here.", _excluded(comparison)),
+        Panel(
+            "Rows that do not count",
+            "Kept in the file; what is not used counts for no number here.",
+            _excluded(comparison),
+        ),
     ]
     return [Panel(prefix + panel.title, panel.caption, panel.content) for panel in panels]
 
@@ -211,11 +215,7 @@ def _sentence(text: str) -> str:
 
 def _excluded(comparison: Comparison) -> PageTable:
     rows = [[reason, str(count)] for reason, count in comparison.left_out.items()]
-    numbers = comparison.outlier_rows
-    if numbers:
-        more = comparison.outlier_count - 40
-        shown = ", ".join(map(str, numbers[:40])) + (f" and {more} more" if more > 0 else "")
-        rows.append([f"beyond all noise: rows {shown}", str(comparison.outlier_count)])
+    rows += [[fault.text, str(len(fault.rows) or comparison.rows)] for fault in comparison.faults]
     return PageTable(("reason", "rows"), rows or [["none", "0"]])
 
 

@@ -15,7 +15,7 @@ from compd.diagnosis import (
     EmpiricalFinding,
     ErrorFall,
     change_text,
-    gross_texts,
+    data_texts,
     parameter_texts,
     short_name,
     untested_here,
@@ -140,9 +140,9 @@ def constant_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable | None:
     return PageTable(("", "a constant in every row"), rows)
 
 
-def gross_rows_text(diagnosis: Diagnosis, fall: ErrorFall) -> str:
-    """Number and list of unexplained rows."""
-    return "; ".join(gross_texts(diagnosis.gross, diagnosis.after, fall.unit, GROSS_ROWS))
+def wrong_data(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    """What is wrong with the data; number and list of unexplained rows."""
+    return data_texts(diagnosis, fall.unit, GROSS_ROWS)
 
 
 def findings_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:

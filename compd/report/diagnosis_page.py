@@ -22,11 +22,11 @@ from compd.report.diagnosis_evidence import (
     described_by,
     findings_table,
     formula_list,
-    gross_rows_text,
     next_table,
     step_rows,
     untested_table,
     without_gain,
+    wrong_data,
 )
 from compd.report.falling_error import CAPTION, plot_falling_error
 from compd.report.page import COLOURS, PageText, Panel, style_figure, write_page
@@ -73,8 +73,8 @@ def plot_time(diagnosis: Diagnosis, fall: ErrorFall) -> Figure:
 
 
 def _places(recording: Recording) -> FloatArray:
-    """(N,) hours; rows in a recording without time."""
-    return recording.time_s / SECONDS_PER_HOUR if recording.has_time else recording.row.astype(np.float64)
+    """(N,) hours from the first row; rows in a recording without time."""
+    return recording.elapsed_s / SECONDS_PER_HOUR if recording.has_time else recording.row.astype(np.float64)
 
 
 def _add_rows(figure: Figure, k: int, x: FloatArray, values: FloatArray, rows: IntArray) -> None:
@@ -101,6 +101,7 @@ def write_diagnosis_page(
     panels = [
         Panel("The falling error", CAPTION, plot_falling_error(diagnosis, holdouts, fall)),
         *_step_panels(diagnosis, fall),
+        *_data_panels(diagnosis, fall),
         *_time_panels(diagnosis, fall),
         *_description_panels(diagnosis, fall),
         *_table_panels(diagnosis, fall),
@@ -126,13 +127,19 @@ def _step_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
     return panels
 
 
+def _data_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
+    """What is wrong with the data, if anything is."""
+    texts = wrong_data(diagnosis, fall)
+    return [Panel("What is wrong with the data", "", PageTable(("",), [[text] for text in texts]))] if texts else []
+
+
 def _time_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
     """Gross rows and changes in time, if any."""
     if not diagnosis.gross.rows and not any(finding.is_change for finding in diagnosis.depends_on):
         return []
     caption = "The error that is left; dashed lines are changes."
     if diagnosis.gross.rows:
-        caption += f" Crosses at the edge lie beyond it: {gross_rows_text(diagnosis, fall)}."
+        caption += " Crosses at the edge lie beyond it: these rows do not count."
     return [Panel("Over time", caption, plot_time(diagnosis, fall))]
 
 

@@ -17,12 +17,12 @@ from compd.report.diagnosis_evidence import (
     constant_table,
     findings_table,
     formula_list,
-    gross_rows_text,
     next_table,
     plan_command,
     step_rows,
     untested_table,
     without_gain,
+    wrong_data,
 )
 from compd.report.page_table import PageTable
 from compd.report.terminal_table import keep_words_whole
@@ -47,9 +47,10 @@ def print_diagnosis(console: Console, diagnosis: Diagnosis, holdouts: Sequence[H
         _print_pairs(console, step_rows(number, diagnosis, fall))
     _print_findings(console, diagnosis, fall)
     _print_constant(console, diagnosis, fall)
-    if diagnosis.gross.rows:
-        _heading(console, "Rows that do not count:")
-        _paragraph(console, gross_rows_text(diagnosis, fall))
+    if texts := wrong_data(diagnosis, fall):
+        _heading(console, "What is wrong with the data:")
+    for text in texts:
+        _paragraph(console, text)
     _print_candidates(console, diagnosis, fall)
     _print_next(console, diagnosis)
 

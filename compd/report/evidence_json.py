@@ -13,11 +13,11 @@ from compd.report.diagnosis_evidence import (
     explains_text,
     findings_table,
     formula_texts,
-    gross_rows_text,
     next_table,
     plan_command,
     untested_table,
     without_gain,
+    wrong_data,
 )
 from compd.report.page_table import PageTable
 from compd.text import estimate_text, fall_text, nan_to_null, number_text, percent_text
@@ -37,7 +37,7 @@ def evidence(diagnosis: Diagnosis) -> dict[str, Any]:
             "follows": _table(findings_table(diagnosis, fall)),
             "formulas": _formulas(diagnosis),
             "constant": _table(constant_table(diagnosis, fall)),
-            "gross": gross_rows_text(diagnosis, fall),
+            "gross": "; ".join(wrong_data(diagnosis, fall)),
             "tried": _table(candidates_table(diagnosis, fall)),
             "without_gain": without_gain(diagnosis),
             "untested": _table(untested_table(diagnosis)),

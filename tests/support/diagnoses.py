@@ -71,8 +71,9 @@ def external_recording(axes: str = "x", quantities: tuple[str, ...] = (), direct
 
 
 def formula(name: str, text: str, physics: str, low: float = -20.0, high: float = 20.0, **more: Any) -> Effect:
-    """A formula of one parameter b, in um, along x of an external machine."""
-    parameters = {"b": {"unit": "um", "plausible": [low, high], "source": "a test"}}
+    """A formula of one parameter b, in um, or um/mm of a position, along x of an external machine."""
+    unit = "um/mm" if "position_mm" in text else "um"
+    parameters = {"b": {"unit": unit, "plausible": [low, high], "source": "a test"}}
     source = {"id": name, "port": "reference", "axis": "x", "formula": text, "parameters": parameters, **more}
     return formula_effect(source | ({"physics": physics} if physics else {}), "test")
 

@@ -116,10 +116,8 @@ def print_comparisons(comparisons: list[Comparison]) -> None:
             console.print(f"  - {trend.text}")
         if len(comparison.trends) > MAX_SENTENCES:
             console.print(f"  and {len(comparison.trends) - MAX_SENTENCES} weaker ones (--json and --html have all)")
-        rows = comparison.outlier_rows
-        if rows:
-            shown = ", ".join(map(str, rows[:20])) + (" ..." if comparison.outlier_count > 20 else "")
-            console.print(f"Rows beyond all noise, not used: {shown}")
+        for fault in comparison.faults:
+            console.print(f"Look: {fault.text}")
         for why, count in comparison.left_out.items():
             console.print(f"{count} rows left out: {why}")
         sidecar = comparison.aligned.recording.sidecar

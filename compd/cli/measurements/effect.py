@@ -214,6 +214,11 @@ def _finish(
             "" if number.searched else plausible + ("" if number.plausible else ": [red]outside[/]"),
         )
     console.print(keep_words_whole(table, console.width))
+    for fitted in changed.fitted:
+        for text in fitted.effect.remarks:
+            typer.echo(f"look: effect {fitted.effect.id}: {text}")
+    for remark in changed.warnings:
+        typer.echo(f"look: {remark.where}: {remark.what}; {remark.allowed}")
     typer.echo(after.verdict)
 
 
@@ -234,6 +239,8 @@ def _card(effect: Effect, configuration: Configuration | None) -> RenderableType
         card.add_row("", f"{symbol}: {meaning}")
     card.add_row("source", effect.source)
     card.add_row("needs", ", ".join(effect.needs) or "nothing but the links' gauges")
+    if effect.remarks:
+        card.add_row("look", "\n".join(effect.remarks))
     card.add_row("mistaken for", ", ".join(effect.mistaken_for) or "-")
     card.add_row("separated by", effect.separated_by)
     if configuration is not None:

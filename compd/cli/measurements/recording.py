@@ -11,6 +11,7 @@ import typer
 from compd.cli.options import MachineOption
 
 if TYPE_CHECKING:
+    from compd.data_fault import DataFault
     from compd.recording import Recording
 
 recording = typer.Typer(
@@ -37,6 +38,8 @@ def check(
     loaded, _ = read_with_machine(path, machine, needs_reference=False)
     for warning in loaded.warnings:
         typer.echo(f"warning: {warning}")
+    for fault in _faults(loaded, path, machine):
+        typer.echo(f"look: {fault.text}")
     for line in _summary(loaded):
         typer.echo(line)
 
@@ -134,6 +137,19 @@ def include(
     numbers = rows_of_text(rows, "--rows")
     include_rows(path, numbers)
     typer.echo(f"{path.with_suffix('.yaml')}: {len(numbers)} rows count again")
+
+
+def _faults(contents: Recording, path: Path, machine: Path | None) -> tuple[DataFault, ...]:
+    """What is wrong with the data; of a recording with a reference also what its comparison with the model shows."""
+    from compd.comparison import compare, is_long, open_recording
+    from compd.errors import CompdError
+
+    if contents.reference is None or is_long(path):
+        return contents.faults
+    try:
+        return compare(open_recording(path, machine)).faults
+    except CompdError:  # `compd compare` says why the two cannot be compared
+        return contents.faults
 
 
 def _summary(contents: Recording) -> list[str]:

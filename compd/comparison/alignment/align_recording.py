@@ -181,7 +181,7 @@ def _at_fixed_ends(aligned: AlignedRecording, end: IntArray) -> AlignedRecording
     recording, where = aligned.recording, str(aligned.recording.path)
     assert recording.reference is not None
     distance_mm = recording.reference_distance_mm
-    tip_mm = np.where(recording.excluded[:, None], np.nan, aligned.nominal_tip_mm)
+    tip_mm = np.where(recording.unused[:, None], np.nan, aligned.nominal_tip_mm)
     if aligned.part_of is not None:
         assert aligned.part_of.ends is not None
         ends = aligned.part_of.ends.at_rows(end, recording.end_name, where)
@@ -208,7 +208,7 @@ def _placed(
     """Frame and target of an instrument that shows both place and attitude; None where the place is not shown."""
     if len(axes) < 3 or recording.reference_mm is None:
         return None
-    points_mm = np.where(recording.excluded[:, None], np.nan, recording.reference_mm)
+    points_mm = np.where(recording.unused[:, None], np.nan, recording.reference_mm)
     return place_target(points_mm, rotation_rad, observations.tip_M_mm, observations.rotation_M_P, criteria, held)
 
 
@@ -228,7 +228,7 @@ def _registered(
     if len(axes) < 3 and not in_plane:
         return None, measured_mm
     points, predicted = _in_space(measured_mm, axes), _in_space(tip_M_mm[:, list(axes)], axes)
-    registration = register(np.where(recording.excluded[:, None], np.nan, points), predicted, criteria)
+    registration = register(np.where(recording.unused[:, None], np.nan, points), predicted, criteria)
     if registration is not None:
         measured_mm = registration.into_M(points)[:, list(axes)]
     return registration, measured_mm
@@ -263,7 +263,7 @@ def _observations(
         joint_mm=joint_mm,
         frame_mm=frame_mm,
         quantities=recording.quantities,
-        time_s=recording.time_s,
+        time_s=recording.elapsed_s,
         session_start=starts,
         movement=movement,
         quantities_at_zero=recording.sidecar.quantities_at_zero,

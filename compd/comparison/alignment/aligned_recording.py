@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
+from compd.columns import is_sensitivity
 from compd.comparison.alignment.external_machine import external_change, external_prediction
 from compd.comparison.alignment.fixed_ends import FixedEnds
 from compd.comparison.alignment.measured_attitude import (
@@ -26,6 +27,7 @@ from compd.comparison.alignment.registration import (
 )
 from compd.comparison.alignment.target_place import HELD, PlacedTarget
 from compd.comparison.criteria import ComparisonCriteria
+from compd.comparison.lone_visits import lone_distance
 from compd.display_unit import ATTITUDE_LABELS, ATTITUDE_UNIT, MM_PER_RAD, in_place_unit
 from compd.errors import CompdError
 from compd.model import (
@@ -290,6 +292,20 @@ class AlignedRecording:
         if all(values is self.rows.quantities[name] for name, values in quantities.items()):
             return self
         return replace(self, rows=replace(self.rows, quantities=quantities))
+
+    @cached_property
+    def conditions(self) -> FloatArray:
+        """(N, K) what was recorded beside the reference: where the machine was, and every quantity."""
+        quantities = [values for name, values in self.rows.quantities.items() if not is_sensitivity(name)]
+        return np.column_stack([self.rows.tip_M_mm, self.rows.scale_mm, *quantities])
+
+    def lone_distance(self, distance: FloatArray, use: BoolArray) -> float:
+        """Beyond which the repeats of a visit do not confirm each other; inf where no visit is a lone one.
+
+        distance : (N,) of each row from what is known, in robust standard deviations.  use : (N,) rows that count.
+        """
+        use = use & ~np.isin(self.recording.row, list(self.recording.sidecar.trusted))
+        return lone_distance(distance, use, self.recording.visit, self.conditions, self.criteria)
 
     @cached_property
     def usable(self) -> UsableRows:

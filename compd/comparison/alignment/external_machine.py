@@ -85,7 +85,7 @@ def external_observations(
         scale_mm=scale_mm,
         movement=Movement(np.nan_to_num(direction), velocity, np.zeros((recording.rows, 0))),
         quantities=quantities,
-        time_s=recording.time_s,
+        time_s=recording.elapsed_s,
         session_start=starts,
         recorded=frozenset(recorded | ({"time", "order"} if recording.has_time else set())),
     )

@@ -153,7 +153,7 @@ def _system(sample: Sample, start: FitResult, sigma_um: FloatArray) -> _System:
     aligned = sample.aligned
     whitened = start.residual_um / sigma_um
     known: BoolArray = np.asarray(np.isfinite(whitened).all(axis=1))
-    limits = outlier_limits(whitened, known, aligned.recording.visit, aligned.criteria)
+    limits = outlier_limits(whitened, known, aligned.recording.visit, aligned.criteria, aligned.conditions)
     columns_um = nuisance_columns(aligned, start.fitted)
     _, total = effect_deltas(start.fitted, aligned.rows)
     taken_um = (aligned.measured_mm - aligned.predicted_mm(total)) * UM_PER_MM - start.residual_um
@@ -162,7 +162,7 @@ def _system(sample: Sample, start: FitResult, sigma_um: FloatArray) -> _System:
     count = aligned.registration_columns.shape[2]
     nuisance: list[FloatArray] = [amounts[:count]]
     amounts = amounts[count:]
-    sampled = session_places(sample.starts_s, aligned.rows.time_s[aligned.rows.session_start])
+    sampled = session_places(sample.starts_s, aligned.recording.time_s[aligned.rows.session_start])
     keys: dict[str, Sequence[StateKey]] = {}
     for effect in start.fitted:
         states = initial_states(aligned.rows, effect.effect, effect.constants)
@@ -202,7 +202,7 @@ def _normals(
         aligned = align_block(block, sample.aligned)
         rows, carried = advance_effects(effects, aligned.rows, system.keys, hand_over.take())
         hand_over.give(carried)
-        session = session_places(sample.starts_s, aligned.rows.time_s)
+        session = session_places(sample.starts_s, aligned.recording.time_s)
         normals, used = _block_normals(aligned, effects, rows, system, nuisance, cluster, session)
         return normals, quantity_ranges(effects, aligned.rows, used), aligned.recording.rows
 

@@ -89,12 +89,13 @@ def fixed_terms(comparison: Comparison, starts_s: FloatArray) -> FixedTerms:
     """From the comparison of the sample.  starts_s : (S,) when the sessions of the whole recording start."""
     aligned, used = comparison.aligned, comparison.used
     known: BoolArray = np.asarray(np.isfinite(comparison.residual_um).all(axis=1))
-    limits = outlier_limits(comparison.residual_um, known, aligned.recording.visit, comparison.criteria)
+    visit, conditions = aligned.recording.visit, aligned.conditions
+    limits = outlier_limits(comparison.residual_um, known, visit, comparison.criteria, conditions)
     states = {
         effect.effect.id: initial_states(aligned.rows, effect.effect, effect.constants) for effect in comparison.fitted
     }
     keys = {id_: sorted({state.key for state in of_effect}) for id_, of_effect in states.items() if of_effect}
-    sampled = session_places(starts_s, aligned.rows.time_s[aligned.rows.session_start])
+    sampled = session_places(starts_s, aligned.recording.time_s[aligned.rows.session_start])
     by_effect, total = effect_deltas(comparison.fitted, aligned.rows)
     terms: dict[str, NuisanceTerms] = {}
     for name, added in {NOTHING: total, **deltas_without(aligned, by_effect)}.items():

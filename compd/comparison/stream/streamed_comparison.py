@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.comparison.column_faults import column_faults
 from compd.comparison.comparison import Comparison, Size
+from compd.comparison.row_faults import OUTLIER
 from compd.comparison.stream.residual_totals import ResidualTotals
+from compd.data_fault import DataFault
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,6 +86,13 @@ class StreamedComparison(Comparison):
     def outlier_rows(self) -> list[int]:
         """The first thousand of these rows, as a spreadsheet shows them."""
         return self.totals.outlier_rows
+
+    @cached_property
+    def faults(self) -> tuple[DataFault, ...]:
+        """Of the recording as it was read; and the rows that no noise explains."""
+        rows = tuple(self.outlier_rows)
+        found = DataFault(OUTLIER, rows, (), "far from all else, which no noise explains", "rows left out")
+        return (*column_faults(self.aligned), *self.aligned.recording.faults, *([found] if rows else []))
 
     @property
     def sample_rows(self) -> int:

@@ -15,7 +15,7 @@ from compd.diagnosis.candidates.candidates import Candidate
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChangeCandidate(Candidate):
-    """An effect from a moment on, time_s on the recording's clock.  whole : the same over all rows."""
+    """An effect from a moment on, time_s since its first row.  whole : the same over all rows."""
 
     time_s: float
     whole: Candidate

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -40,6 +40,7 @@ def weigh_rows(
     criteria: Criteria,
     huber: float = ComparisonCriteria.huber_sigmas,
     least: FloatArray | float = 0.0,
+    lone_distance: Callable[[FloatArray, BoolArray], float] | None = None,
 ) -> RowWeights:
     """Weigh rows by what a robust fit of some columns and a constant leaves of them.
 
@@ -47,10 +48,11 @@ def weigh_rows(
     known : (N,) rows that the fit rests on. Others are judged by it where the residual and the columns are known.
     visit : (N,) number of the visit, negative for none.
     noise : standard deviation of the noise, 1 of a whitened residual; 0 where it is not known. A row that another one
-        of its visit confirms within 5 sqrt(2) of it is not gross: the machine really was there.
+        of its visit confirms within 5 sqrt(2) of it is not gross: the machine really was there. A lone visit is.
     huber : of the robust fit, as of `huber_weights`.
     least : (m,) below which no robust standard deviation is taken: where most rows are alike to the last digit, a
         difference of one digit is not gross.
+    lone_distance : beyond which the repeats of a visit do not confirm each other, `AlignedRecording.lone_distance`.
 
     With d the rms over the coordinates of a row's residual in robust standard deviations, its weight is
     min(1, 2 / d) (Huber, Robust Statistics (1981), chapter 7), over the mean of min(d^2, 2 d) for normal noise. Rows
@@ -76,6 +78,9 @@ def weigh_rows(
     distance = np.where(judged[:, None], np.abs(left) / scale, 0.0)
     far = (distance > criteria.gross_sigmas).any(axis=1)
     gross = far & ~_confirmed(left, judged, visit, criteria.gross_sigmas * np.sqrt(2.0) * (noise or scale))
+    farthest = distance.max(axis=1)
+    if lone_distance is not None:
+        gross |= farthest > lone_distance(farthest, judged)
     size = np.sqrt(np.mean(distance**2, axis=1))
     full = criteria.full_weight_sigmas
     weight = np.minimum(1.0, full / np.maximum(size, full))

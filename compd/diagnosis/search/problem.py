@@ -198,6 +198,7 @@ def _weights(
         criteria,
         aligned.criteria.huber_sigmas,
         floor.least_um / sigma_um,
+        aligned.lone_distance,
     )
 
 

@@ -23,6 +23,8 @@ MEASURE_TWICE = "measure one point twice (two rows with the same number in a `vi
 
 def advice(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     """Clauses, the most urgent first."""
+    if any(fault.consequence == "mend the column" for fault in diagnosis.after.faults):
+        return ["mend the column first, then diagnose again: all numbers here rest on it"]
     clauses = [] if fall.noise_known else [MEASURE_TWICE]
     changes = [moment_text(finding, diagnosis) for finding in diagnosis.depends_on if finding.is_change]
     clauses += [f"find out what changed from {moment}" for moment in changes[:1]]

@@ -213,10 +213,15 @@ def constant_text(constant: ConstantFinding, unit: str) -> str:
 def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: int = MAX_ROWS) -> list[str]:
     """How many rows nothing explains, how far off they are, where they lie, and what to look at.
 
-    most_rows : single rows that are named.
+    most_rows : single rows that are named. Rows of which more is known are told by `fault_texts`.
     """
-    if not gross.rows:
+    told = {row for fault in comparison.named_faults for row in fault.rows}
+    if not set(gross.rows) - told:
         return []
+    gross = GrossRows(
+        tuple(row for row in gross.rows if row not in told),
+        tuple(run for run in gross.runs if not told & set(range(run[0], run[1] + 1))),
+    )
     recording = comparison.aligned.recording
     size = np.abs(comparison.residual_um[np.isin(recording.row, gross.rows)])
     largest = float(np.nanmax(size)) if np.isfinite(size).any() else float("nan")
@@ -235,6 +240,17 @@ def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: 
     held = f" with {percent_text(share)} of the squared error" if np.isfinite(share) else ""
     texts = [count, f"look at what happened in rows {runs}{held} (a bump, a slipped target, a lost step)"]
     return [*texts, f"single bad readings: {rows}"] if single else texts
+
+
+def fault_texts(comparison: Comparison, most: int | None = None) -> list[str]:
+    """What is wrong with the data, in the words of `compd recording check`.  most : how many are told; None for all."""
+    texts = [fault.text for fault in comparison.named_faults]
+    return texts if most is None or len(texts) <= most else [*texts[:most], f"{len(texts) - most} more"]
+
+
+def data_texts(diagnosis: Diagnosis, unit: str, most_rows: int = MAX_ROWS) -> list[str]:
+    """All that is wrong with the data, then the rows of which nothing more is known than that nothing explains them."""
+    return [*fault_texts(diagnosis.after), *gross_texts(diagnosis.gross, diagnosis.after, unit, most_rows)]
 
 
 def untested_here(diagnosis: Diagnosis) -> list[UntestedEffect]:

@@ -14,6 +14,7 @@ from compd.diagnosis.words.phrases import (
     change_text,
     constant_text,
     doubts,
+    fault_texts,
     followed_text,
     gross_texts,
     is_best_a_change,
@@ -34,6 +35,8 @@ WIDTH = 80
 # Effects, rivals and untested effects that are said here.
 MAX_NAMED = 3
 NO_RIVAL = "no other effect that was tried does as well"
+# Faults of the data that are said here.
+MAX_FAULTS = 2
 # A probability above this is said before the numbers.
 DOUBTFUL = 0.01
 # With so many other texts the one is left out that says nothing.
@@ -49,6 +52,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     found = tuple(_found(diagnosis, fall))
     names = tuple(clause.partition(": ")[0] for clause in found)
     others = [
+        LabelledText("Data", tuple(fault_texts(diagnosis.after, MAX_FAULTS))),
         LabelledText("Changed", tuple(_changed(diagnosis, fall))),
         LabelledText("Asked", tuple(question(diagnosis))),
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
@@ -104,6 +108,8 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
     if (asked := diagnosis.asked) is not None:
         takes = f"would take {percent_text(fall.share_of(asked.heldout_rms_um))}, with an implausible number"
         texts = [f"{asked.effect} {takes}", f"an effect {takes}"]
+    if wrong := [fault for fault in diagnosis.after.faults if fault.consequence == "mend the column"]:
+        texts = [wrong[0].what.partition(":")[0], "columns of the recording seem wrong"]
     headings = [f"{diagnosis.verdict}: {text}" for text in texts]
     return headings[len(headings[0]) > WIDTH]
 
@@ -203,6 +209,7 @@ def _sure(diagnosis: Diagnosis) -> list[str]:
     session = [f"{join_words(names)} seen in one session only: measure on another day"] if names else []
     p_values = [step.p_value for step in steps] or ([] if finding is None else [finding.p_value])
     chance = [clause for clause in (chance_clause(p_values),) if clause]
+    implausible += [f"{step.effect.id}: {remark}" for step in steps for remark in step.effect.remarks]
     doubtful = chance if max(p_values, default=0.0) > DOUBTFUL else []
     others = [text for text in numbers if text not in implausible]
     return [*implausible, *doubtful, *session, *others, *(chance if not doubtful else [])]

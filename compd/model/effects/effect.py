@@ -257,6 +257,8 @@ class Effect:
     intercept : str
         Of an effect that grows with a quantity, the id of the effect that remains where the quantity is 0; ``""`` for
         none. A diagnosis that names the first tries the second.
+    remarks : tuple of str
+        What a person should look at in its declaration, such as a unit that does not fit its column.
     declared : str or dict
         What a model file names it by: the mapping that it was declared with as a formula, or
         ``"/absolute/file.py:NAME"``; ``""`` for its id.
@@ -295,6 +297,7 @@ class Effect:
     unknown_states: tuple[int, ...] = ()
     follows_reading: bool = False
     registration: bool = False
+    remarks: tuple[str, ...] = ()
     counts_from: Datum = "machine zero"
     intercept: str = ""
     declared: str | Mapping[str, Any] = ""

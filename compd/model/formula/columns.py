@@ -29,7 +29,7 @@ OF_LINK: Mapping[str, str] = {
 }
 OF_READING: Mapping[str, str] = {"reading_mm": "the comparator's or the scale's own reading since machine zero, mm"}
 ANYWHERE: Mapping[str, str] = {
-    "time_s": "time, s",
+    "time_s": "time since the recording's first row, s",
     "tip_x_mm": "x of the tip in {M}, mm",
     "tip_y_mm": "y of the tip in {M}, mm",
     "tip_z_mm": "z of the tip in {M}, mm",

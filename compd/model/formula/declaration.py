@@ -27,6 +27,7 @@ from compd.model.formula.formula import Formula
 from compd.model.formula.functions import NUMBERS
 from compd.model.formula.keys import FormulaDeclaration, FormulaParameter, read_declaration
 from compd.model.formula.parser import MAX_EXPONENT, parse_together
+from compd.model.formula.unit_check import unit_remarks
 
 # Rounding of the numbers in a formula, 2 * 3.141593 for instance, in turns.
 ROUNDING = 1e-6
@@ -130,6 +131,15 @@ def _with_formulas(declaration: FormulaDeclaration, where: str) -> Effect:
         constants=tuple(_constant(name, declaration.parameters[name], periods.get(name, "")) for name in constants),
         remembers=any(formula.lags for formula in parsed),
         unknown_states=lagged_states(sum(formula.lags for formula in parsed)),
+        remarks=_unit_remarks(declaration, parsed),
+    )
+
+
+def _unit_remarks(declaration: FormulaDeclaration, formulas: tuple[Formula, ...]) -> tuple[str, ...]:
+    """What is wrong with the units of the parameters, each once."""
+    units = {name: parameter.unit for name, parameter in declaration.parameters.items()}
+    return tuple(
+        dict.fromkeys(remark for formula in formulas for remark in unit_remarks(formula.tree, units, declaration.gives))
     )
 
 

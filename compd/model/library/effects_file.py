@@ -74,14 +74,17 @@ def load_effects(source: str | Path) -> dict[str, Effect]:
 
 
 def gather_effects(effects: str | Path | Effect | Sequence[Effect | str | Path]) -> dict[str, Effect]:
-    """Effects and sources of effects together, by id. Raises as `load_effects`, and where an id is the library's."""
+    """Effects and sources of effects together, by id. Raises as `load_effects`.
+
+    One that has the id of an effect of the library takes its place.
+    """
     found: list[tuple[Effect, str]] = []
     for part in [effects] if isinstance(effects, str | Path | Effect) else effects:
         if isinstance(part, Effect):
             found.append((part, f"effect {part.id}"))
         else:
             found += [(effect, str(part)) for effect in load_effects(part).values()]
-    return _by_id(found, load_library())
+    return _by_id(found)
 
 
 def named_effect(name: str, where: str, given: Mapping[str, Effect] | None = None) -> Effect:
@@ -210,13 +213,15 @@ def _python_effects(path: Path) -> list[Effect]:
     return list(effects.values())
 
 
-def _by_id(found: Iterable[tuple[Effect, str]], taken: Iterable[str] = ()) -> dict[str, Effect]:
-    """Effects by id, from effects with their places. Raises ConfigurationError for every id that is there already.
+def beside_library(given: Mapping[str, Effect]) -> list[Effect]:
+    """The effects of the library, then effects of one's own, which take the places of those with the same ids."""
+    return list({**load_library(), **given}.values())
 
-    taken : ids of the library.
-    """
+
+def _by_id(found: Iterable[tuple[Effect, str]]) -> dict[str, Effect]:
+    """Effects by id, from effects with their places. Raises ConfigurationError for every id that is there already."""
     effects: dict[str, Effect] = {}
-    places = dict.fromkeys(taken, "the library of compd")
+    places: dict[str, str] = {}
     problems: list[Problem] = []
     for effect, place in found:
         if effect.id in places:

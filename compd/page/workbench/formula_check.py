@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from compd.errors import CompdError, Problem
 from compd.model.effects import Effect, Observations, unmet_needs
 from compd.model.formula import ANYWHERE, FUNCTIONS, NUMBERS, OF_LINK, OF_READING, column_needs, formula_effect
-from compd.page.workbench.own_effects import library_id_problems, too_large
+from compd.page.workbench.own_effects import too_large
 
 _WHERE = "formula"
 _FORMULA = re.compile(r"formula(?: of [a-z0-9_]+)?(?:(?:\.|, )(?P<axis>[xyz]))?(?:, character (?P<character>\d+))?")
@@ -71,7 +71,7 @@ def check(declaration: Mapping[str, Any], rows: Observations, present: Sequence[
 
 
 def _effect(declaration: Mapping[str, Any]) -> tuple[Effect | None, list[Problem]]:
-    effect, problems = None, library_id_problems(declaration.get("id"), f"{_WHERE}, id")
+    effect, problems = None, list[Problem]()
     try:
         effect = formula_effect(declaration, _WHERE)
     except CompdError as error:

@@ -79,6 +79,7 @@ class OpenedRecording:
             "trends": [trend.text for trend in comparison.trends],
             "used": int(comparison.used.sum()),
             "left_out": dict(comparison.left_out),
+            "faults": [fault.text for fault in comparison.faults],
             "excluded": {str(row): reason for row, reason in self.aligned.recording.sidecar.excluded.items()},
             "numbers": [vars(number) | {"plausible": number.plausible} for number in self.model.numbers()],
             "ledger": [

@@ -12,7 +12,7 @@ from compd.errors import CompdError, Problem, StateError
 from compd.files import file_stamp, write_files
 from compd.model.effects import Effect
 from compd.model.formula import formula_effect
-from compd.model.library import gather_effects, load_library
+from compd.model.library import gather_effects
 from compd.page.workbench.effects_text import Declaration, entries_of, with_entry, without_entry
 
 # Most combinations of searched constants, and most numbers, of an effect: more would take too long in a page.
@@ -69,8 +69,6 @@ class OwnEffects:
         the file has a mistake, or where the disk refuses.
         """
         effect = formula_effect(declaration, "effect")
-        if problems := library_id_problems(effect.id, "effect, id"):
-            raise StateError(problems)
         with _WRITING:
             self._refuse_faulty()
             if effect.id in self.declarations and not replace:
@@ -102,14 +100,6 @@ class OwnEffects:
 
     def _text(self) -> str:
         return read_text(self.path, "a file of effects") if self.path.exists() else ""
-
-
-def library_id_problems(name: object, where: str) -> list[Problem]:
-    """A problem if the id is that of an effect of compd's library."""
-    if not isinstance(name, str) or name not in load_library():
-        return []
-    what, step = "this id is taken, by the library of compd", "give it another one"
-    return [Problem(where=where, what=what, value=name, next_step=step)]
 
 
 def too_large(effect: Effect, where: str) -> list[Problem]:

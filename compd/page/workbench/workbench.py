@@ -12,7 +12,7 @@ from compd.errors import CompdError, Problem, RecordingError, StateError
 from compd.files import file_stamp, write_files
 from compd.live.machine import ModelText
 from compd.model.effects import can_concern
-from compd.model.library import load_library
+from compd.model.library import beside_library
 from compd.page.recording_machine import machine_of
 from compd.page.workbench.candidates import Candidates
 from compd.page.workbench.drafts import Drafts
@@ -136,9 +136,13 @@ class Workbench:
 
     def _set_candidates(self) -> None:
         rows = self.opened.aligned.rows
-        library = [effect for effect in load_library().values() if can_concern(effect, rows.available, rows.links)]
-        on_machine = self.opened.aligned.on_machine
-        self.candidates = Candidates(self.opened.comparison, list(map(on_machine, [*library, *self.sources.effects])))
+        own = {effect.id: effect for effect in self.sources.effects}
+        every = [
+            self.opened.aligned.on_machine(effect)
+            for effect in beside_library(own)
+            if effect.id in own or can_concern(effect, rows.available, rows.links)
+        ]
+        self.candidates = Candidates(self.opened.comparison, every)
         self.drafts = Drafts(self.opened.comparison, self.candidates)
 
     def use_libraries(self, libraries: Sequence[str]) -> None:

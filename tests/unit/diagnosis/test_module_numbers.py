@@ -46,6 +46,7 @@ NUMBERS = {
     },
     "comparison/noise_floor.py": {"DIFFERENCE_VARIANCE": DEFINITION},
     "comparison/nuisance.py": {"MIN_SHARE": CONDITIONING, "SCATTER_ROUNDS": ITERATION},
+    "comparison/row_faults.py": {"_AGREE_SHARE": WORDS},
     "comparison/shape_search.py": {"FINE": ITERATION},
     "statistics/last_digit.py": {"PER_STEP": DEFINITION, "STEPS_UM": DEFINITION},
     "statistics/least_squares.py": {
@@ -128,6 +129,7 @@ NUMBERS = {
         "WIDTH": WORDS,
         "MAX_NAMED": WORDS,
         "DOUBTFUL": WORDS,
+        "MAX_FAULTS": WORDS,
         "CROWDED": WORDS,
     },
     "fleet/checkpoint.py": {"WRITE_EVERY_S": MEMORY},

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from compd.errors import CompdError, ConfigurationError
-from compd.model.library import gather_effects, load_effects, named_effect
+from compd.model.library import beside_library, gather_effects, load_effects, named_effect
 
 STAGE = """\
 - id: stage_offset
@@ -95,10 +95,15 @@ def test_an_id_is_taken_once(tmp_path: Path) -> None:
     (tmp_path / "b.yaml").write_text(ONE)
     with pytest.raises(ConfigurationError, match=r"b\.yaml: this id is taken, by .*a\.yaml"):
         load_effects(tmp_path)
-    (tmp_path / "b.yaml").write_text(ONE.replace("growth", "link_zero"))
-    with pytest.raises(ConfigurationError, match="by the library of compd"):
-        gather_effects([tmp_path / "b.yaml"])
     assert list(gather_effects(tmp_path / "a.yaml")) == ["growth"]
+
+
+def test_an_effect_of_ones_own_takes_the_place_of_the_librarys(tmp_path: Path) -> None:
+    (tmp_path / "b.yaml").write_text(ONE.replace("growth", "link_zero"))
+    own = gather_effects([tmp_path / "b.yaml"])
+    every = {effect.id: effect for effect in beside_library(own)}
+    assert every["link_zero"] is own["link_zero"]
+    assert len(every) == len(beside_library({}))
 
 
 def test_effects_of_a_python_file_are_declared_by_its_absolute_path(

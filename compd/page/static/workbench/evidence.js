@@ -14,7 +14,7 @@ export function evidence(diagnosis, act) {
     ...effects.map((effect, k) => folded(`${k + 1}. ${plain(effect.effect)}`, effectParts(effect, act), true)),
     follows && folded("What the rest follows: descriptions, no causes; on rows left out", [table(follows), ...formulas.map((formula) => formulaPart(formula, act))], !effects.length),
     constant && folded("A constant in every row, which no effect is judged by", [table(constant)]),
-    gross && folded("Rows that do not count", [element("p", {}, units(gross))]),
+    gross && folded("What is wrong with the data", [element("p", {}, units(gross))]),
     next && folded("What to measure next", [table(next)], true),
     tried && folded("Effects that were tried, each alone, on rows left out", [table(tried)]),
     without_gain.length && folded(`Without gain (${without_gain.length})`, [element("p", {}, without_gain.map(plain).join(", "))]),

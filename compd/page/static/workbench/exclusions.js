@@ -72,8 +72,11 @@ export class Exclusions {
       const back = element("button", { type: "button", class: "include", onclick: () => this.bench.attempt(() => this.bench.change("exclusions", { rows })) }, "Let them count again");
       return element("li", {}, `${rowsText(rows)}: ${reason} `, back, command.row);
     });
-    if (!entries.length && !others.length) return this.left_out.replaceChildren();
-    this.left_out.replaceChildren(element("p", {}, element("b", {}, "Rows that do not count")), element("ul", {}, ...entries, ...others.map(([reason, count]) => element("li", {}, `${count}: ${reason}`))));
+    const { faults } = this.bench.summary;
+    const list = (title, items) => (items.length ? [element("p", {}, element("b", {}, title)), element("ul", {}, ...items)] : []);
+    const told = others.map(([reason, count]) => element("li", {}, `${count}: ${reason}`));
+    const wrong = faults.slice(0, MAX_TOLD).map((fault) => element("li", {}, fault));
+    this.left_out.replaceChildren(...list("Rows that do not count", [...entries, ...told]), ...list("What is wrong with the data", wrong));
   }
 }
 

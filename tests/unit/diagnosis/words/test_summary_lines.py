@@ -69,8 +69,8 @@ Shares:   joint_zero (105 -> 73 um): the encoders' zeros are elsewhere
           link_length (73 -> 55 um): the arms are longer than drawn
 Explains: 75 % of the squared error above noise: 105 -> 55 um, rows left out
 Left:     55 um; noise 20 um (declared): something else acts as well
-Sure:     joint_zero b = 4.20 +- 0.30 um; link_length b = 9.10 +- 0.40 um; noise
-          alone does each at most 1 time in 1000
+Sure:     joint_zero b = 4.20 +- 0.30 um/mm; link_length b = 9.10 +- 0.40 um;
+          noise alone does each at most 1 time in 1000
 Or else:  no other effect that was tried does as well
 Besides:  a constant of (4.0, -3.0, 2.0) um: tool_offset, link_zero or the
           instrument's frame; these rows cannot tell
@@ -84,7 +84,7 @@ Shares:   stage_backlash (1.4 -> 1.1 um): play of screw and coupling
 Explains: 99 % of the squared error: 1.4 -> 0.11 um, rows left out
 Left:     0.11 um; how much of it is noise cannot be known
 Sure:     stage_backlash b = 0.610 +- 0.020 um; stage_gain b = 0.02400 +-
-          0.00030 um; noise alone does each at most 1 time in 1000
+          0.00030 um/mm; noise alone does each at most 1 time in 1000
 Or else:  no other effect that was tried does as well
 Besides:  a constant of -3.2 um in x, which stage_offset can make
 Next:     measure one point twice (two rows with the same number in a `visit`

@@ -41,7 +41,6 @@ def test_what_is_right_has_no_problem(rows):
         ({"formula": "k * reference_x_mm"}, "formula", 5, "would show the effect the answer"),
         ({"formula": "k * humdity_pct"}, "formula", None, "did you mean humidity_pct?"),
         ({"id": "A b"}, "id", None, "is no name"),
-        ({"id": "backlash"}, "id", None, "taken"),
         ({"port": "nowhere"}, "port", None, "none of the choices"),
         ({"gives": "inch"}, "gives", None, "none of the choices"),
         ({"thing": 1}, "", None, "unknown key"),

@@ -135,8 +135,9 @@ def test_a_file_in_one_line_is_left_to_its_writer(own):
         with_entry("[{id: a, port: link}]\n", declared(), own.path)
 
 
-def test_an_id_of_the_library_and_a_mistake_are_refused(own):
-    for wrong in (declared("backlash"), declared(formula="k *")):
-        with pytest.raises(CompdError):
-            own.save(wrong, replace=False)
+def test_a_mistake_is_refused_and_an_id_of_the_library_is_not(own):
+    with pytest.raises(CompdError):
+        own.save(declared(formula="k *"), replace=False)
     assert not own.path.exists()
+    own.save(declared("backlash"), replace=False)
+    assert list(own.effects) == ["backlash"]
