@@ -13,7 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tests.scoreboard.cases import FAMILIES, FIRST_SEED, Case, cases, parse_case
+from tests.scoreboard.case import Case
+from tests.scoreboard.cases import FAMILIES, FIRST_SEED, cases, parse_case
 from tests.scoreboard.page import write_page
 from tests.scoreboard.parallel import append_results, in_parallel, read_results
 from tests.scoreboard.real import FAMILY as REAL

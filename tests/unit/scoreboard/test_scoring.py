@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.scoreboard.cases import CONSTANT_CAUSES, Case
+from tests.scoreboard.case import CONSTANT_CAUSES, Case
 from tests.scoreboard.expectation import Change, Expectation, expectation
 from tests.scoreboard.scoring import intervals, score
 
