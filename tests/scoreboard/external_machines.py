@@ -83,7 +83,12 @@ def record_stage(case: Case, number: int) -> Recorded:
     place_mm, moved = np.tile(run, runs), np.tile(direction, runs)
     (name,), (floors,) = case.causes, case.floors
     made, unit = _stage_error(name, place_mm, moved)
-    strength = _rounded(shape * floors * step_um / np.sqrt(12) / np.std(made))
+    # the same cause on all days, sized by the first
+    strength = (
+        record_stage(case, 0).strengths[name] / unit
+        if number
+        else _rounded(shape * floors * step_um / np.sqrt(12) / np.std(made))
+    )
     uneven_um = np.tile(_there_and_back(rng.normal(0, UNEVEN_IN_STEPS * step_um, places + 1)), runs)
     named_um = np.repeat(offset_um + strength * made, READINGS)
     error_um = named_um + np.repeat(uneven_um, READINGS) + rng.normal(0, noise_um, len(named_um))
@@ -135,8 +140,13 @@ def record_bed(case: Case, number: int) -> Recorded:
     session = np.repeat(np.arange(SESSIONS), PASSES * SIDE**2)
     in_session_s = np.tile(np.arange(PASSES * SIDE**2) * TOUCH_S, SESSIONS)
     column, probe, room = _temperatures(rng, session, in_session_s)
-    made, unit, signed = _bed_error(case.causes[0], x, y, column, probe)
-    strength = _rounded((sign if signed else 1.0) * case.floors[0] * noise_um / np.std(made))
+    (name,), (floors,) = case.causes, case.floors
+    made, unit, signed = _bed_error(name, x, y, column, probe)
+    strength = (
+        record_bed(case, 0).strengths[name] / unit
+        if number
+        else _rounded((sign if signed else 1.0) * floors * noise_um / np.std(made))
+    )
     # how much lower the machine believes to be than it is
     error_um = offset_um + tilt[0] * x + tilt[1] * y + strength * made
     noise = rng.normal(0, noise_um, len(x))
@@ -153,7 +163,7 @@ def record_bed(case: Case, number: int) -> Recorded:
         "reference_z_mm": np.zeros(len(x)),
     }
     left_um = float(np.sqrt(np.mean(noise**2)))
-    return Recorded(columns, _sidecar(), {case.causes[0]: strength * unit}, left_um)
+    return Recorded(columns, _sidecar(), {name: strength * unit}, left_um)
 
 
 def _temperatures(rng: np.random.Generator, session: FloatArray, in_session_s: FloatArray) -> tuple[FloatArray, ...]:
