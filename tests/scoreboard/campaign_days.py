@@ -9,6 +9,7 @@ import numpy as np
 from compd.simulation import AirAtZero, Heat, Mechanism
 from compd.simulation.campaign.campaign_plan import (
     GAP_S,
+    PASSES_PER_SESSION,
     VISIT_S,
     VISITS_PER_SESSION,
     CampaignItem,
@@ -69,7 +70,8 @@ def days(case: Case, mechanism: Mechanism, number: int, places: FixedPlaces | No
         number,
         warm_up_s=WARM_UP_S if case.family == "warm-start" else 0.0,
         air_at_zero=air,
-        **({} if places is None else {"points_mm": places.scale_mm, "passes": 0}),
+        points_mm=None if places is None else places.scale_mm,
+        passes=PASSES_PER_SESSION if places is None else 0,
     )
     match case.family:
         case "short" if number == 0:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, IntArray
 from compd.configuration import shipped_effects
 from tests.scoreboard.case import Case
 
@@ -166,7 +166,7 @@ def record_bed(case: Case, number: int) -> Recorded:
     return Recorded(columns, _sidecar(), {name: strength * unit}, left_um)
 
 
-def _temperatures(rng: np.random.Generator, session: FloatArray, in_session_s: FloatArray) -> tuple[FloatArray, ...]:
+def _temperatures(rng: np.random.Generator, session: IntArray, in_session_s: FloatArray) -> tuple[FloatArray, ...]:
     """Column, probe and room: each day both warm up, by another amount, and follow the room."""
     phase, share = rng.uniform(0, 2 * np.pi, SESSIONS)[session], rng.uniform(0.4, 1.0, (2, SESSIONS))[:, session]
     room = ZERO_degC + ROOM_K * np.sin(2 * np.pi * in_session_s / ROOM_S + phase)
@@ -196,7 +196,7 @@ def _sidecar() -> dict[str, Any]:
     return {"format": 2, "machine": "external", "reference": {"quantity": "tool_position", "frame": "machine"}}
 
 
-def _rounded(strength: float) -> float:
+def _rounded(strength: np.floating[Any]) -> float:
     return float(f"{strength:.6g}")
 
 
