@@ -77,7 +77,7 @@ def score(result: Result) -> Score:
     absent = [group for group in expected.groups if not told & set(group)]
     hidden = [group for group in absent if not possible & set(group)]
     missing = [f"not named: {' or '.join(group)}" for group in absent]
-    missing += [f"named: {name}" for name in _wrongly_named(result, expected)]
+    missing += [f"named: {name}" for name in wrongly_named(result, expected)]
     missing += [f"not reported as a constant: {' or '.join(group)}" for group in _no_constant(result, expected)]
     missing += [*_not_followed(result, expected), *_change_missing(result, expected)]
     missing += _residual_and_rows(result, expected)
@@ -92,8 +92,11 @@ def score(result: Result) -> Score:
     return Score(right, near, dangerous, tuple(missing))
 
 
-def _wrongly_named(result: Result, expected: Expectation) -> list[str]:
-    """Steps whose effect was not hidden; also those that must not be named, or not without a rival."""
+def wrongly_named(result: Result, expected: Expectation, *, with_rivals: bool = True) -> list[str]:
+    """Steps whose effect was not hidden; also those that must not be named, or not without a rival.
+
+    with_rivals : whether a rival that is there excuses a step, where the expectation has `or_rival`.
+    """
     allowed = {name for group in (*expected.groups, *expected.constant_or) for name in group}
     # the weak disturbances are there, too: none has to be named, and each may be
     allowed |= {*expected.may_name, *expected.constant, *result["answer"].get("weak_disturbances", ())}
@@ -103,14 +106,15 @@ def _wrongly_named(result: Result, expected: Expectation) -> list[str]:
         alone = {step["effect"] for step in steps(result) if not step["rivals"]}
         return forbidden + [name for name in expected.never_alone if name in alone]
     told = [
-        ({step["effect"], *(step["rivals"] if expected.or_rival else ())}, step["effect"]) for step in steps(result)
+        ({step["effect"], *(step["rivals"] if with_rivals and expected.or_rival else ())}, step["effect"])
+        for step in steps(result)
     ]
     return [name for either, name in told if not either & allowed]
 
 
 def _only_wrong_names(result: Result, expected: Expectation) -> bool:
     """Whether an effect is named, without a rival that may be, where none should be."""
-    wrong = _wrongly_named(result, expected)
+    wrong = wrongly_named(result, expected)
     may = set(expected.may_name)
     return not expected.groups and any(s["effect"] in wrong and not may & set(s["rivals"]) for s in steps(result))
 
