@@ -6,7 +6,10 @@ from collections.abc import Callable, Sequence
 
 from tests.scoreboard import draws
 from tests.scoreboard.case import THERMOMETERS, Case, Family, counts
-from tests.scoreboard.external_machines import BED, STAGE, ExternalMachine
+from tests.scoreboard.external_gantry import BED
+from tests.scoreboard.external_machine import ExternalMachine
+from tests.scoreboard.external_printer import PRINTER
+from tests.scoreboard.external_stage import STAGE
 
 ONE_WARM_UP, ROUNDED, PLACE_BY_PLACE, WRONG_NOISE = "one-warm-up", "rounded", "place-by-place", "wrong-noise"
 PLANE, RE_MOUNTED, MANY_SMALL, ZERO_ELSEWHERE = "plane", "re-mounted", "many-small", "zero-elsewhere"
@@ -61,7 +64,7 @@ FAMILIES = (
         ONE_WARM_UP,
         "one session in which everything warms up, and a thermal cause",
         90,
-        _in_turn(ONE_WARM_UP, tuple(THERMOMETERS)),
+        _with_external(ONE_WARM_UP, PRINTER, _in_turn(ONE_WARM_UP, tuple(THERMOMETERS))),
         counts(8, 40),
     ),
     Family(

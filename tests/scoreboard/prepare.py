@@ -25,7 +25,8 @@ from tests.scoreboard.campaign_days import OWN_DAYS, air_at_zero, days, touched_
 from tests.scoreboard.case import THERMOMETERS, Case
 from tests.scoreboard.case_machine import configuration_of, period_mm
 from tests.scoreboard.expectation import ALWAYS_THERE, LEFT_UM, expectation
-from tests.scoreboard.external_machines import ExternalMachine, machine_of
+from tests.scoreboard.external_machine import ExternalMachine
+from tests.scoreboard.external_machines import machine_of
 from tests.scoreboard.hard_cases import PLANE, RE_MOUNTED, ROUNDED, WRONG_NOISE, ZERO_ELSEWHERE
 
 # What is there of a play before it grows.
