@@ -242,16 +242,23 @@ def double_rows(file: RecordingFile) -> RecordingFile:
 
 
 def double_columns(file: RecordingFile) -> RecordingFile:
-    """Every quantity twice, under another name."""
-    return file.with_columns({f"{COPY}{name}": file.columns[name].copy() for name in quantities(file)})
+    """Every quantity twice, under another name, in the rows and at machine zero."""
+    doubled = file.with_columns({f"{COPY}{name}": file.columns[name].copy() for name in quantities(file)})
+    at_zero = file.sidecar.get("quantities_at_zero")
+    if at_zero is None:
+        return doubled
+    copies = {f"{COPY}{name}": value for name, value in at_zero.items()}
+    return replace(doubled, sidecar={**file.sidecar, "quantities_at_zero": {**at_zero, **copies}})
 
 
 def in_other_units(file: RecordingFile) -> RecordingFile:
-    """Every quantity whose unit is in OTHER_UNITS in that one, in the formulas too.
+    """Every quantity whose unit is in OTHER_UNITS in that one, in the formulas too, but those that a library needs.
 
     A column temperature_..._K would be refused, with how to convert it: it gets a name of its own.
     """
     for name in quantities(file):
+        if name in file.sidecar.get("quantities_at_zero", ()):
+            continue
         for old, (new, factor, offset) in OTHER_UNITS.items():
             if name.endswith(f"_{old}"):
                 stem = name.removesuffix(old).removeprefix("temperature_")
