@@ -16,6 +16,8 @@ ATTITUDES = ("rx", "ry", "rz")
 ID_COLUMNS = ("session", "visit", "point", "ball", "pin")
 DISTANCE_COLUMN = "reference_distance_mm"
 SKEW_COLUMN = "skew_s"
+# What people read in place of time where none was recorded.
+ROW_ORDER = "order of rows"
 POSITION_COLUMNS = tuple(f"reference_{axis}_mm" for axis in AXES)
 MODEL_COLUMNS = tuple(f"model_{axis}_mm" for axis in AXES)
 ATTITUDE_COLUMNS = tuple(f"reference_{axis}_rad" for axis in ATTITUDES)

@@ -27,3 +27,4 @@ from .stream.sample import Sample as Sample
 from .stream.sample import draw_sample as draw_sample
 from .stream.streamed_comparison import StreamedComparison as StreamedComparison
 from .thinning import thinned as thinned
+from .white_residual import counted_by_neighbours as counted_by_neighbours

@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.columns import is_sensitivity
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.display_unit import in_place_unit, place_unit
 from compd.units import unit_of
 
+# Columns of derivatives, as of the prediction by a parameter.
+DERIVATIVE = "d_"
 # Units of pure numbers, and words by which people call a number that names something.
 _PURE = ("", "1", "counts")
 _LABEL_WORDS = frozenset(
@@ -78,7 +79,7 @@ def why_no_covariate(name: str, values: FloatArray) -> str:
 
     values : (R,) those that are known.
     """
-    if is_sensitivity(name):
+    if name.startswith(DERIVATIVE):
         return "a derivative of the model's prediction, which belongs to an effect"
     if unit_of(name) in _PURE and (values == np.rint(values)).all():
         counts = len(np.unique(values)) > 2 and bool(np.isin(np.diff(values), (0.0, 1.0)).all())

@@ -125,6 +125,12 @@ class ComparisonCriteria:
         reason="a choice: one comparison in a hundred reports a trend of pure noise. Stricter than the search for what "
         "a residual follows, because nothing is tried on left-out rows here",
     )
+    white_share: float = threshold(
+        0.1,
+        unit="share of a coordinate's scatter",
+        meaning="a residual of which no more follows the order of time, of a place or of a quantity is taken for white",
+        reason="two disturbances of a fifth of the noise are 0.07 of the whole",
+    )
     quiet_floor_ratio: float = threshold(
         1.2,
         unit="squares of the noise floor",

@@ -7,6 +7,7 @@ repeats : pure error, the standard deviation of replicates (rows of one visit), 
     the visits about their means, and not less than the uncertainty of the reference's last digit. A declaration that
     agrees with it is pooled.
 declared : the reference's standard uncertainty and the gauges' noise at the tip, sqrt(u_reference^2 + u_gauges^2).
+    Neighbouring rows that differ by much less contradict it: then the estimate is the unit to count in.
 estimate : from differences of neighbouring rows, s = trimmed_scale((r_{i+1} - r_i) / sqrt(2)). What changes from row
     to row counts as noise, be it noise or not: it is a unit to count in, and no floor.
 
@@ -17,7 +18,7 @@ Sources: N. R. Draper, H. Smith, Applied Regression Analysis, Wiley 1998, sectio
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -42,8 +43,9 @@ class NoiseFloor:
 
     by_axis_um : (m,) per coordinate.  source : where it is from.  how : the same in a sentence.
     dof : degrees of freedom, over all coordinates; inf for a declaration that nothing tests.
-    contradiction : a remark where repeats and the declaration are far apart; "" where they are not.
+    contradiction : a remark where repeats or neighbours and the declaration are far apart; "" where they are not.
     angles : how many of the coordinates, the last ones, are an attitude's, in urad.
+    digit_um : (m,) standard uncertainty of the reference's last digit, 0 where unknown.
     """
 
     by_axis_um: FloatArray
@@ -52,11 +54,17 @@ class NoiseFloor:
     dof: float
     contradiction: str = ""
     angles: int = 0
+    digit_um: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     @property
     def um(self) -> float:
         """Root mean square over the coordinates that are lengths."""
         return rms(self.by_axis_um[: len(self.by_axis_um) - self.angles])
+
+    @property
+    def least_um(self) -> FloatArray:
+        """(m,) below which scatter says nothing: the noise where it is known, and the uncertainty of the last digit."""
+        return np.maximum(self.by_axis_um if self.known else 0.0, self.digit_um)
 
     @property
     def known(self) -> bool:
@@ -113,12 +121,13 @@ def noise_floor(
         an attitude's, in urad.
     """
     return replace(
-        _noise_floor(residual_um, use, visit, declared_um, gauges_um, digit_um, orders, criteria, _Units(unit, angles)),
+        _noise_floor(residual_um, use, visit, declared_um, gauges_um, digit_um, orders, criteria, Units(unit, angles)),
         angles=angles,
+        digit_um=digit_um,
     )
 
 
-class _Units(NamedTuple):
+class Units(NamedTuple):
     """The unit of the coordinates but for the last `angles` ones, which are in urad."""
 
     unit: str
@@ -140,7 +149,7 @@ def _noise_floor(
     digit_um: FloatArray,
     orders: tuple[FloatArray, ...],
     criteria: ComparisonCriteria,
-    units: _Units,
+    units: Units,
 ) -> NoiseFloor:
     """As `noise_floor`."""
     expected_um = np.sqrt(declared_um**2 + np.nan_to_num(gauges_um) ** 2)
@@ -151,13 +160,32 @@ def _noise_floor(
         if (scatter.by_axis_um > 0).all():
             return _from_repeats(scatter, expected_um if is_declared else None, criteria, units)
     no_repeats = _why_no_repeats(scatter, criteria)
+    estimate = from_differences(residual_um[use], tuple(order[use] for order in orders), digit_um, no_repeats)
     if is_declared:
+        if remark := _too_large(estimate, expected_um, criteria, units):
+            how = f"an estimate, from differences of neighbouring rows: {no_repeats}, and the declared noise is larger"
+            return replace(estimate, how=how, contradiction=remark)
         declared = f"the reference's {units.text(declared_um)}"
         if not np.isnan(gauges_um).any():
             declared += f" with the gauges' {units.text(gauges_um)} at the tip"
         how = f"declared: {declared}; {no_repeats}, so nothing tests it"
         return NoiseFloor(expected_um, "declared", how, float("inf"))
-    return _from_differences(residual_um[use], tuple(order[use] for order in orders), no_repeats)
+    return estimate
+
+
+def _too_large(estimate: NoiseFloor, expected_um: FloatArray, criteria: ComparisonCriteria, units: Units) -> str:
+    """Why declared noise (m,) is no floor: neighbouring rows differ by far less; "" where they do not.
+
+    F test as of repeats. What changes from row to row only adds to differences, so that nothing excuses small ones.
+    """
+    ratio = float(np.mean((estimate.by_axis_um / expected_um) ** 2))
+    below = float(fdtr(estimate.dof, criteria.declared_dof * len(expected_um), ratio))
+    if below >= criteria.contradiction_p_value / 2 or np.sqrt(ratio) > 1 / criteria.declared_ratio:
+        return ""
+    return (
+        f"neighbouring rows scatter by {units.text(estimate.by_axis_um)}, and {units.text(expected_um)} is declared: "
+        f"check `{sigma_key(units.unit)}`; what it holds beside noise, these rows do not show"
+    )
 
 
 def _why_no_repeats(scatter: Scatter | None, criteria: ComparisonCriteria) -> str:
@@ -170,7 +198,7 @@ def _why_no_repeats(scatter: Scatter | None, criteria: ComparisonCriteria) -> st
 
 
 def _from_repeats(
-    scatter: Scatter, expected_um: FloatArray | None, criteria: ComparisonCriteria, units: _Units
+    scatter: Scatter, expected_um: FloatArray | None, criteria: ComparisonCriteria, units: Units
 ) -> NoiseFloor:
     """The repeats, pooled with a declaration (m,) that they do not contradict, weighted by degrees of freedom.
 
@@ -207,7 +235,9 @@ def _contradiction(factor: float, limit: float, key: str) -> str:
     return ""
 
 
-def _from_differences(residual_um: FloatArray, orders: tuple[FloatArray, ...], no_repeats: str) -> NoiseFloor:
+def from_differences(
+    residual_um: FloatArray, orders: tuple[FloatArray, ...], digit_um: FloatArray, no_repeats: str
+) -> NoiseFloor:
     """From differences of rows that are neighbours in time, place or temperature, in the order in which they differ
     least.
 
@@ -223,4 +253,6 @@ def _from_differences(residual_um: FloatArray, orders: tuple[FloatArray, ...], n
             sigma_um = np.where(sigma_um > 0, sigma_um, np.sqrt(np.mean(steps_um**2, axis=0)))
             smallest_um = np.minimum(smallest_um, sigma_um)
     how = f"an estimate, from differences of neighbouring rows: {no_repeats} and no uncertainty is declared"
-    return NoiseFloor(smallest_um, "estimate", how, SCALE_EFFICIENCY * residual_um.size / DIFFERENCE_VARIANCE)
+    return NoiseFloor(
+        np.maximum(smallest_um, digit_um), "estimate", how, SCALE_EFFICIENCY * residual_um.size / DIFFERENCE_VARIANCE
+    )

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from compd.arrays import BoolArray, FloatArray
-from compd.columns import is_sensitivity
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.comparison import NO_QUANTITY, Comparison
 from compd.comparison.contributions import contributions
@@ -18,6 +17,7 @@ from compd.comparison.nuisance import FittedAlong, fit_along
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import Uncertainty, first_order_uncertainty, gauge_noise
 from compd.comparison.residual_trends import find_trends
+from compd.comparison.white_residual import row_orders
 from compd.display_unit import MM_PER_RAD
 from compd.errors import Problem, RecordingError
 from compd.model import GaugeNoise, link_residuals
@@ -58,7 +58,7 @@ def compare(
         _declared_um(aligned),
         np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0)),
         _last_digit_um(aligned),
-        _orders(aligned),
+        tuple(row_orders(aligned).values()),
         criteria,
         aligned.unit,
         angles=3 if aligned.with_attitude else 0,
@@ -180,10 +180,3 @@ def _declared_um(aligned: AlignedRecording) -> FloatArray:
     if aligned.with_attitude and recording.reference is not None:
         return np.append(declared_um, np.full(3, recording.reference.sigma_urad))
     return declared_um
-
-
-def _orders(aligned: AlignedRecording) -> tuple[FloatArray, ...]:
-    """Quantities (N,) in whose order rows are neighbours: time, place, everything measured."""
-    places = [column for column in aligned.rows.tip_M_mm.T if np.isfinite(column).any()]
-    measured = [values for name, values in aligned.recording.quantities.items() if not is_sensitivity(name)]
-    return (aligned.recording.time_s, *places, *measured)

@@ -8,7 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.comparison import AlignedRecording, Comparison, compare, fit, initial_effect, thinned
+from compd.comparison import (
+    AlignedRecording,
+    Comparison,
+    compare,
+    counted_by_neighbours,
+    fit,
+    initial_effect,
+    thinned,
+)
 from compd.diagnosis import stages
 from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidate_result import candidate_results, explained_fraction, why_nothing_else
@@ -132,6 +140,10 @@ def explain_residual(
     pool = candidate_pool(before, effects, criteria.candidates)
     problem = build_problem(before, pool, criteria)
     explanation = explain(problem, progress)
+    if not explanation.members and (counted := counted_by_neighbours(before)) is not None:
+        before = counted
+        problem = build_problem(before, pool, criteria)
+        explanation = explain(problem, progress)
     # which rows are gross, and what explains the others, depend on one another: both are determined twice
     members = [explanation.losses.candidates[k] for k in explanation.members]
     weights = explanation.problem.weigh_beside(members)

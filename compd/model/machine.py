@@ -72,17 +72,17 @@ class MachineModel:
     constants: MachineConstants | None = None
     frame_drift_mm: float = 0.0
 
-    @property
+    @cached_property
     def links(self) -> int:
         """Number of links, 3 to 6, which knows the number of scales."""
         return LinkCount(self.platform_joints_P_mm.shape[0], self.scales)
 
-    @property
+    @cached_property
     def scales(self) -> int:
         """Number of actuators, each with the place of a scale."""
         return len(self.actuators.kinds)
 
-    @property
+    @cached_property
     def attitude_is_free(self) -> bool:
         """Whether a target has an attitude of its own; a tripod's follows from its tip."""
         return bool(self.actuators.fixed[3:].any())

@@ -21,6 +21,11 @@ from compd.units import UNIT_KINDS, unit_of
 Kind: TypeAlias = Literal["workspace", "place", "angle", "load", "flow", "other"]
 
 STAYED_THE_SAME = "stayed the same"
+OWN_PREDICTION = "goes with the model's own prediction, and the reference is constant: the residual is its mirror image"
+# A coordinate of which the reference scatters by less, as a share of the prediction's scatter, has a constant one.
+CONSTANT_SHARE = 0.3
+# Of the correlation with the prediction, from which on a column is a copy of it.
+COPY_CORRELATION = 0.99
 # Smaller changes, as a share of the largest value, are rounding.
 MIN_CHANGE = 1e-9
 # A middle nearer to zero than this share of the covariate's range is zero, and it is rounded to half of that.
@@ -81,9 +86,10 @@ def search_covariates(aligned: AlignedRecording, rows: BoolArray) -> list[Search
         if name not in reasons
     ]
     tip: Kind = "place" if aligned.model is None else "workspace"
+    mirrored = _mirrored_predictions(aligned)
     for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True):
         values = column[rows]
-        if np.isfinite(values).all() and _changes(values) and not _is_among(values, found):
+        if np.isfinite(values).all() and _changes(values) and not _is_among(values, found) | _is_copy(column, mirrored):
             found.append(SearchCovariate(f"tip_{axis}_mm", tip, values))
     return found
 
@@ -91,6 +97,7 @@ def search_covariates(aligned: AlignedRecording, rows: BoolArray) -> list[Search
 def untried_quantities(aligned: AlignedRecording) -> dict[str, str]:
     """The measured quantities that are not searched, with the reason in words."""
     usable = aligned.usable.mask
+    mirrored = _mirrored_predictions(aligned)
     reasons: dict[str, str] = {}
     for name, column in aligned.gaps_filled.rows.quantities.items():
         known = column[usable & np.isfinite(column)]
@@ -101,6 +108,8 @@ def untried_quantities(aligned: AlignedRecording) -> dict[str, str]:
             reasons[name] = f"empty in {100 * empty:.0f} % of the rows"
         elif not _changes(known):
             reasons[name] = STAYED_THE_SAME
+        elif _is_copy(column, mirrored):
+            reasons[name] = OWN_PREDICTION
     return reasons
 
 
@@ -130,6 +139,25 @@ def round_within(value: float, tolerance: float) -> float:
 
 def _changes(values: FloatArray) -> bool:
     return len(values) > 0 and float(np.ptp(values)) > MIN_CHANGE * max(1.0, float(np.abs(values).max()))
+
+
+def _mirrored_predictions(aligned: AlignedRecording) -> list[FloatArray]:
+    """(N,) the prediction of each coordinate of which the reference is constant, as a straight edge's is.
+
+    There the residual is the prediction with its sign reversed: whatever goes with that explains it, and says nothing.
+    """
+    predicted_mm, usable = aligned.predicted_mm({}), aligned.usable.mask
+    scatter_mm = [np.nanstd(values[usable], axis=0) for values in (aligned.measured_mm, predicted_mm)]
+    return [predicted_mm[:, k] for k in np.flatnonzero(scatter_mm[0] < CONSTANT_SHARE * scatter_mm[1])]
+
+
+def _is_copy(column: FloatArray, predictions: list[FloatArray]) -> bool:
+    """Whether a column (N,) goes with one of some predictions (N,)."""
+    for prediction in predictions:
+        known = np.isfinite(column) & np.isfinite(prediction)
+        if _changes(column[known]) and abs(np.corrcoef(column[known], prediction[known])[0, 1]) > COPY_CORRELATION:
+            return True
+    return False
 
 
 def _is_among(values: FloatArray, covariates: list[SearchCovariate]) -> bool:

@@ -12,7 +12,7 @@ from compd.diagnosis.candidates.candidates import Candidate, periodic_candidates
 from compd.diagnosis.candidates.changes import ChangeCandidate, change_candidates, moments_between_s, moments_s
 from compd.diagnosis.candidates.refined_constants import refined_variants
 from compd.diagnosis.search.empirical_search import EmpiricalFit, EmpiricalSearch, explained_squares
-from compd.diagnosis.search.forward_search import extend, forward_search
+from compd.diagnosis.search.forward_search import extend, forward_search, right_alone
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.significance import OrthogonalComplement
 from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
@@ -146,7 +146,7 @@ def _search_all(losses: SubsetLosses, start: tuple[int, ...]) -> Subset:
     effects = [k for k, candidate in enumerate(losses.candidates) if candidate.kind in ("effect", "constant")]
     for begin in dict.fromkeys([extend(losses, among=effects).members, ()]):
         extend(losses, begin)
-    return forward_search(losses, start)
+    return right_alone(losses, forward_search(losses, start))
 
 
 def _search_library(problem: DiagnosisProblem) -> tuple[DiagnosisProblem, SubsetLosses, Subset]:

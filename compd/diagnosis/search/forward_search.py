@@ -74,6 +74,26 @@ def best_acceptable(losses: SubsetLosses) -> Subset:
     )
 
 
+def right_alone(losses: SubsetLosses, subset: Subset) -> Subset:
+    """The set with its effects exchanged where, without its descriptions, as many other effects leave less.
+
+    A description of much of the error lets an effect look needed that alone is worse than another. The descriptions are
+    sought anew beside those that are exchanged.
+    """
+    named = tuple(k for k in subset.members if losses.candidates[k].kind in ("effect", "constant"))
+    if not losses.described(subset.members) or not any(losses.candidates[k].kind == "effect" for k in named):
+        return subset
+    effects = [k for k, candidate in enumerate(losses.candidates) if candidate.kind in ("effect", "constant")]
+    alone = Subset(named, losses.loss(named))
+    other = _exchanged(losses, alone, effects)
+    gain, std = losses.gain(other.members, alone.members) if other.members != alone.members else (0.0, 0.0)
+    better = losses.score(other) < losses.score(alone) - losses.criteria.effect_price
+    if not better or gain < losses.criteria.least_sigmas * std or not losses.is_plausible(other.members):
+        return subset
+    described = extend(losses, other.members, losses.described(range(len(losses.candidates))))
+    return _standing_alone(losses, _pruned(losses, described))
+
+
 def _standing_alone(losses: SubsetLosses, subset: Subset) -> Subset:
     """The set without the effects that are worth their price only beside a description: these are not named."""
     unseen = True
@@ -127,7 +147,8 @@ def _proven(losses: SubsetLosses, subset: Subset) -> Subset:
             sets = {tuple(sorted((*rest, k))): k for k in substitutes if losses.name(k) not in names}
             others = [(worth(sets[other.members], other.cv_loss), other) for other in losses.evaluate(sets)]
             best_worth, best = min(others, key=lambda pair: pair[0], default=(float("inf"), subset))
-            if best_worth >= worth(member, subset.cv_loss) or not losses.is_plausible(best.members):
+            least = losses.criteria.number_price  # a twin differs by the ridge of the range
+            if best_worth >= worth(member, subset.cv_loss) - least or not losses.is_plausible(best.members):
                 continue
             gain, std = losses.gain(best.members, subset.members)
             if gain >= losses.criteria.least_sigmas * std:

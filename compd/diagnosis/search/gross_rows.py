@@ -39,6 +39,7 @@ def weigh_rows(
     noise: float,
     criteria: Criteria,
     huber: float = ComparisonCriteria.huber_sigmas,
+    least: FloatArray | float = 0.0,
 ) -> RowWeights:
     """Weigh rows by what a robust fit of some columns and a constant leaves of them.
 
@@ -48,6 +49,8 @@ def weigh_rows(
     noise : standard deviation of the noise, 1 of a whitened residual; 0 where it is not known. A row that another one
         of its visit confirms within 5 sqrt(2) of it is not gross: the machine really was there.
     huber : of the robust fit, as of `huber_weights`.
+    least : (m,) below which no robust standard deviation is taken: where most rows are alike to the last digit, a
+        difference of one digit is not gross.
 
     With d the rms over the coordinates of a row's residual in robust standard deviations, its weight is
     min(1, 2 / d) (Huber, Robust Statistics (1981), chapter 7), over the mean of min(d^2, 2 d) for normal noise.
@@ -63,12 +66,12 @@ def weigh_rows(
         ridge=criteria.gross.ridge,
         exponent=criteria.gross.exponent,
         rounds=ROUNDS,
-        scale=trimmed_scale,
+        scale=lambda rest: np.maximum(trimmed_scale(rest), least),
         huber=huber,
     )
     left = residual - G @ theta
     judged: BoolArray = np.asarray(np.isfinite(left).all(axis=1))
-    scale = np.maximum(trimmed_scale(left[known]), MIN_SIGMA)
+    scale = np.maximum(trimmed_scale(left[known]), np.maximum(least, MIN_SIGMA))
     distance = np.where(judged[:, None], np.abs(left) / scale, 0.0)
     far = (distance > criteria.gross_sigmas).any(axis=1)
     gross = far & ~_confirmed(left, judged, visit, criteria.gross_sigmas * np.sqrt(2.0) * (noise or scale))

@@ -143,10 +143,7 @@ class DiagnosisProblem:
     def weigh_beside(self, candidates: Sequence[Candidate]) -> RowWeights:
         """What each row counts beside some candidates alone."""
         columns = [self.nuisance, *(candidate.columns_um / self.sigma_um[:, None] for candidate in candidates)]
-        visit, noise = self.aligned.recording.visit, 1.0 if self.floor_known else 0.0
-        return weigh_rows(
-            columns, self.residual, self.known, visit, noise, self.criteria, self.aligned.criteria.huber_sigmas
-        )
+        return _weights(self.comparison, columns, self.residual, self.known, self.sigma_um, self.criteria)
 
 
 def build_problem(
@@ -173,10 +170,7 @@ def build_problem(
     nuisance = fitted_along_um / sigma_um[:, None]
     if weights is None:
         everything = [nuisance, *_everything(aligned, candidates, sigma_um, known)]
-        noise = 1.0 if comparison.floor.known else 0.0
-        weights = weigh_rows(
-            everything, residual, known, aligned.recording.visit, noise, criteria, aligned.criteria.huber_sigmas
-        )
+        weights = _weights(comparison, everything, residual, known, sigma_um, criteria)
     rows = known & ~weights.gross
     root = np.sqrt(weights.weight[rows])
     data = RegressionData(
@@ -199,6 +193,28 @@ def build_problem(
         residual=residual,
         nuisance=nuisance,
         data=data,
+    )
+
+
+def _weights(
+    comparison: Comparison,
+    columns: Sequence[FloatArray],
+    residual: FloatArray,
+    known: BoolArray,
+    sigma_um: FloatArray,
+    criteria: Criteria,
+) -> RowWeights:
+    """What each row counts beside whitened columns."""
+    aligned, floor = comparison.aligned, comparison.floor
+    return weigh_rows(
+        columns,
+        residual,
+        known,
+        aligned.recording.visit,
+        1.0 if floor.known else 0.0,
+        criteria,
+        aligned.criteria.huber_sigmas,
+        floor.least_um / sigma_um,
     )
 
 

@@ -285,9 +285,11 @@ def _reported(
 ) -> tuple[State, str]:
     """State and reason of a valid setpoint: of what concerns it the worst state, and all reasons."""
     beyond = f"effects stay at the edge of their range: {usable.beyond.text}" if usable.beyond else ""
+    reason = "; ".join(filter(None, (usable.reason, scales_reason, limited.reason, beyond)))
+    if limited.state is usable.state is scales_state and not beyond:
+        return scales_state, reason
     at_edge = State.CLAMPED if beyond else State.OK
-    state = max(limited.state, usable.state, scales_state, at_edge, key=lambda state: state.rank)
-    return state, "; ".join(filter(None, (usable.reason, scales_reason, limited.reason, beyond)))
+    return max(limited.state, usable.state, scales_state, at_edge, key=lambda state: state.rank), reason
 
 
 def _refused_skew(snapshot: Snapshot, skew_s: float, target: Target | None, settings: CycleSettings) -> _Outcome:

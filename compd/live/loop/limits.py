@@ -45,6 +45,11 @@ def limit_correction(
     wanted = wanted_mm.tolist()
     previous = previous_mm.tolist()
     largest, step = limits.correction_mm, limits.slew_mm_per_s * period_s
+    for value, before in zip(wanted, previous, strict=True):
+        if not (-largest <= value <= largest and abs(value - before) <= step + _ROUNDING_MM):
+            break
+    else:  # nearly always
+        return LimitedCorrection(wanted_mm, State.OK, "")
     if not all(map(math.isfinite, wanted)):
         return LimitedCorrection(
             previous_mm, State.REFUSED, f"{_first_not_finite(wanted, names)}, refused; the last one is kept"
@@ -58,11 +63,9 @@ def limit_correction(
         allowed[i] = previous[i] + math.copysign(step, allowed[i] - previous[i])
     if beyond:
         return LimitedCorrection(np.array(allowed), State.CLAMPED, _beyond(beyond, wanted, largest, "clamped", names))
-    if late:
-        return LimitedCorrection(
-            np.array(allowed), State.SLEWING, _slewing(late[0], wanted, allowed, limits.slew_mm_per_s, names)
-        )
-    return LimitedCorrection(wanted_mm, State.OK, "")
+    return LimitedCorrection(
+        np.array(allowed), State.SLEWING, _slewing(late[0], wanted, allowed, limits.slew_mm_per_s, names)
+    )
 
 
 # Distance, mm, at which the rotation moves a point as far as the tip goes, where the limits do not say.

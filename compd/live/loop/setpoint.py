@@ -176,9 +176,12 @@ class Setpoint(NamedTuple):
         ]
         if self.tool_on_plate:
             vectors.append(values.tip_P_mm)
+        by_cause_mm = contributions.by_cause_mm
+        vectors.append(by_cause_mm.ravel())
         # rounding one long array costs as much as rounding one of three elements
         lengths = _rounded(np.concatenate(vectors), _DECIMALS_MM, moved_mm)
-        n, links = len(values.correction_mm), len(values.link_length_mm)
+        n, links, width = len(values.correction_mm), len(values.link_length_mm), by_cause_mm.shape[1]
+        sources_at = len(lengths) - by_cause_mm.size
         message: dict[str, Any] = {
             "tip_M_mm": lengths[:3],
             "tip_B0_mm": lengths[3:6],
@@ -188,12 +191,13 @@ class Setpoint(NamedTuple):
                 "displacement_M_mm": lengths[9:12],
                 "rotation_M_rad": _rounded(frame.rotation_M_rad, _DECIMALS_RAD, moved_mm),
             },
-            "sources_mm": dict(
-                zip(contributions.causes, _rounded(contributions.by_cause_mm, _DECIMALS_MM, moved_mm), strict=True)
-            ),
+            "sources_mm": {
+                cause: lengths[sources_at + k * width : sources_at + (k + 1) * width]
+                for k, cause in enumerate(contributions.causes)
+            },
         }
         if self.tool_on_plate:
-            message["tip_P_mm"] = lengths[12 + links + 2 * n :]
+            message["tip_P_mm"] = lengths[12 + links + 2 * n : sources_at]
         if values.rotation_M_rad is not None or values.pose_correction is not None:
             message |= _json_pose(values, moved_mm)
         u_tip_um = self.u_tip_um
