@@ -11,6 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from compd.release import __version__
 from docs.pictures import reliability as reliability_picture
+from tests.scoreboard.commit import commits_text
 from tests.scoreboard.families import FamilyScore, family_scores
 from tests.scoreboard.measures import measures
 from tests.scoreboard.reliability import UNSTATED, reliability
@@ -53,7 +54,7 @@ def write_page(path: Path, results: Sequence[Result], campaigns: Path) -> None:
     found = reliability(results)
     environment = Environment(loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined)
     page = environment.get_template("page.html").render(
-        title=f"compd {__version__}, {len(results)} cases.",
+        title=f"compd {__version__}, commit {commits_text(results)}, {len(results)} cases.",
         families=[_row(scores, campaigns) for scores in family_scores(results)],
         measures=measures(results),
         reliability=found,

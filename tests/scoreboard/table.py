@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
 from tests.scoreboard import reliability
+from tests.scoreboard.commit import commits_text
 from tests.scoreboard.families import FamilyScore, family_scores
 from tests.scoreboard.measures import floors, measures, named_first
 from tests.scoreboard.scoring import Result
@@ -15,6 +16,7 @@ def report(results: Sequence[Result]) -> str:
     """All tables of these results."""
     families = list(family_scores(results))
     tables = (
+        [f"{len(results)} cases, commit {commits_text(results)}."],
         _families(families),
         _measures(results),
         reliability.lines(reliability.reliability(results)),

@@ -14,6 +14,7 @@ from compd.diagnosis import Criteria, Diagnosis, diagnose
 from compd.errors import CompdError
 from compd.model.effects import Effect, FittedEffect
 from compd.model.library import load_effects, load_library
+from tests.scoreboard.commit import commit
 
 ANSWER = "answer.json"
 # The family for which it is computed what the true effects, fitted, leave on the other recording: a bound, set by the
@@ -44,6 +45,7 @@ def run(directory: Path, criteria: Criteria = Criteria()) -> dict[str, Any]:
         "family": answer["family"],
         "directory": directory.name,
         "verdict": diagnosis.as_json(),
+        "commit": commit(),
         "took_s": round(took_s, 3),
         "other_floor_ratio": _floor_ratio(other, diagnosis.after.fitted),
         "true_floor_ratio": _floor_ratio(other, true_effects) if bounded else None,
