@@ -40,7 +40,7 @@ class Expectation:
     """Attributes
     ----------
     verdicts : the words that are right.
-    groups : one effect of each has to be named.
+    groups : one effect of each has to be named, or one covariate to be followed.
     may_name : effects that may be named besides.
     constant : ids of effects that are to be reported as a constant, each as a step or as what a constant may come from.
     constant_or : likewise, one of each group.

@@ -73,7 +73,8 @@ def score(result: Result) -> Score:
     expected = Expectation.from_json(result["expected"])
     verdict = result["verdict"]
     named, constant, possible = names(result), constant_effects(result), rivals(result)
-    told = {*named, *constant, *(possible if expected.or_rival else ())}
+    # a group may have a covariate as well, where a description says what a cause would
+    told = {*named, *constant, *_followed(result), *(possible if expected.or_rival else ())}
     absent = [group for group in expected.groups if not told & set(group)]
     hidden = [group for group in absent if not possible & set(group)]
     missing = [f"not named: {' or '.join(group)}" for group in absent]
@@ -135,10 +136,15 @@ def _no_constant(result: Result, expected: Expectation) -> list[tuple[str, ...]]
 
 
 def _not_followed(result: Result, expected: Expectation) -> list[str]:
-    entries = result["verdict"]["depends_on"][: expected.first or None]
-    followed = {name for entry in entries for name in (entry.get("covariate"), *entry.get("beside", ()))}
+    followed = _followed(result, expected.first)
     wrong = [f"follows {name}" for name in expected.never_follows if name in followed]
     return wrong + [f"does not say that it follows {' or '.join(g)}" for g in expected.follows if not followed & set(g)]
+
+
+def _followed(result: Result, first: int = 0) -> set[str | None]:
+    """What the rest follows, by the first findings; 0 for all."""
+    entries = result["verdict"]["depends_on"][: first or None]
+    return {name for entry in entries for name in (entry.get("covariate"), *entry.get("beside", ()))}
 
 
 def _change_missing(result: Result, expected: Expectation) -> list[str]:

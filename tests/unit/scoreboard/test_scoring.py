@@ -233,6 +233,12 @@ def test_what_is_expected_of_hard_cases():
     assert hard("zero-elsewhere", "backlash", zero_is_unknown=True).may_name == CONSTANT_CAUSES
 
 
+def test_a_description_may_stand_for_a_cause_where_the_answer_says_so():
+    drift = Expectation(NAMED, (("reference_drift", "time_s"),))
+    assert kinds(result(drift, "partial", depends_on=[TIME])) == "right"
+    assert kinds(result(drift, "partial", depends_on=[HUMIDITY])) == "missed"
+
+
 def test_gross_rows_may_be_too_many():
     at_most_one = Expectation(NAMED, gross_rows_at_most=1)
     assert score(result(at_most_one, "partial", family="real", outlier_rows=[3, 4])).missing == (
