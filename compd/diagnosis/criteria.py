@@ -126,6 +126,12 @@ class Criteria:
         reason="a choice: ranges are from handbooks, and round, and an effect of nearly the right form misses its "
         "number by as much",
     )
+    bounded_price: float = threshold(
+        0.06,
+        unit=_LOG,
+        meaning="parameters outside their ranges are plausible where others within leave so little more",
+        reason="half an effect's price: parameters that nearly cancel are known only in their sum",
+    )
     p_value: float = threshold(
         0.05,
         unit="probability",
@@ -137,6 +143,12 @@ class Criteria:
         unit="share of a candidate's sum of squares",
         meaning="a split in which one fold holds more of what a candidate does cannot test it",
         reason="a choice: what is left in the other folds determines no parameter",
+    )
+    swing_share: float = threshold(
+        0.3,
+        unit="share of a temperature's range",
+        meaning="by so much a temperature has to turn to count as heated or cooled again",
+        reason="a choice: less is the control of a heater, or a draught",
     )
     disturbance: float = threshold(
         0.28,

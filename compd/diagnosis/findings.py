@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from compd.model.effects import Effect, FittedEffect, Parameter
@@ -321,6 +321,32 @@ class ConstantFinding:
             "effects": list(self.effects),
             "separated_by": self.separated_by,
         }
+
+
+@dataclass(frozen=True)
+class UnknownStates:
+    """A lag that was out of equilibrium when sessions began: its states there are fitted along, in every comparison.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    numbers : int
+        How many states are fitted.
+    before_um : float
+        Error on rows that were left out with neither the states nor an effect, um per coordinate.
+    after_um : float
+        The same with the states.
+    """
+
+    effect: str
+    numbers: int
+    before_um: float
+    after_um: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys of the verdict's `start`."""
+        return asdict(self)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from compd.comparison import AlignedRecording, Comparison, compare
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.summary import summary
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,16 @@ class Holdout:
             "final_rms_um": self.after.rms_um,
             "final_floor_ratio": self.after.floor_ratio,
         }
+
+
+def confirmed(diagnosis: Diagnosis, holdouts: Sequence[Holdout]) -> Diagnosis:
+    """The diagnosis, identified where it was likely and what it found brings a sealed recording down to its noise."""
+    if diagnosis.verdict != "likely" or not any(
+        holdout.after.floor.known and holdout.after.at_floor for holdout in holdouts
+    ):
+        return diagnosis
+    identified = replace(diagnosis, verdict="identified")
+    return replace(identified, summary=summary(identified))
 
 
 def evaluate_holdout(diagnosis: Diagnosis, aligned: AlignedRecording) -> Holdout:

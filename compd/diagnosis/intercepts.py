@@ -64,6 +64,5 @@ def _may_contain(losses: SubsetLosses, member: int, intercept: int) -> bool:
 def _is_worth(losses: SubsetLosses, members: tuple[int, ...], new: int) -> bool:
     """Whether a candidate beside some members gains its price, and more than may be chance."""
     with_it = (*members, new)
-    gain, std = losses.gain(with_it, members)
     worth = losses.log_loss(losses.loss(members)) - losses.log_loss(losses.loss(with_it))
-    return worth >= losses.price(new) and gain >= losses.criteria.least_sigmas * std
+    return worth >= losses.price(new) and losses.is_sure(with_it, members)

@@ -25,7 +25,14 @@ from compd.diagnosis.candidates.plausibility import estimate_parameters
 from compd.diagnosis.candidates.proxies import proxy_candidates
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.empirical_findings import describe_remainder
-from compd.diagnosis.findings import CandidateResult, ConstantFinding, DiagnosisStep, Rival, UntestedEffect
+from compd.diagnosis.findings import (
+    CandidateResult,
+    ConstantFinding,
+    DiagnosisStep,
+    Rival,
+    UnknownStates,
+    UntestedEffect,
+)
 from compd.diagnosis.implausible_effect import implausible_effect
 from compd.diagnosis.intercepts import beside, with_intercepts
 from compd.diagnosis.proposed_measurement import propose_measurement
@@ -36,6 +43,7 @@ from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
 from compd.diagnosis.search.rivals import find_rivals
 from compd.diagnosis.search.significance import Family, OrthogonalComplement, p_values
 from compd.diagnosis.search.subset_losses import SubsetLosses
+from compd.diagnosis.thermal_evidence import seen_once
 from compd.diagnosis.unmodelled import with_disturbances
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.diagnosis.words.summary import summary
@@ -190,6 +198,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         gross=gross_rows(problem.gross, aligned.recording.row, criteria.gross),
         untested=_untested(problem, explanation, steps),
         asked=asked,
+        start=_states(problem, explanation),
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
         criteria=criteria,
@@ -199,6 +208,13 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         next_measurement=propose_measurement(problem, explanation, diagnosis),
         summary=summary(diagnosis),
     )
+
+
+def _states(problem: DiagnosisProblem, explanation: Explanation) -> UnknownStates | None:
+    if (start := explanation.start) is None:
+        return None
+    before_um, after_um = (problem.unit_um * float(np.sqrt(loss)) for loss in (start.before, start.after))
+    return UnknownStates(start.lag.effect.id, problem.states, before_um, after_um)
 
 
 def _verdict(
@@ -217,7 +233,12 @@ def _verdict(
     if not found and problem.may_be_noise(explanation.reduced_chi_squared - unnamed):
         if not steps:
             return "adequate"
-        return "ambiguous" if any(step.rivals for step in steps) else "identified"
+        if any(step.rivals for step in steps):
+            return "ambiguous"
+        effects = [step.effect for step in steps]
+        return (
+            "likely" if seen_once(problem.aligned, problem.comparison.used, effects, problem.criteria) else "identified"
+        )
     if steps:
         return "partial"
     if not found and (not problem.floor_known or all(c.status == "not_testable" for c in candidates)):

@@ -18,10 +18,10 @@ class SearchCriteria:
         reason="effects of a fiftieth of the noise still show in them",
     )
     max_members: int = threshold(
-        7,
+        9,
         unit="effects and descriptions",
         meaning="a set has so many members at most",
-        reason="a choice: more causes at once no recording can prove",
+        reason="a choice: it bounds the time; the price of each ends a search before",
     )
     further_members: int = threshold(
         2,
@@ -90,6 +90,12 @@ class FoldCriteria:
         meaning="places nearer to each other are one; an axis along which the tip moves by less of the longest one "
         "is none of the workspace",
         reason="a choice: a target is visited again within far less",
+    )
+    confounded_share: float = threshold(
+        0.3,
+        unit="share of the variance",
+        meaning="where a place or a setting varies by less within blocks of time, each fold gets a part of every block",
+        reason="a choice: most of what is varied goes with the block then, and a block left out lies beyond the others",
     )
     max_values: int = threshold(
         12,

@@ -15,6 +15,7 @@ from compd.diagnosis.findings import (
     EmpiricalFinding,
     GrossRows,
     ImplausibleEffect,
+    UnknownStates,
     UntestedEffect,
 )
 from compd.result_tables import Columns, data_frame, html_table
@@ -23,9 +24,9 @@ from compd.text import nan_to_null
 if TYPE_CHECKING:
     import pandas as pd
 
-Verdict = Literal["adequate", "identified", "ambiguous", "partial", "unexplained", "not_testable"]
-# Version of the words and keys of `Diagnosis.as_json`: 2 has the word `partial` and the key `constant`.
-VERDICT_VERSION = 2
+Verdict = Literal["adequate", "identified", "likely", "ambiguous", "partial", "unexplained", "not_testable"]
+# Version of the words and keys of `Diagnosis.as_json`: 2 has the word `partial` and the key `constant`, 3 `likely`.
+VERDICT_VERSION = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,6 +37,8 @@ class Diagnosis:
     ----------
     verdict : str
         ``"adequate"``: nothing is missing. ``"identified"``: the effects of `steps` are what is missing.
+        ``"likely"``: they explain it, but a thermal one was seen in one warm-up only; another session, a sealed
+        recording or a second cycle of heating and cooling makes it identified.
         ``"ambiguous"``: they explain it, but the recording cannot tell at least one of them from a rival.
         ``"partial"``: they explain a part; the rest is above the noise, or the noise is not known.
         ``"unexplained"``: no effect of the library gains; `depends_on` says what the error follows.
@@ -60,6 +63,8 @@ class Diagnosis:
         Effects that cannot be tried here; first those that may be behind what was found.
     asked : ImplausibleEffect or None
         The effect that explains the error best, and only with an implausible number; None where none is asked about.
+    start : UnknownStates or None
+        What is fitted along of a lag that was out of equilibrium when sessions began; None where nothing is.
     heldout_before_um : float
         Error on rows that were left out with the model as it was, without its constant, um per coordinate.
     heldout_after_um : float
@@ -81,6 +86,7 @@ class Diagnosis:
     gross: GrossRows = field(default_factory=GrossRows)
     untested: tuple[UntestedEffect, ...] = ()
     asked: ImplausibleEffect | None = None
+    start: UnknownStates | None = None
     heldout_before_um: float = float("nan")
     heldout_after_um: float = float("nan")
     summary: str = ""
@@ -153,6 +159,7 @@ class Diagnosis:
             "heldout_after_um": self.heldout_after_um,
             "constant": None if self.constant is None else self.constant.as_json(),
             "steps": [step.as_json() for step in self.steps],
+            **({} if self.start is None else {"start": self.start.as_json()}),
             **({} if self.asked is None else {"asked": self.asked.as_json()}),
             "candidates": [candidate.as_json() for candidate in self.candidates],
             "depends_on": [finding.as_json() for finding in self.depends_on],

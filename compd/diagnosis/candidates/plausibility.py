@@ -40,6 +40,13 @@ def is_plausible(limits: tuple[float, float], theta: float, std: float, criteria
     return bool(low - below <= theta <= high + above)
 
 
+def with_slack(limits: FloatArray, criteria: Criteria) -> FloatArray:
+    """(P, 2) limits that reach to nought, wider by `range_slack`; where they end there, the sign counts."""
+    low, high = np.minimum(limits[:, 0], 0.0), np.maximum(limits[:, 1], 0.0)
+    slack = criteria.range_slack * (high - low)
+    return np.stack([np.where(low < 0, low - slack, low), np.where(high > 0, high + slack, high)], axis=1)
+
+
 def is_undetermined(limits: FloatArray, std: FloatArray) -> bool:
     """Whether no parameter (P,) of an effect has a standard error below the width of its range (P, 2)."""
     return bool((~(std < limits[:, 1] - limits[:, 0])).all())

@@ -10,6 +10,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison import AlignedRecording
+from compd.diagnosis.descriptions.search_covariates import kind_of
 from compd.diagnosis.search_criteria import FoldCriteria
 from compd.errors import Problem, RecordingError
 from compd.recording import PLACE, TIME
@@ -20,7 +21,9 @@ def row_splits(aligned: AlignedRecording, criteria: FoldCriteria = FoldCriteria(
 
     By what the sidecar's `folds:` names; without it by time, and by place where it is known:
 
-    time : sessions, or blocks of time. What is left out tests what an effect says of the weather.
+    time : sessions, or blocks of time. What is left out tests what an effect says of the weather. Where each of them
+        has a place or a setting of its own, as of a machine that is measured height by height, every one that is left
+        out lies beyond the others; then each fold has a part of every block (`_balanced`).
     place : sectors about the middle of the first two axes along which the tip moves, with equally many places each.
         They test what an effect says of the geometry. The tip is the model's prediction: x, y, z of a known machine,
         the columns `model_...` of an external one.
@@ -34,6 +37,8 @@ def row_splits(aligned: AlignedRecording, criteria: FoldCriteria = FoldCriteria(
     if not recording.sidecar.folds:
         by_place = _split_by_place(aligned, criteria)
         by_time = _split_by_time(aligned, criteria)
+        if _is_confounded(aligned, by_time, criteria):
+            by_time = _balanced(aligned, by_time, criteria)
         return (by_time,) if by_place is None else (by_time, by_place)
     splits: list[IntArray] = []
     problems: list[Problem] = []
@@ -73,6 +78,39 @@ def _split_by_time(aligned: AlignedRecording, criteria: FoldCriteria) -> IntArra
     number = _numbered(fold)
     count = int(number.max()) + 1
     return number * criteria.max_folds // count if count > criteria.max_folds else number
+
+
+def _is_confounded(aligned: AlignedRecording, fold: IntArray, criteria: FoldCriteria) -> bool:
+    """Whether a coordinate of the tip, an angle or a setting changes with the folds (N,) and hardly within them.
+
+    What warms, cools or loads the machine may change with time: what it does then is what folds of time test.
+    """
+    usable = aligned.usable.mask
+    quantities = aligned.rows.quantities
+    settings = [values for name, values in quantities.items() if kind_of(name) in ("workspace", "place", "angle")]
+    count = int(fold.max()) + 1
+    for values in (*aligned.rows.tip_M_mm.T, *settings):
+        known = usable & np.isfinite(values)
+        if known.sum() <= count or np.ptp(values[known]) == 0:
+            continue
+        of_fold, rows = fold[known], np.maximum(np.bincount(fold[known], minlength=count), 1)
+        means = np.bincount(of_fold, values[known], minlength=count) / rows
+        within = float(np.mean((values[known] - means[of_fold]) ** 2))
+        if within < criteria.confounded_share * float(np.var(values[known])):
+            return True
+    return False
+
+
+def _balanced(aligned: AlignedRecording, fold: IntArray, criteria: FoldCriteria) -> IntArray:
+    """(N,) folds that each have a part of every one of some folds (N,): the first parts, the second, and so on.
+
+    A part is a run of neighbouring rows, so that few rows have a neighbour in another fold.
+    """
+    part = np.zeros(len(fold), dtype=np.int64)
+    for k in range(int(fold.max()) + 1):
+        rows = np.flatnonzero(fold == k)
+        part[rows] = np.arange(len(rows)) * criteria.blocks // max(len(rows), 1)
+    return _numbered(aligned.recording.first_of_visit(part))
 
 
 def _split_by_values(aligned: AlignedRecording, values: FloatArray, criteria: FoldCriteria) -> IntArray:

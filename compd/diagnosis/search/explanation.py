@@ -16,7 +16,7 @@ from compd.diagnosis.search.forward_search import extend, forward_search, right_
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.significance import OrthogonalComplement
 from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
-from compd.diagnosis.search.warm_start import find_warm_start, with_states_of
+from compd.diagnosis.search.warm_start import UnknownStart, find_warm_start, with_start
 
 Progress = Callable[[str], None]
 
@@ -30,6 +30,7 @@ class Explanation:
     members : the set: effects, the one that explains most first, then the constant, then descriptions and changes.
     fits : the promising descriptions; empty where none was needed.
     fit_by_place : of the candidates that are descriptions, the term by the candidate's place.
+    start : what is unknown at the start of sessions and is in every fit; None where nothing is.
     """
 
     problem: DiagnosisProblem
@@ -37,6 +38,7 @@ class Explanation:
     members: tuple[int, ...]
     fits: tuple[EmpiricalFit, ...] = ()
     fit_by_place: Mapping[int, EmpiricalFit] = field(default_factory=dict)
+    start: UnknownStart | None = None
 
     def _of_kind(self, *kinds: str) -> tuple[int, ...]:
         return tuple(k for k in self.members if self.losses.candidates[k].kind in kinds)
@@ -91,15 +93,18 @@ class Explanation:
         return self.fit_by_place[member]
 
 
-def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
+def explain(problem: DiagnosisProblem, progress: Progress, starts: bool = True) -> Explanation:
     """Search the library alone; where that leaves more than the floor, the library together with descriptions.
 
     A set of effects and descriptions wins by the same score; a description has the higher price.
+
+    starts : whether a lag may begin out of equilibrium.
     """
     progress(stages.EFFECTS)
-    problem, library, best = _search_library(problem)
+    whole = problem
+    problem, library, best, start = _search_library(whole, starts)
     if _beats_descriptions(problem, library, best):
-        return Explanation(problem, library, _ordered(library, best.members))
+        return Explanation(problem, library, _ordered(library, best.members), start=start)
     progress(stages.COVARIATES)
     competitors = _Competitors(problem, library)
     for basis in dict.fromkeys([(), best.members]):
@@ -112,25 +117,34 @@ def explain(problem: DiagnosisProblem, progress: Progress) -> Explanation:
     if len(competitors.candidates) > len(losses.candidates):
         losses = problem.losses(competitors.candidates)
         best = _search_all(losses, best.members)
-    return Explanation(problem, losses, _ordered(losses, best.members), fits, competitors.fit_by_place)
+    if start is not None and not _has(losses, best, start):
+        return explain(whole, progress, starts=False)
+    return Explanation(problem, losses, _ordered(losses, best.members), fits, competitors.fit_by_place, start)
+
+
+def _has(losses: SubsetLosses, subset: Subset, start: UnknownStart) -> bool:
+    """Whether the lag of an unknown start is in a set: without it, nothing began out of equilibrium."""
+    return start.lag.name in [losses.name(k) for k in subset.members]
 
 
 def explain_again(problem: DiagnosisProblem, before: Explanation, progress: Progress) -> Explanation:
     """The same search on rows that are weighed anew, among the candidates that were promising before."""
-    candidates = before.losses.candidates
-    if before.problem.states:
-        problem = with_states_of(problem, [candidates[k] for k in before.members])
+    candidates, whole = before.losses.candidates, problem
+    if before.start is not None:
+        problem = with_start(problem, before.start.lag)
     losses = problem.losses(candidates)
     best = _search_all(losses, before.members)
+    if before.start is not None and not _has(losses, best, before.start):
+        return explain(whole, progress, starts=False)
     if not losses.describes and not _beats_descriptions(problem, losses, best):
-        return explain(problem, progress)
+        return explain(whole, progress)
 
     def weighed(fit: EmpiricalFit) -> EmpiricalFit:
         return replace(fit, values=problem.whiten(fit.columns_um(problem.aligned)))
 
     fit_by_place = {k: replace(fit, values=losses.values[k]) for k, fit in before.fit_by_place.items()}
     fits = tuple(weighed(fit) for fit in before.fits)
-    return Explanation(problem, losses, _ordered(losses, best.members), fits, fit_by_place)
+    return Explanation(problem, losses, _ordered(losses, best.members), fits, fit_by_place, before.start)
 
 
 def _beats_descriptions(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset) -> bool:
@@ -149,11 +163,13 @@ def _search_all(losses: SubsetLosses, start: tuple[int, ...]) -> Subset:
     return right_alone(losses, forward_search(losses, start))
 
 
-def _search_library(problem: DiagnosisProblem) -> tuple[DiagnosisProblem, SubsetLosses, Subset]:
-    """The library's best set, and the problem in which it was found: where a lag began warm, without that start."""
+def _search_library(
+    problem: DiagnosisProblem, starts: bool
+) -> tuple[DiagnosisProblem, SubsetLosses, Subset, UnknownStart | None]:
+    """The library's best set, and the problem in which it was found: where a lag began warm, with that start."""
     losses, best = _refined(problem, problem.candidates, ())
     if problem.is_at_floor(best.cv_loss):
-        return problem, losses, best
+        return problem, losses, best, None
     if best.members:
         # a period that was hidden behind something larger shows in what that leaves
         effects = {candidate.name: candidate.effect for candidate in problem.candidates if candidate.kind == "effect"}
@@ -161,14 +177,14 @@ def _search_library(problem: DiagnosisProblem) -> tuple[DiagnosisProblem, Subset
         periodic = periodic_candidates(problem.aligned, effects.values(), residual_um, problem.rows)
         if periodic:
             losses, best = _refined(problem, [*losses.candidates, *periodic], best.members)
-    warm = find_warm_start(problem, losses, best)
+    warm = find_warm_start(problem, losses, best) if starts else None
     if warm is not None:
         candidates = [*losses.candidates, *(lag for lag in (warm.lag,) if lag not in losses.candidates)]
         start = tuple(candidates.index(member) for member in warm.members)
         warm_losses, warm_best = _refined(warm.problem, candidates, start)
-        if warm.lag.name in [warm_losses.name(k) for k in warm_best.members]:
-            return warm.problem, warm_losses, warm_best
-    return problem, losses, best
+        if _has(warm_losses, warm_best, warm):
+            return warm.problem, warm_losses, warm_best, warm
+    return problem, losses, best, None
 
 
 def _refined(

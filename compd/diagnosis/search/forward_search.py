@@ -86,9 +86,8 @@ def right_alone(losses: SubsetLosses, subset: Subset) -> Subset:
     effects = [k for k, candidate in enumerate(losses.candidates) if candidate.kind in ("effect", "constant")]
     alone = Subset(named, losses.loss(named))
     other = _exchanged(losses, alone, effects)
-    gain, std = losses.gain(other.members, alone.members) if other.members != alone.members else (0.0, 0.0)
     better = losses.score(other) < losses.score(alone) - losses.criteria.effect_price
-    if not better or gain < losses.criteria.least_sigmas * std or not losses.is_plausible(other.members):
+    if not better or not losses.is_sure(other.members, alone.members) or not losses.is_plausible(other.members):
         return subset
     described = extend(losses, other.members, losses.described(range(len(losses.candidates))))
     return _standing_alone(losses, _pruned(losses, described))
@@ -173,14 +172,13 @@ def _exchanged(losses: SubsetLosses, subset: Subset, allowed: Collection[int]) -
 
 def _pruned(losses: SubsetLosses, subset: Subset) -> Subset:
     """The set without the members of which the gain is not worth their price or may be chance, the weakest first."""
-    criteria = losses.criteria
     while subset.members:
         weakest: tuple[float, Subset] | None = None
         for member in subset.members:
             rest = Subset(*_rest(losses, subset, member))
             worth = losses.log_loss(rest.cv_loss) - losses.log_loss(subset.cv_loss) - losses.price(member)
-            gain, std = losses.gain(subset.members, rest.members)
-            if (worth < 0 or gain < criteria.least_sigmas * std) and (weakest is None or worth < weakest[0]):
+            needed = worth >= 0 and losses.is_sure(subset.members, rest.members)
+            if not needed and (weakest is None or worth < weakest[0]):
                 weakest = worth, rest
         if weakest is None:
             break

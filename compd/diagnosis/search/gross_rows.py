@@ -53,7 +53,8 @@ def weigh_rows(
         difference of one digit is not gross.
 
     With d the rms over the coordinates of a row's residual in robust standard deviations, its weight is
-    min(1, 2 / d) (Huber, Robust Statistics (1981), chapter 7), over the mean of min(d^2, 2 d) for normal noise.
+    min(1, 2 / d) (Huber, Robust Statistics (1981), chapter 7), over the mean of min(d^2, 2 d) for normal noise. Rows
+    that follow one another are no chance: a run of them counts in full, since it is what the machine did.
     """
     m = residual.shape[1]
     constant = np.broadcast_to(np.eye(m), (*residual.shape, m))
@@ -77,8 +78,19 @@ def weigh_rows(
     gross = far & ~_confirmed(left, judged, visit, criteria.gross_sigmas * np.sqrt(2.0) * (noise or scale))
     size = np.sqrt(np.mean(distance**2, axis=1))
     full = criteria.full_weight_sigmas
-    weight = np.minimum(1.0, full / np.maximum(size, full)) / consistency(m, full)
+    weight = np.minimum(1.0, full / np.maximum(size, full))
+    weight[_in_runs((size > full) & known & ~gross, criteria.gross.min_in_run)] = 1.0
+    weight /= consistency(m, full)
     return RowWeights(gross, np.where(known & ~gross, weight, 0.0))
+
+
+def _in_runs(far: BoolArray, least: int) -> BoolArray:
+    """(N,) rows among `least` or more far rows (N,) without another between them."""
+    edges = np.flatnonzero(np.diff(far.astype(np.int8), prepend=0, append=0))
+    runs = np.zeros(len(far), dtype=bool)
+    for begin, end in edges.reshape(-1, 2):
+        runs[begin:end] = end - begin >= least
+    return runs
 
 
 def consistency(m: int, full: float) -> float:

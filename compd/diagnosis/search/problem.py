@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import orth
 from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
@@ -16,30 +15,10 @@ from compd.diagnosis.candidates.constant import constant_candidate, split_consta
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search.gross_rows import RowWeights, weigh_rows
-from compd.diagnosis.search.regression import RegressionData, Regressors
+from compd.diagnosis.search.regression import RegressionData, Regressors, normal_equations
 from compd.diagnosis.search.subset_losses import SubsetLosses
 from compd.statistics import filled
 from compd.units import UM_PER_MM
-
-
-class Projection:
-    """Takes out of columns what others explain, and scales the rest up for the degrees of freedom that this costs."""
-
-    def __init__(self, columns: FloatArray) -> None:
-        """columns : (R, m, Q) what is taken out."""
-        flat = columns.reshape(-1, columns.shape[2])
-        self._q = orth(flat) if flat.size else flat
-        self._scale = float(np.sqrt(len(flat) / max(len(flat) - self.count, 1)))
-
-    @property
-    def count(self) -> int:
-        """How many independent columns are taken out."""
-        return int(self._q.shape[1])
-
-    def __call__(self, values: FloatArray) -> FloatArray:
-        """The projection of (R, m, P) or (R, m)."""
-        flat = values.reshape(len(self._q), -1)
-        return np.asarray(self._scale * (flat - self._q @ (self._q.T @ flat)).reshape(values.shape))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +36,7 @@ class DiagnosisProblem:
     root_weight : (R,) root of each row's weight, by which residual and columns are multiplied.
     residual : (N, m) whitened, nan where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
     data : residual and nuisance columns on the rows that count, weighted, and how these are divided.
-    start : what is projected out of these and of all candidates; None for nothing.
+    states : how many of the nuisance columns are unknown states at the start of sessions.
     """
 
     comparison: Comparison
@@ -73,7 +52,7 @@ class DiagnosisProblem:
     residual: FloatArray
     nuisance: FloatArray
     data: RegressionData
-    start: Projection | None = None
+    states: int = 0
 
     @property
     def aligned(self) -> AlignedRecording:
@@ -105,26 +84,30 @@ class DiagnosisProblem:
 
     def whiten(self, columns_um: FloatArray) -> FloatArray:
         """(R, m, P) columns (N, m, P) in um, whitened and weighted, on the rows that count."""
-        values = np.asarray(columns_um[self.rows] / self.sigma_um[:, None] * self.root_weight[:, None, None])
-        return values if self.start is None else self.start(values)
+        return np.asarray(columns_um[self.rows] / self.sigma_um[:, None] * self.root_weight[:, None, None])
 
-    @property
-    def states(self) -> int:
-        """How many unknown numbers were projected out."""
-        return 0 if self.start is None else self.start.count
+    def on_splits_that_test(self, columns_um: FloatArray) -> DiagnosisProblem | None:
+        """The problem with those of its splits that can test each of some columns (N, m, Q) in um; None without any."""
+        columns = self.whiten(columns_um)
+        own = [Regressors(columns[:, :, k : k + 1], np.full(1, np.inf)) for k in range(columns.shape[2])]
+        equations, indices = normal_equations(self.data, own)
+        share = self.criteria.most_in_one_fold
+        testable = np.all([equations.testable_splits(index, share) for index in indices], axis=0)
+        splits = tuple(fold for fold, tests in zip(self.data.splits, testable, strict=True) if tests)
+        return replace(self, data=replace(self.data, splits=splits)) if splits else None
 
-    def without(self, columns_um: FloatArray) -> DiagnosisProblem:
-        """The problem with what some columns (N, m, Q) in um can explain projected out of everything."""
-        columns = columns_um / self.sigma_um[:, None]
-        start = Projection(self.whiten(columns_um))
+    def with_states(self, columns_um: FloatArray) -> DiagnosisProblem:
+        """The problem with columns (N, m, Q) in um of unknown states in every fit."""
+        values, count = self.whiten(columns_um), columns_um.shape[2]
         nuisance = self.data.nuisance
+        more = Regressors(
+            np.concatenate([nuisance.values, values], axis=2), np.append(nuisance.largest, np.full(count, np.inf))
+        )
         return replace(
             self,
-            nuisance=np.concatenate([self.nuisance, columns], axis=2),
-            data=replace(
-                self.data, y=start(self.data.y), nuisance=Regressors(start(nuisance.values), nuisance.largest)
-            ),
-            start=start,
+            nuisance=np.concatenate([self.nuisance, columns_um / self.sigma_um[:, None]], axis=2),
+            data=replace(self.data, nuisance=more),
+            states=self.states + count,
         )
 
     def residual_beside_um(self, losses: SubsetLosses, members: Sequence[int]) -> FloatArray:

@@ -11,11 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.statistics import ridge_inverse, solve_ridge
+from compd.statistics import DIAGONAL_GUARD, ridge_inverse, solve_ridge
 
 # Ridge of a parameter without a plausible range, as a share of its column's sum of squares: conditioning alone.
 MIN_RIDGE = 1e-9
@@ -85,6 +87,17 @@ class RegressionData:
         return np.stack(sums)
 
 
+class _Scaled(NamedTuple):
+    """Normal equations of columns of length 1.
+
+    gram : (F, C, C).  score : (F, C).  held : of each split the sum over its folds (C, C), with the ridge.
+    """
+
+    gram: FloatArray
+    score: FloatArray
+    held: list[FloatArray]
+
+
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
     """Normal equations of C columns on each of F folds: all that least squares on any of the columns needs.
@@ -148,17 +161,29 @@ class NormalEquations:
 
     def fold_losses(self, index: IntArray) -> FloatArray:
         """(S, F) sum of squares left in each fold by parameters learned from the split's other folds; index (S, p)."""
-        gram = self.gram[:, index[:, :, None], index[:, None, :]].swapaxes(0, 1)  # (S, F, p, p)
-        score = self.score[:, index].swapaxes(0, 1)
-        losses = np.empty(gram.shape[:2])
+        scaled = self._scaled
+        gram = scaled.gram[:, index[:, :, None], index[:, None, :]]  # (F, S, p, p)
+        score = scaled.score[:, index]
+        losses = np.empty((len(index), len(gram)))
         for k in range(len(self.data.splits)):
             folds = self.data.split_of_fold == k
-            normal = gram[:, folds].sum(axis=1, keepdims=True) - gram[:, folds]
-            right = score[:, folds].sum(axis=1, keepdims=True) - score[:, folds]
-            theta = solve_ridge(normal, right, self.ridge[index][:, None])
-            left = self.data.squares[folds] - 2 * (theta * score[:, folds]).sum(axis=2)
-            losses[:, folds] = left + np.einsum("sfp,sfpq,sfq->sf", theta, gram[:, folds], theta)
+            normal = scaled.held[k][index[:, :, None], index[:, None, :]] - gram[folds]
+            right = score[folds].sum(axis=0) - score[folds]
+            theta = np.linalg.solve(normal, right[..., None])[..., 0]
+            left = self.data.squares[folds][:, None] - 2 * (theta * score[folds]).sum(axis=2)
+            left += ((gram[folds] @ theta[..., None])[..., 0] * theta).sum(axis=2)
+            losses[:, folds] = left.T
         return losses
+
+    @cached_property
+    def _scaled(self) -> _Scaled:
+        """The equations of columns of length 1, so that many small systems are solved as they are."""
+        first = self.data.split_of_fold == 0
+        norms = np.sqrt(np.einsum("fcc->c", self.gram[first]) + self.ridge)
+        gram = self.gram / (norms[:, None] * norms)
+        diagonal = np.diag(self.ridge / norms**2 + DIAGONAL_GUARD)
+        held = [gram[self.data.split_of_fold == k].sum(axis=0) + diagonal for k in range(len(self.data.splits))]
+        return _Scaled(gram, self.score / norms, held)
 
     def theta_by_fold(self, index: IntArray, split: int) -> FloatArray:
         """(folds of the split, p) parameters learned from the split's other folds."""
@@ -188,6 +213,16 @@ class NormalEquations:
         theta = covariance @ score
         left = float(self.data.squares[folds].sum()) - 2 * float(theta @ score) + float(theta @ normal @ theta)
         return theta, covariance, left / self.data.value_count
+
+    def bounded_loss(self, index: IntArray, limits: FloatArray) -> float:
+        """Mean square left by the parameters within limits (p, 2) that fit all rows best."""
+        folds = self.data.split_of_fold == 0
+        normal = self.gram[folds][:, index[:, None], index].sum(axis=0)
+        score = self.score[folds][:, index].sum(axis=0)
+        root = np.linalg.cholesky(normal + np.diag(self.ridge[index])).T
+        theta = lsq_linear(root, np.linalg.solve(root.T, score), (limits[:, 0], limits[:, 1])).x
+        left = float(self.data.squares[folds].sum()) - 2 * float(theta @ score) + float(theta @ normal @ theta)
+        return left / self.data.value_count
 
 
 def normal_equations(data: RegressionData, candidates: Sequence[Regressors]) -> tuple[NormalEquations, list[IntArray]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.diagnosis.candidates.candidates import Candidate
-from compd.diagnosis.candidates.plausibility import is_plausible, is_undetermined
+from compd.diagnosis.candidates.plausibility import is_plausible, is_undetermined, with_slack
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.search.regression import NormalEquations, RegressionData, Regressors, normal_equations
 
@@ -161,8 +161,10 @@ class SubsetLosses:
     def is_plausible(self, members: Sequence[int]) -> bool:
         """Whether every parameter of every effect is plausible, and at least one of each is determined.
 
-        A cause may be weaker than is usual: plausible ranges reach to nought.
+        A cause may be weaker than is usual: plausible ranges reach to nought. Parameters that nearly cancel may be far
+        outside together; they are plausible where parameters within the ranges leave little more.
         """
+        within = True
         for k, (theta, covariance) in zip(members, self.estimates(members), strict=True):
             candidate = self.candidates[k]
             if candidate.kind not in ("effect", "proxy", "change"):
@@ -171,11 +173,23 @@ class SubsetLosses:
             allowed = candidate.allowed(self.criteria.rough_factor)
             for (low, high), value, error in zip(allowed, theta, std, strict=True):
                 limits = (min(low, 0.0), max(high, 0.0))
-                if not is_plausible(limits, float(value), float(error), self.criteria):
-                    return False
+                within &= is_plausible(limits, float(value), float(error), self.criteria)
             if is_undetermined(candidate.limits, std):
                 return False
-        return True
+        return within or self._fits_within(members)
+
+    def _fits_within(self, members: Sequence[int]) -> bool:
+        """Whether parameters within the ranges of several effects leave hardly more than those without limits."""
+        if len(members) < 2:
+            return False
+        index = self.index(members)
+        nothing_known = np.tile([-np.inf, np.inf], (len(self._nuisance_index), 1))
+        limits = [self.candidates[k].allowed(self.criteria.rough_factor) for k in members]
+        bounded = self.equations.bounded_loss(
+            index, np.concatenate([nothing_known, *(with_slack(limit, self.criteria) for limit in limits)])
+        )
+        _, _, left = self.equations.estimate(index)
+        return self.log_loss(bounded) - self.log_loss(left) <= self.criteria.bounded_price
 
     def gain(self, members: Sequence[int], without: Sequence[int]) -> tuple[float, float]:
         """How much less a set leaves than another on rows left out, and the standard error of that; per value.
@@ -184,12 +198,36 @@ class SubsetLosses:
 
             std = sqrt(B / (B - 1) sum_b (d_b - mean d)^2),  d_b = sum of the differences in block b
         """
-        testable: BoolArray = np.asarray(self._testable[[*members, *without]].all(axis=0))
-        difference = self._row_losses(without, testable) - self._row_losses(members, testable)
-        by_block = np.bincount(self.data.block, difference)
+        more, less = self._block_losses(members, without)
+        by_block = less - more
         count = len(by_block)
         spread = float(np.sqrt(count / max(count - 1, 1) * ((by_block - by_block.mean()) ** 2).sum()))
         return float(by_block.sum()) / self.data.value_count, spread / self.data.value_count
+
+    def is_sure(self, members: Sequence[int], without: Sequence[int]) -> bool:
+        """Whether a set leaves less than another by more than may be chance: in squares, or as a share in most blocks.
+
+        Where one block holds most of the squares, as the start of a warm-up does, squares say nothing of the others.
+        The share of block b is log(L_b' / L_b) of its losses, neither below the floor, with the standard error of its
+        mean over the blocks.
+        """
+        gain, std = self.gain(members, without)
+        if gain >= self.criteria.least_sigmas * std:
+            return True
+        more, less = self._block_losses(members, without)
+        least = self._least_loss * np.bincount(self.data.block) * self.data.y.shape[1]
+        share = np.log(np.maximum(less, least) / np.maximum(more, least))
+        std = float(share.std(ddof=1)) / np.sqrt(len(share)) if len(share) > 1 else np.inf
+        return gain > 0 and float(share.mean()) >= self.criteria.least_sigmas * std
+
+    def _block_losses(self, members: Sequence[int], without: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+        """(B,) sums of squares that two sets leave in each block of rows, in the splits that test both."""
+        testable: BoolArray = np.asarray(self._testable[[*members, *without]].all(axis=0))
+        block = self.data.block
+        of_set = [
+            np.bincount(block, self._row_losses(each, testable)).astype(np.float64) for each in (members, without)
+        ]
+        return of_set[0], of_set[1]
 
     def nuisance_with(self, members: Iterable[int]) -> Regressors:
         """The nuisance columns and those of some candidates."""

@@ -1,16 +1,16 @@
 """Sessions that began out of equilibrium: a lag whose state at the start nobody knows, as a competitor.
 
-The unknown states move each session by a decaying exponential of their own. A session that is left out cannot teach its
-own start, so these columns are projected out of everything before rows are left out; their number is paid for.
+The unknown states move each session by a decaying exponential of their own, and any warm-up is much like one. They are
+a description, at its price, and are judged on rows that were left out, as everything is: in the splits that leave out a
+part of a session, since a session that is left out whole cannot teach its own start. Where they win, every set of
+candidates is judged with them and in these splits, so that none is compared with another that lacks them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
-import numpy as np
-
+from compd.arrays import FloatArray
 from compd.comparison import initial_state_columns
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.diagnosis.candidates.refined_constants import refined_variants
@@ -19,49 +19,66 @@ from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
 
 
 class UnknownStart(NamedTuple):
-    """A problem without the starts of sessions, and the lag for which they are unknown.
+    """A problem with the unknown starts of sessions, and the lag of which they are.
 
-    problem : with the states projected out.  lag : the effect with its time constant.
-    members : the lag and the other candidates that it was tried with.  score : of these, states included.
+    problem : with the states in every fit.  lag : the effect with its time constant.
+    members : the lag and the other candidates that it was tried with.
+    gain : by how much its score is less than without the states and with the lag at its best, in the same splits.
+    before, after : loss with and without the states, beside nothing else, in the same splits.
     """
 
     problem: DiagnosisProblem
     lag: Candidate
     members: tuple[Candidate, ...]
-    score: float
+    gain: float
+    before: float
+    after: float
 
 
 def find_warm_start(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset) -> UnknownStart | None:
-    """The lag that with unknown states at the start of sessions scores better than the best set; None where none does.
+    """The lag that with unknown states at the start of sessions gains their price; None where none does.
 
     Each is tried with the other members of the best set, at every time constant of its grid, then between these.
     """
     lags = [k for k, candidate in enumerate(losses.candidates) if candidate.effect.unknown_states]
     lags = [k for k in lags if losses.candidates[k].kind == "effect"]
-    if not lags:
+    trials = [trial for k in lags if (trial := _try(problem, losses, best, losses.candidates[k])) is not None]
+    if not trials:
         return None
-    first = min((_try(problem, losses, best, losses.candidates[k]) for k in lags), key=lambda trial: trial.score)
+    first = max(trials, key=lambda trial: trial.gain)
     place = next(k for k in lags if losses.candidates[k] is first.lag)
     between = refined_variants(losses.candidates, [place], problem.aligned, problem.criteria.candidates)
-    trial = min([first, *(_try(problem, losses, best, lag) for lag in between)], key=lambda trial: trial.score)
-    return trial if trial.score < losses.score(best) else None
+    refined = [trial for lag in between if (trial := _try(problem, losses, best, lag)) is not None]
+    trial = max([first, *refined], key=lambda trial: trial.gain)
+    return trial if trial.gain > 0 else None
 
 
-def with_states_of(problem: DiagnosisProblem, members: Iterable[Candidate]) -> DiagnosisProblem:
-    """The problem with the unknown states of every lag among some candidates projected out."""
-    columns = [
-        initial_state_columns(problem.aligned, candidate.effect, candidate.constants)
-        for candidate in members
-        if candidate.kind == "effect" and candidate.effect.unknown_states
-    ]
-    return problem.without(np.concatenate(columns, axis=2)) if columns else problem
+def with_start(problem: DiagnosisProblem, lag: Candidate) -> DiagnosisProblem:
+    """A problem, of which a split can test the states, with the unknown states of a lag in every fit."""
+    columns_um = start_columns_um(problem, lag)
+    part = problem.on_splits_that_test(columns_um)
+    return (part or problem).with_states(columns_um)
 
 
-def _try(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset, lag: Candidate) -> UnknownStart:
+def start_columns_um(problem: DiagnosisProblem, lag: Candidate) -> FloatArray:
+    """(N, m, Q) by how many um each unknown state of a lag moves the prediction."""
+    return initial_state_columns(problem.aligned, lag.effect, lag.constants)
+
+
+def _try(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset, lag: Candidate) -> UnknownStart | None:
     others = [losses.candidates[k] for k in best.members if losses.candidates[k].effect.id != lag.effect.id]
+    columns_um = start_columns_um(problem, lag)
+    part = problem.on_splits_that_test(columns_um) if columns_um.shape[2] else None
+    if part is None:
+        return None
+    with_states = part.with_states(columns_um)
     members = (*others, lag)
-    projected = with_states_of(problem, members)
-    alone = projected.losses(members)
-    subset = Subset(tuple(range(len(members))), alone.loss(range(len(members))))
-    score = alone.score(subset) + problem.criteria.number_price * projected.states
-    return UnknownStart(projected, lag, members, score)
+    own = [losses.candidates[k] for k in best.members]
+    without, beside = part.losses([*own, lag]), with_states.losses(members)
+    sets = [range(len(own)), [*(k for k in range(len(own)) if own[k].effect.id != lag.effect.id), len(own)]]
+    score = min((without.score(subset) for subset in without.evaluate(sets)), default=float("inf"))
+    criteria = problem.criteria
+    price = criteria.description_price + criteria.number_price * (columns_um.shape[2] - 1)
+    complete = Subset(tuple(range(len(members))), beside.loss(range(len(members))))
+    gain = score - beside.score(complete) - price
+    return UnknownStart(with_states, lag, members, gain, without.baseline, beside.baseline)

@@ -27,7 +27,7 @@ def advice(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     changes = [moment_text(finding, diagnosis) for finding in diagnosis.depends_on if finding.is_change]
     clauses += [f"find out what changed from {moment}" for moment in changes[:1]]
     match diagnosis.verdict:
-        case "identified":
+        case "identified" | "likely":
             return [*clauses, *_how_to_add(diagnosis)]
         case "ambiguous":
             still = "change nothing on the machine yet: what mends one does not mend its rival"

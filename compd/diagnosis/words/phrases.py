@@ -16,6 +16,7 @@ from compd.diagnosis.findings import (
     ImplausibleEffect,
     UntestedEffect,
 )
+from compd.diagnosis.thermal_evidence import seen_once
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effects import Effect
 from compd.model.formula import FormulaDeclaration
@@ -184,7 +185,10 @@ def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: 
     if not gross.runs:
         return [f"{count}: {rows}"]
     runs = join_words([f"{first} to {last}" for first, last in gross.runs])
-    texts = [count, f"look at what happened in rows {runs} (a bump, a slipped target, a lost step)"]
+    share = float(np.nansum(size[[row in in_runs for row in recording.row[np.isin(recording.row, gross.rows)]]] ** 2))
+    share /= max(float(np.nansum(comparison.residual_um**2)), 1e-300)
+    held = f", which hold {percent_text(share)} of the squared error" if np.isfinite(share) else ""
+    texts = [count, f"look at what happened in rows {runs}{held} (a bump, a slipped target, a lost step)"]
     return [*texts, f"single bad readings: {rows}"] if single else texts
 
 
@@ -231,15 +235,11 @@ def thermal_in_one_session(diagnosis: Diagnosis) -> list[str]:
 
     All that warms up in a session rises together, and with time: one session alone proves no thermal cause.
     """
+    finding = best_description(diagnosis)
+    if diagnosis.steps or finding is None:
+        effects = [step.effect for step in diagnosis.steps]
+        return seen_once(diagnosis.after.aligned, diagnosis.after.used, effects, diagnosis.criteria)
     session = diagnosis.after.aligned.recording.session
     if session is not None and len(np.unique(session[diagnosis.after.used & (session >= 0)])) > 1:
         return []
-    finding = best_description(diagnosis)
-    if diagnosis.steps or finding is None:
-        return [step.effect.id for step in diagnosis.steps if _is_thermal(step.effect)]
     return [name for name in (finding.covariate, *finding.beside) if name.startswith(("temperature", "time"))]
-
-
-def _is_thermal(effect: Effect) -> bool:
-    """Whether a temperature, or time as its stand-in, drives the effect."""
-    return any(need.startswith("temperature") for need in effect.needs) or effect.needs == ("time",)

@@ -18,6 +18,8 @@ from compd.diagnosis.words.phrases import (
 )
 from compd.text import join_words, number_text
 
+# What confirms a thermal cause.
+CONFIRM = "measure on another day, or let it cool down and warm up again"
 CANNOT_KNOW = "how much of it is noise cannot be known"
 
 
@@ -35,6 +37,10 @@ def summary(diagnosis: Diagnosis) -> str:
         case "identified":
             them = "it" if len(diagnosis.steps) == 1 else "them"
             return f"What is missing is {names}: with {them} the error of {before} falls to {after}, {noise}."
+        case "likely":
+            them, be = ("it", "is") if len(diagnosis.steps) == 1 else ("them", "are")
+            falls = f"{names} {be} likely what is missing: with {them} the error of {before} falls to {after}, {noise}."
+            return f"{falls} One warm-up proves no cause: {CONFIRM}."
         case "ambiguous":
             pairs = "; ".join(rivals_text(step) for step in diagnosis.steps if step.rivals)
             falls = f"With {names} the error of {before} falls to {after}, {noise}."

@@ -23,7 +23,7 @@ from compd.diagnosis.words.phrases import (
     untested_here,
     was_any_tried,
 )
-from compd.diagnosis.words.summary import CANNOT_KNOW, question
+from compd.diagnosis.words.summary import CANNOT_KNOW, CONFIRM, question
 from compd.text import LabelledText, fall_text, fit_lines, join_words, number_text, percent_text
 
 # What a terminal shows without scrolling, and its usual width.
@@ -51,6 +51,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         LabelledText("Asked", tuple(question(diagnosis))),
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
         LabelledText("Follows", tuple(_follows(diagnosis, fall))),
+        LabelledText("Start", tuple(_start(diagnosis, fall))),
         LabelledText("Left", tuple(_left(diagnosis, fall))),
         LabelledText("Gross", tuple(gross_texts(diagnosis.gross, diagnosis.after, fall.unit))),
         LabelledText("Sure", tuple(_sure(diagnosis))),
@@ -81,6 +82,8 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
             )
         case "identified":
             text = f"What is missing is {{}}: {fall.text(fall.after)}"
+        case "likely":
+            text = f"{{}} {be} missing, seen in one warm-up only: {fall.text(fall.after)}"
         case "ambiguous":
             ids = [
                 join_words([step.effect.id, *(rival.name for rival in step.rivals)], "or") for step in diagnosis.steps
@@ -153,6 +156,14 @@ def _explains(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     return [f"{fall.share_text(fall.after)}: {fall.text(fall.after)}{rows}"] if diagnosis.steps else []
 
 
+def _start(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
+    """What is fitted along of a lag that was out of equilibrium when sessions began."""
+    if (start := diagnosis.start) is None:
+        return []
+    errors = fall_text([start.before_um, start.after_um], fall.unit)
+    return [f"{start.effect} was not in equilibrium at first: {start.numbers} numbers more ({errors}), no cause"]
+
+
 def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     """The error that is left beside the noise, and what the difference means."""
     described = next(iter(diagnosis.depends_on), None) if not diagnosis.steps else None
@@ -163,7 +174,7 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     if not fall.noise_known:
         return [f"{text}; {CANNOT_KNOW}", *remarks]
     at_floor = left**2 <= diagnosis.criteria.most_at_floor * fall.noise**2
-    if diagnosis.verdict in ("adequate", "identified", "ambiguous") or at_floor:
+    if diagnosis.verdict in ("adequate", "identified", "likely", "ambiguous") or at_floor:
         meaning = "only noise is left"
     elif diagnosis.steps and is_best_a_change(diagnosis):
         meaning = "some of it goes with the change"
@@ -185,7 +196,7 @@ def _sure(diagnosis: Diagnosis) -> list[str]:
     ]
     implausible = [text for text in numbers if IMPLAUSIBLE in text]
     names = thermal_in_one_session(diagnosis)
-    session = [f"{join_words(names)} seen in one session only: measure on another day"] if names else []
+    session = [f"{join_words(names)} seen in one warm-up only: {CONFIRM}"] if names else []
     p_values = [step.p_value for step in steps] or ([] if finding is None else [finding.p_value])
     chance = [clause for clause in (chance_clause(p_values),) if clause]
     doubtful = chance if max(p_values, default=0.0) > DOUBTFUL else []
