@@ -80,7 +80,7 @@ def days(case: Case, mechanism: Mechanism, number: int, places: FixedPlaces | No
             return one_warm_up(case, mechanism, usual, air)
         case hard.PLACE_BY_PLACE if number == 0:
             return place_by_place(case, mechanism, usual, air)
-        case hard.WRONG_NOISE if number == 0 and case.seed % 2:
+        case hard.WRONG_NOISE if number == 0 and case.rng("repeats").uniform() < 0.5:
             return usual.single_visits(UNREPEATED_ROWS)
         case hard.ZERO_ELSEWHERE:
             return since_a_zero_elsewhere(case, usual, number, air)

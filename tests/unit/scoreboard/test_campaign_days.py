@@ -54,10 +54,10 @@ def test_the_room_is_elsewhere_than_at_machine_zero(seed):
 
 
 def test_half_of_the_wrong_declarations_have_no_repeats():
-    plans = {seed: days(case("wrong-noise", seed), MACHINE, 0) for seed in (4, 5)}
-    assert any(item.repeated for item in plans[4].items)
-    assert not any(item.repeated for item in plans[5].items)
-    assert len(plans[5].items) == UNREPEATED_ROWS
+    plans = [days(case("wrong-noise", seed), MACHINE, 0) for seed in range(12)]
+    unrepeated = [plan for plan in plans if not any(item.repeated for item in plan.items)]
+    assert 3 <= len(unrepeated) <= 9
+    assert {len(plan.items) for plan in unrepeated} == {UNREPEATED_ROWS}
 
 
 def test_a_plane_is_level_and_within_reach():
