@@ -49,6 +49,7 @@ def build_model(geometry: Geometry, wiring: Wiring) -> MachineModel:
         model,
         constants=machine_constants(model, machine_details(geometry)),
         frame_drift_mm=wiring.unmeasured_frame_um / UM_PER_MM,
+        quantity_noise={wire.name: wire.noise for wire in wiring.quantities if wire.noise is not None},
     )
 
 

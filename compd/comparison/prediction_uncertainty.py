@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,20 +25,29 @@ from compd.model.effects import FittedEffect, evaluate_basis
 from compd.statistics import last_digit_um
 from compd.units import UM_PER_MM
 
+# Seed of the draw of the quantities' noise.
+NOISE_SEED = 20262
+
 
 class Uncertainty(NamedTuple):
-    """Standard uncertainty of each predicted coordinate, (N, m) in um: by the gauges, by the fitted numbers, and by
-    what the frame moves unmeasured.
+    """Standard uncertainty of each predicted coordinate, (N, m) in um: by the gauges, by the fitted numbers, by what
+    the frame moves unmeasured, and by the noise of the quantities from which effects are computed.
     """
 
     gauges_um: FloatArray
     parameters_um: FloatArray
     frame_um: FloatArray
+    quantities_um: FloatArray
+
+    @property
+    def noise_um(self) -> FloatArray:
+        """What changes from reading to reading: the gauges' and the quantities' noise."""
+        return np.asarray(np.sqrt(self.gauges_um**2 + self.quantities_um**2))
 
     @property
     def total_um(self) -> FloatArray:
-        """All three, which are independent of each other."""
-        return np.asarray(np.sqrt(self.gauges_um**2 + self.parameters_um**2 + self.frame_um**2))
+        """All of them, which are independent of each other."""
+        return np.asarray(np.sqrt(self.noise_um**2 + self.parameters_um**2 + self.frame_um**2))
 
 
 def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True) -> GaugeNoise:
@@ -96,7 +106,35 @@ def first_order_uncertainty(
         derivatives = np.concatenate([aligned.columns(effect.effect, effect.constants) for effect in fitted], axis=2)
         parameters = np.sqrt(np.maximum(parameter_variance(derivatives, covariance), 0.0))
     frame_mm = 0.0 if noise is None else noise.frame_drift_mm
-    return Uncertainty(np.sqrt(variance) * UM_PER_MM, parameters * UM_PER_MM, np.full(shape, frame_mm * UM_PER_MM))
+    return Uncertainty(
+        np.sqrt(variance) * UM_PER_MM,
+        parameters * UM_PER_MM,
+        np.full(shape, frame_mm * UM_PER_MM),
+        np.broadcast_to(_by_quantities_mm(aligned, fitted) * UM_PER_MM, shape),
+    )
+
+
+def _by_quantities_mm(aligned: AlignedRecording, fitted: Sequence[FittedEffect]) -> FloatArray:
+    """(m,) standard deviation of each coordinate by the stated noise of the quantities that effects are computed from.
+
+    From one draw of the noise of all rows (JCGM 101:2008), through the memory of effects that have one.
+    """
+    rows, moved_mm = aligned.rows, np.zeros(aligned.measured_mm.shape)
+    stated = {} if aligned.model is None else aligned.model.quantity_noise
+    rng = np.random.default_rng(NOISE_SEED)
+    noisy = {
+        name: values + stated[name] * rng.standard_normal(len(values)) if name in stated else values
+        for name, values in rows.quantities.items()
+    }
+    drawn = replace(rows, quantities=noisy)
+    for effect in fitted if stated else ():
+        with_noise, _ = evaluate_basis(effect.effect, drawn, effect.constants, None)
+        without, _ = evaluate_basis(effect.effect, rows, effect.constants, None)
+        added: FloatArray = np.einsum("rsp,p->rs", with_noise - without, effect.theta)
+        changes: FloatArray = aligned.propagated(effect.effect, added[:, :, np.newaxis])
+        moved_mm = moved_mm + changes[:, :, 0]
+    known = moved_mm[np.isfinite(moved_mm).all(axis=1)]
+    return np.asarray(np.sqrt(np.mean(known**2, axis=0)) if len(known) else np.zeros(len(aligned.labels)))
 
 
 def monte_carlo(

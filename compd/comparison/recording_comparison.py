@@ -56,7 +56,7 @@ def compare(
         used,
         aligned.recording.visit,
         _declared_um(aligned),
-        np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0)),
+        np.sqrt(np.mean(uncertainty.noise_um[used] ** 2, axis=0)),
         _last_digit_um(aligned),
         tuple(row_orders(aligned).values()),
         criteria,

@@ -11,7 +11,7 @@ from compd.diagnosis.findings import CandidateResult, DiagnosisStep, ParameterEs
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
 from compd.diagnosis.undetermined import undetermined_text
-from compd.text import number_text
+from compd.text import chance_text, number_text
 
 
 def candidate_results(
@@ -86,7 +86,9 @@ def _result_alone(
     elif steps:
         status, why = "partial", "nothing more beside what is named"
     else:
-        status, why = "partial", f"leaves {number_text(rms_um, unit)}: others or descriptions do better"
+        chance = f"noise alone does this {chance_text(p_value)}" if p_value > 0 else "that may be chance"
+        others = "others or descriptions do better" if len(losses.candidates) > 1 and losses.describes else chance
+        status, why = "partial", f"leaves {number_text(rms_um, unit)}: {others}"
     return CandidateResult(candidate.name, status, why, rms_um, fraction, p_value, parameters)
 
 

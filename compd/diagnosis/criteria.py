@@ -144,6 +144,18 @@ class Criteria:
         meaning="a split in which one fold holds more of what a candidate does cannot test it",
         reason="a choice: what is left in the other folds determines no parameter",
     )
+    twin_cosine: float = threshold(
+        0.98,
+        unit="cosine",
+        meaning="two effects that are more alike and have opposite signs may be one cause",
+        reason="a choice: a fifth of what one does (sin of the angle) is its own",
+    )
+    twin_share: float = threshold(
+        0.25,
+        unit="share of the squares of the smaller",
+        meaning="what such effects leave of each other, below which they are no two causes",
+        reason="a choice: half of the smaller one, as an error",
+    )
     swing_share: float = threshold(
         0.3,
         unit="share of a temperature's range",

@@ -27,7 +27,9 @@ class ParameterEstimate:
     unit : str
         For instance ``"ppm/K"``.
     plausible : bool
-        Whether the value lies in the range that the effect declares as plausible.
+        Whether the value may lie in the range that the effect declares as plausible, given its standard error.
+    low, high : float
+        That range, which reaches to nought, in `unit`.
     """
 
     name: str
@@ -35,10 +37,24 @@ class ParameterEstimate:
     std: float
     unit: str
     plausible: bool
+    low: float = -math.inf
+    high: float = math.inf
+
+    @property
+    def outside(self) -> bool:
+        """Whether the value is outside the range by more than a standard error."""
+        margin = 0.0 if math.isnan(self.std) else self.std
+        return not self.low - margin <= self.value <= self.high + margin
+
+    @property
+    def determined(self) -> bool:
+        """Whether the rows say more of it than its range: the standard error is less than the range is wide."""
+        return self.std < self.high - self.low
 
     def as_json(self) -> dict[str, object]:
         """Keys of the verdict's `parameters`."""
-        return {"name": self.name, "value": self.value, "std": self.std, "unit": self.unit, "plausible": self.plausible}
+        own = {"name": self.name, "value": self.value, "std": self.std, "unit": self.unit}
+        return {**own, "plausible": self.plausible, "determined": self.determined}
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, rms
 from compd.comparison import (
     AlignedRecording,
     Comparison,
@@ -167,7 +167,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     losses, aligned, criteria = explanation.losses, problem.aligned, problem.criteria
     before = compare(aligned, problem.comparison.fitted, covariance, outlier=problem.gross)
     before = replace(before, floor=problem.comparison.floor)
-    p_value_by_effect = _p_values(losses, explanation.members)
+    explanation, p_value_by_effect = _without_chance(explanation)
     after = before
     if explanation.named:
         links = aligned.rows.links
@@ -176,11 +176,11 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         result = fit(aligned, initial, problem.sigma_um, outlier=problem.gross)
         result = with_disturbances(result, aligned, problem.sigma_um, problem.pool.candidates, criteria)
         after = compare(aligned, result.fitted, result.covariance, outlier=problem.gross)
-        after = replace(after, floor=before.floor)
+        after = replace(after, floor=before.floor if _noise_grows(before, after) == 1.0 else after.floor)
     named = dict(zip(explanation.named, after.fitted[len(before.fitted) :], strict=True))
     steps = _steps(problem, explanation, named, p_value_by_effect)
     candidates = candidate_results(problem, losses, steps, p_value_by_effect)
-    verdict = _verdict(problem, explanation, steps, candidates)
+    verdict = _verdict(problem, explanation, steps, candidates, _noise_grows(before, after))
     above = verdict in ("partial", "unexplained", "not_testable")
     asked = implausible_effect(problem, explanation) if above else None
     depends_on = describe_remainder(problem, explanation) if above else ()
@@ -210,6 +210,14 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     )
 
 
+def _noise_grows(before: Comparison, after: Comparison) -> float:
+    """By how much the variance of the noise grows with the effects that were found: a thermometer's noise is noise."""
+    if not (before.floor.known and after.floor.known) or before.floor.source != after.floor.source:
+        return 1.0
+    quantities_um = rms(after.uncertainty.quantities_um[after.used][:, after.aligned.lengths])
+    return 1.0 + (quantities_um / before.floor.um) ** 2
+
+
 def _states(problem: DiagnosisProblem, explanation: Explanation) -> UnknownStates | None:
     if (start := explanation.start) is None:
         return None
@@ -222,15 +230,18 @@ def _verdict(
     explanation: Explanation,
     steps: Sequence[DiagnosisStep],
     candidates: Sequence[CandidateResult],
+    grown: float,
 ) -> Verdict:
     """At the floor nothing, one or several effects are missing; above it, or where it is not known, the rest remains.
 
     Beside effects that are named the unnamed ones may leave what their standard errors allow for. Where the noise is
     not known, whether something is missing can be told only by finding it.
+
+    grown : by how much the variance of the noise grows by that of the quantities from which effects are computed.
     """
     found = bool(explanation.described)
     unnamed = problem.criteria.disturbance**2 if steps else 0.0
-    if not found and problem.may_be_noise(explanation.reduced_chi_squared - unnamed):
+    if not found and problem.may_be_noise(explanation.reduced_chi_squared / grown - unnamed):
         if not steps:
             return "adequate"
         if any(step.rivals for step in steps):
@@ -286,6 +297,18 @@ def _rivals(explanation: Explanation, member: int) -> tuple[Rival, ...]:
         others = find_rivals(explanation.losses, explanation.named, member)
         rivals += tuple(rival for rival in others if rival.name not in known)
     return rivals
+
+
+def _without_chance(explanation: Explanation) -> tuple[Explanation, dict[str, float]]:
+    """The explanation without the effects that noise alone does as well as, and the p-value of each effect."""
+    losses = explanation.losses
+    while True:
+        p_values = _p_values(losses, explanation.members)
+        weak = [k for k in explanation.effects if p_values[losses.name(k)] > losses.criteria.p_value]
+        if not weak:
+            return explanation, p_values
+        weakest = max(weak, key=lambda k: p_values[losses.name(k)])
+        explanation = replace(explanation, members=tuple(k for k in explanation.members if k != weakest))
 
 
 def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float]:

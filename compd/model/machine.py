@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple, Self
@@ -55,6 +56,7 @@ class MachineModel:
     constants : what effects need beyond the kinematics; None where none was computed, as for a model without effects.
     frame_drift_mm : standard uncertainty of the tip along each axis by what the frame moves unmeasured; nan where it is
         not known.
+    quantity_noise : of quantities, by name, the standard deviation of one reading that the configuration states.
     """
 
     frame: FrameGeometry
@@ -71,6 +73,7 @@ class MachineModel:
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     constants: MachineConstants | None = None
     frame_drift_mm: float = 0.0
+    quantity_noise: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def links(self) -> int:

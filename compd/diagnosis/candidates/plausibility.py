@@ -22,7 +22,8 @@ def estimate_parameters(
         std = float(np.sqrt(covariance[k, k])) if k < len(covariance) else float("nan")
         value, shown_std = column.parameter.from_theta(float(theta[k]), std)
         plausible = is_plausible(column.parameter.theta_range, float(theta[k]), std, criteria)
-        estimates.append(ParameterEstimate(column.name, value, shown_std, column.parameter.unit, plausible))
+        low, high = min(column.parameter.low, 0.0), max(column.parameter.high, 0.0)
+        estimates.append(ParameterEstimate(column.name, value, shown_std, column.parameter.unit, plausible, low, high))
     return estimates
 
 

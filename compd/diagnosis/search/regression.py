@@ -214,6 +214,22 @@ class NormalEquations:
         left = float(self.data.squares[folds].sum()) - 2 * float(theta @ score) + float(theta @ normal @ theta)
         return theta, covariance, left / self.data.value_count
 
+    def products_beside(self, index: IntArray, sizes: Sequence[int]) -> FloatArray:
+        """(G, G) products of what the last groups of parameters do, by their sizes, beside all columns before them.
+
+        A diagonal element is the sum of squares of what a group does with the parameters that fit all rows best, an
+        element beside it the product of what two groups do.
+        """
+        folds = self.data.split_of_fold == 0
+        normal = self.gram[folds][:, index[:, None], index].sum(axis=0)
+        theta, _, _ = self.estimate(index)
+        first = len(index) - sum(sizes)
+        held = normal[:first, :first] + np.diag(self.ridge[index][:first])
+        beside = normal[first:, first:] - normal[first:, :first] @ np.linalg.solve(held, normal[:first, first:])
+        group = np.repeat(np.arange(len(sizes)), sizes)
+        own = np.equal.outer(np.arange(len(sizes)), group) * theta[first:]
+        return np.asarray(own @ beside @ own.T)
+
     def bounded_loss(self, index: IntArray, limits: FloatArray) -> float:
         """Mean square left by the parameters within limits (p, 2) that fit all rows best."""
         folds = self.data.split_of_fold == 0

@@ -176,7 +176,20 @@ class SubsetLosses:
                 within &= is_plausible(limits, float(value), float(error), self.criteria)
             if is_undetermined(candidate.limits, std):
                 return False
-        return within or self._fits_within(members)
+        return (within or self._fits_within(members)) and not self._has_twins(members)
+
+    def _has_twins(self, members: Sequence[int]) -> bool:
+        """Whether two effects do the same with opposite signs and nearly cancel: they are one cause, or none."""
+        kinds = [self.candidates[k].kind for k in members]
+        if kinds.count("effect") < 2:
+            return False
+        ordered = sorted(members, key=lambda k: self.candidates[k].kind == "effect")
+        effects = [k for k in ordered if self.candidates[k].kind == "effect"]
+        products = self.equations.products_beside(self.index(ordered), [len(self._indices[k]) for k in effects])
+        size = np.sqrt(np.maximum(np.diag(products), 1e-300))
+        together = size**2 + (size**2)[:, None] + 2 * products
+        opposite = products < -self.criteria.twin_cosine * np.outer(size, size)
+        return bool((opposite & (together < self.criteria.twin_share * np.minimum.outer(size, size) ** 2)).any())
 
     def _fits_within(self, members: Sequence[int]) -> bool:
         """Whether parameters within the ranges of several effects leave hardly more than those without limits."""

@@ -8,6 +8,7 @@ candidates is judged with them and in these splits, so that none is compared wit
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from compd.arrays import FloatArray
@@ -38,17 +39,18 @@ class UnknownStart(NamedTuple):
 def find_warm_start(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset) -> UnknownStart | None:
     """The lag that with unknown states at the start of sessions gains their price; None where none does.
 
-    Each is tried with the other members of the best set, at every time constant of its grid, then between these.
+    Each is tried alone and with the other members of the best set, which may be there for what the start does; at every
+    time constant of its grid, then between these.
     """
     lags = [k for k, candidate in enumerate(losses.candidates) if candidate.effect.unknown_states]
     lags = [k for k in lags if losses.candidates[k].kind == "effect"]
-    trials = [trial for k in lags if (trial := _try(problem, losses, best, losses.candidates[k])) is not None]
+    trials = [trial for k in lags for trial in _trials(problem, losses, best, losses.candidates[k])]
     if not trials:
         return None
     first = max(trials, key=lambda trial: trial.gain)
     place = next(k for k in lags if losses.candidates[k] is first.lag)
     between = refined_variants(losses.candidates, [place], problem.aligned, problem.criteria.candidates)
-    refined = [trial for lag in between if (trial := _try(problem, losses, best, lag)) is not None]
+    refined = [trial for lag in between for trial in _trials(problem, losses, best, lag)]
     trial = max([first, *refined], key=lambda trial: trial.gain)
     return trial if trial.gain > 0 else None
 
@@ -65,20 +67,21 @@ def start_columns_um(problem: DiagnosisProblem, lag: Candidate) -> FloatArray:
     return initial_state_columns(problem.aligned, lag.effect, lag.constants)
 
 
-def _try(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset, lag: Candidate) -> UnknownStart | None:
-    others = [losses.candidates[k] for k in best.members if losses.candidates[k].effect.id != lag.effect.id]
+def _trials(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset, lag: Candidate) -> Iterator[UnknownStart]:
     columns_um = start_columns_um(problem, lag)
     part = problem.on_splits_that_test(columns_um) if columns_um.shape[2] else None
     if part is None:
-        return None
-    with_states = part.with_states(columns_um)
-    members = (*others, lag)
+        return
     own = [losses.candidates[k] for k in best.members]
-    without, beside = part.losses([*own, lag]), with_states.losses(members)
-    sets = [range(len(own)), [*(k for k in range(len(own)) if own[k].effect.id != lag.effect.id), len(own)]]
-    score = min((without.score(subset) for subset in without.evaluate(sets)), default=float("inf"))
+    others = [candidate for candidate in own if candidate.effect.id != lag.effect.id]
+    without = part.losses([*own, lag])
+    sets = without.evaluate([range(len(own)), [*map(own.index, others), len(own)]])
+    score = min((without.score(subset) for subset in sets), default=float("inf"))
+    with_states = part.with_states(columns_um)
+    beside = with_states.losses([*others, lag])
     criteria = problem.criteria
     price = criteria.description_price + criteria.number_price * (columns_um.shape[2] - 1)
-    complete = Subset(tuple(range(len(members))), beside.loss(range(len(members))))
-    gain = score - beside.score(complete) - price
-    return UnknownStart(with_states, lag, members, gain, without.baseline, beside.baseline)
+    for subset in beside.evaluate([[len(others)], range(len(others) + 1)]):
+        members = tuple(beside.candidates[k] for k in subset.members)
+        gain = score - beside.score(subset) - price
+        yield UnknownStart(with_states, lag, members, gain, without.baseline, beside.baseline)

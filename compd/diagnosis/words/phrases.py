@@ -37,6 +37,11 @@ MAX_RIVALS = 3
 MAX_ROWS = 4
 
 IMPLAUSIBLE = "IMPLAUSIBLE"
+NOT_DETERMINED = "NOT DETERMINED"
+# An effect that does so many times more than the error was is taken back by others.
+CANCELLING = 10.0
+# Numbers that a sentence of doubt names.
+MAX_DOUBTS = 2
 
 
 def physics_clause(effect: Effect) -> str:
@@ -68,13 +73,52 @@ def parameter_texts(step: DiagnosisStep, links: int) -> dict[str, str]:
             text = estimates_text(numbers, std, values[0].unit)
         else:
             text = estimates_text([min(numbers), max(numbers)], std, values[0].unit, " to ")
+        usual = f"{parameter.low:g} to {parameter.high:g} is usual"
         if not all(value.plausible for value in values):
-            text += f", {IMPLAUSIBLE}: {parameter.low:g} to {parameter.high:g} is usual"
+            text += f", {IMPLAUSIBLE}: {usual}"
+        elif not all(value.determined for value in values):
+            text += f", {NOT_DETERMINED} by these rows: {usual}"
+        elif any(value.outside for value in values):
+            text += f", outside: {usual}"
         texts[name] = text
     units = {constant.name: constant.unit for constant in step.effect.constants}
     for name, value in step.fitted.constants.items():
         texts[name] = f"{number_text(value, units.get(name, ''), 3)}, searched"
     return texts
+
+
+def doubts(diagnosis: Diagnosis) -> list[str]:
+    """What speaks against the numbers of the effects that were found: outside their ranges, or not determined."""
+    outside, undetermined = [], []
+    for step in diagnosis.steps:
+        for number in step.parameters:
+            name = number.name if number.name == step.effect.id else f"{number.name} of {step.effect.id}"
+            if not number.determined:
+                undetermined.append(name)
+            elif number.outside:
+                value = estimate_text(number.value, number.std, number.unit)
+                outside.append(f"{name} is {value}, and {number.low:g} to {number.high:g} is usual")
+    clauses = [_some(outside, "; ")] if outside else []
+    clauses += [text for text in (_cancelling_text(diagnosis),) if text]
+    return [*clauses, *([f"these rows do not determine {_some(undetermined, ', ')}"] if undetermined else [])]
+
+
+def _cancelling_text(diagnosis: Diagnosis) -> str:
+    """Which effects do many times more than the whole error was, so that others or the constant take it back."""
+    before, after = diagnosis.before, diagnosis.after
+    sizes = {step.effect.id: after.contributions[step.effect.id].share_rms_um for step in diagnosis.steps}
+    large = [name for name, size in sizes.items() if size > CANCELLING * before.rms_um]
+    if not large:
+        return ""
+    unit = before.aligned.unit
+    moved = join_words([f"{name} ({number_text(sizes[name], unit)})" for name in large])
+    takes = "others or the constant take" if len(large) == 1 else "they, others or the constant take"
+    return f"of what {moved} would do, {takes} back all but {number_text(before.rms_um, unit)}: the numbers go together"
+
+
+def _some(texts: Sequence[str], between: str) -> str:
+    more = f" and {len(texts) - MAX_DOUBTS} more" if len(texts) > MAX_DOUBTS else ""
+    return between.join(texts[:MAX_DOUBTS]) + more
 
 
 def chance_clause(p_values: Sequence[float]) -> str:

@@ -10,6 +10,7 @@ from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import error_fall
 from compd.diagnosis.words.phrases import (
     change_text,
+    doubts,
     followed_text,
     question_text,
     rivals_text,
@@ -24,7 +25,13 @@ CANNOT_KNOW = "how much of it is noise cannot be known"
 
 
 def summary(diagnosis: Diagnosis) -> str:
-    """The verdict in one or two sentences, which claim no more than it does."""
+    """The verdict in a few sentences, which claim no more than it does."""
+    against = doubts(diagnosis)
+    return f"{_verdict(diagnosis)} But {'; '.join(against)}." if against else _verdict(diagnosis)
+
+
+def _verdict(diagnosis: Diagnosis) -> str:
+    """The verdict in one or two sentences."""
     fall = error_fall(diagnosis)
     before, after = number_text(fall.before, fall.unit), number_text(fall.after, fall.unit)
     noise = f"where {fall.noise_text}" if fall.noise_known else CANNOT_KNOW
@@ -46,7 +53,7 @@ def summary(diagnosis: Diagnosis) -> str:
             falls = f"With {names} the error of {before} falls to {after}, {noise}."
             return f"{falls} But these rows cannot tell apart: {pairs}."
         case "adequate" | "not_testable":
-            tried = "that was tried lowers it" if was_any_tried(diagnosis) else "can be tested on this recording"
+            tried = "that was tried surely lowers it" if was_any_tried(diagnosis) else "can be tested on this recording"
             return " ".join([f"The error is {before}, {noise}. No effect {tried}.", *question(diagnosis)])
     if diagnosis.steps:
         verb = "explains" if len(diagnosis.steps) == 1 else "explain"

@@ -8,10 +8,12 @@ from compd.diagnosis.words.advice import advice
 from compd.diagnosis.words.error_fall import ErrorFall, error_fall
 from compd.diagnosis.words.phrases import (
     IMPLAUSIBLE,
+    NOT_DETERMINED,
     best_description,
     chance_clause,
     change_text,
     constant_text,
+    doubts,
     followed_text,
     gross_texts,
     is_best_a_change,
@@ -91,11 +93,13 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
             count += " or rivals" if len(ids) > 1 else " or a rival"
             text = f"{{}} {be} missing; these rows cannot tell"
         case "adequate" | "not_testable" if was_any_tried(diagnosis):
-            text = "no effect that was tried lowers the error; the noise is not known"
+            text = "no effect that was tried surely lowers the error; the noise is not known"
         case "not_testable":
             text = "no effect can be tested; nothing that drives one was varied"
         case _:
             text = _above_the_noise(diagnosis, fall)
+    if doubts(diagnosis):
+        text = f"{text.partition(';')[0]}; see what speaks against its numbers"
     texts = [text.format(join_words(ids)), text.format(count)]
     if (asked := diagnosis.asked) is not None:
         takes = f"would take {percent_text(fall.share_of(asked.heldout_rms_um))}, with an implausible number"
@@ -194,7 +198,7 @@ def _sure(diagnosis: Diagnosis) -> list[str]:
         for step in steps
         for name, text in parameter_texts(step, links).items()
     ]
-    implausible = [text for text in numbers if IMPLAUSIBLE in text]
+    implausible = [text for text in numbers if any(word in text for word in (IMPLAUSIBLE, NOT_DETERMINED, "outside:"))]
     names = thermal_in_one_session(diagnosis)
     session = [f"{join_words(names)} seen in one warm-up only: {CONFIRM}"] if names else []
     p_values = [step.p_value for step in steps] or ([] if finding is None else [finding.p_value])
