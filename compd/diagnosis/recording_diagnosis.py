@@ -241,7 +241,7 @@ def _verdict(
     """
     found = bool(explanation.described)
     unnamed = problem.criteria.disturbance**2 if steps else 0.0
-    if not found and problem.may_be_noise(explanation.reduced_chi_squared / grown - unnamed):
+    if not found and problem.may_be_noise(explanation.loss / grown - unnamed):
         if not steps:
             return "adequate"
         if any(step.rivals for step in steps):

@@ -32,10 +32,13 @@ FRAME = ("temperature_frame_degC", "temperature_bed_degC")
 
 @cache
 def tripod_recording(sessions: int = 4) -> AlignedRecording:
-    """`monday.csv` of the shipped tripod, with temperatures, loads and directions, in one session or four."""
+    """`monday.csv` of the shipped tripod, with temperatures, loads and directions, in four sessions, or in one in which
+    everything warms up."""
     columns = dict(gauges(ROWS, 3))
     if sessions == 1:
         columns["session"] = np.ones(ROWS)
+        warm = {name: np.sort(values) for name, values in columns.items() if name.startswith("temperature_")}
+        columns |= warm
     with tempfile.TemporaryDirectory() as directory:
         return align_tripod(record(Path(directory), columns, name="monday"))
 

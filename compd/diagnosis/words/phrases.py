@@ -106,7 +106,8 @@ def doubts(diagnosis: Diagnosis) -> list[str]:
 def _cancelling_text(diagnosis: Diagnosis) -> str:
     """Which effects do many times more than the whole error was, so that others or the constant take it back."""
     before, after = diagnosis.before, diagnosis.after
-    sizes = {step.effect.id: after.contributions[step.effect.id].share_rms_um for step in diagnosis.steps}
+    named = [step.effect.id for step in diagnosis.steps if step.effect.id in after.contributions]
+    sizes = {name: after.contributions[name].share_rms_um for name in named}
     large = [name for name, size in sizes.items() if size > CANCELLING * before.rms_um]
     if not large:
         return ""
@@ -231,7 +232,7 @@ def gross_texts(gross: GrossRows, comparison: Comparison, unit: str, most_rows: 
     runs = join_words([f"{first} to {last}" for first, last in gross.runs])
     share = float(np.nansum(size[[row in in_runs for row in recording.row[np.isin(recording.row, gross.rows)]]] ** 2))
     share /= max(float(np.nansum(comparison.residual_um**2)), 1e-300)
-    held = f", which hold {percent_text(share)} of the squared error" if np.isfinite(share) else ""
+    held = f" with {percent_text(share)} of the squared error" if np.isfinite(share) else ""
     texts = [count, f"look at what happened in rows {runs}{held} (a bump, a slipped target, a lost step)"]
     return [*texts, f"single bad readings: {rows}"] if single else texts
 

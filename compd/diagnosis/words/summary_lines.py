@@ -25,7 +25,7 @@ from compd.diagnosis.words.phrases import (
     untested_here,
     was_any_tried,
 )
-from compd.diagnosis.words.summary import CANNOT_KNOW, CONFIRM, question
+from compd.diagnosis.words.summary import CANNOT_KNOW, question
 from compd.text import LabelledText, fall_text, fit_lines, join_words, number_text, percent_text
 
 # What a terminal shows without scrolling, and its usual width.
@@ -200,7 +200,7 @@ def _sure(diagnosis: Diagnosis) -> list[str]:
     ]
     implausible = [text for text in numbers if any(word in text for word in (IMPLAUSIBLE, NOT_DETERMINED, "outside:"))]
     names = thermal_in_one_session(diagnosis)
-    session = [f"{join_words(names)} seen in one warm-up only: {CONFIRM}"] if names else []
+    session = [f"{join_words(names)} seen in one session only: measure on another day"] if names else []
     p_values = [step.p_value for step in steps] or ([] if finding is None else [finding.p_value])
     chance = [clause for clause in (chance_clause(p_values),) if clause]
     doubtful = chance if max(p_values, default=0.0) > DOUBTFUL else []

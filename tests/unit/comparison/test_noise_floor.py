@@ -154,9 +154,21 @@ def test_values_far_below_a_step_show_nothing_of_it() -> None:
 
 
 def test_a_declaration_counts_with_the_gauges_noise_where_nothing_is_repeated() -> None:
-    found = floor(noisy(100), None, np.full(3, 0.3), np.full(3, 0.4))
+    found = floor(noisy(100), None, np.full(3, 0.18), np.full(3, 0.24))
     assert found.source == "declared"
-    assert found.um == pytest.approx(0.5)
+    assert found.um == pytest.approx(0.3)
+
+
+def test_a_declaration_that_neighbouring_rows_contradict_is_no_floor() -> None:
+    """A data sheet's 1.5 um, and rows that differ by 0.2 um: both numbers are said, and the smaller one counts."""
+    found = floor(noisy(400), None, np.full(3, 1.5), np.zeros(3))
+    assert found.source == "estimate"
+    assert found.um == pytest.approx(0.2, rel=0.1)
+    assert found.contradiction.startswith("neighbouring rows scatter by 0.189 um, and 1.50 um is declared")
+
+
+def test_a_declaration_that_is_too_small_stays_for_neighbours_may_differ_by_more_than_noise() -> None:
+    assert floor(noisy(400), None, np.full(3, 0.05), np.zeros(3)).source == "declared"
 
 
 def test_the_last_resort_is_an_estimate_and_called_so() -> None:

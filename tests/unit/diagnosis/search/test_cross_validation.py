@@ -105,3 +105,13 @@ def test_folds_by_a_column_that_is_not_there_are_refused_with_the_columns(tmp_pa
 def test_folds_that_name_nothing_are_refused(tmp_path: Path, folds: object) -> None:
     with pytest.raises(RecordingError, match="folds: names nothing to leave out"):
         splits(tmp_path, measured_places(), folds)  # type: ignore[arg-type]
+
+
+def test_where_each_block_of_time_has_a_height_of_its_own_every_fold_has_a_part_of_each(tmp_path: Path) -> None:
+    """Measured height by height, a block that is left out lies beyond the others."""
+    columns = measured_places()
+    block = np.arange(120) * FoldCriteria.blocks // 120
+    by_height = splits(tmp_path, {**columns, "height_mm": 100.0 * block})[0]
+    assert all(len(np.unique(by_height[block == k])) == FoldCriteria.blocks for k in range(FoldCriteria.blocks))
+    warm = splits(tmp_path, {**columns, "temperature_frame_degC": 20.0 + block})[0]
+    assert (warm == block).all()  # what warms up with time is what folds of time test

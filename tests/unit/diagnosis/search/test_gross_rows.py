@@ -141,3 +141,24 @@ def test_a_stretch_of_gross_rows_is_a_run() -> None:
     assert found.rows == (7, 22, 24, 25, 28, 29, 42, 43, 44)
     assert found.runs == ((22, 29),)  # three in a row happen
     assert gross_rows(np.zeros(60, dtype=bool), np.arange(60)) == GrossRows()
+
+
+def test_rows_of_which_most_are_alike_to_the_last_digit_are_not_gross_by_a_digit() -> None:
+    """Of 40 rows 36 are 0, and 4 are one step of 3.5 robust noises: the step is what the display can show."""
+    residual = np.zeros((40, 1))
+    residual[::10] = 3.5
+    known = np.ones(40, dtype=bool)
+    alone = weigh_rows([], residual, known, None, 0.0, CRITERIA)
+    held = weigh_rows([], residual, known, None, 0.0, CRITERIA, least=1.0)
+    assert alone.gross.sum() == 4
+    assert not held.gross.any()
+
+
+def test_far_rows_that_follow_one_another_count_in_full() -> None:
+    """The first rows of a warm-up are what the machine did; a single far row may be chance."""
+    residual = noise(1)
+    residual[:12] = 3.5 * np.sign(residual[:12])
+    residual[200] = 3.5
+    weights = weigh(residual)
+    assert weights.weight[:12] == pytest.approx(weights.weight.max())
+    assert weights.weight[200] < 0.7 * weights.weight.max()

@@ -139,3 +139,34 @@ def test_constant_and_effects_are_no_descriptions() -> None:
     assert losses.described(range(5)) == (2, 3, 4)
     assert losses.describes
     assert not subset_losses(Y, [candidate("a", A), candidate("p", B, kind="proxy")]).describes
+
+
+def test_two_effects_that_do_the_same_with_opposite_signs_are_no_two_causes() -> None:
+    """A twin differs from the cause by a tenth: what they differ by takes both with numbers of opposite sign."""
+    twin = A + 0.1 * B
+    cancelling = subset_losses(noise(4) + 2.0 * (A - twin)[:, :, 0] + 0.2 * A[:, :, 0], {"a": A, "twin": twin})
+    assert not cancelling.is_plausible((0, 1))
+    assert subset_losses(Y + B[:, :, 0], {"a": A, "b": B}).is_plausible((0, 1))
+
+
+def test_numbers_that_nearly_cancel_are_plausible_where_others_within_their_ranges_do_as_well() -> None:
+    """Of 13 of one and -10 of the other their sum is known well: 6 and -3 leave hardly more."""
+    nearly = A + 0.03 * columns(7)
+    candidates = [candidate("a", A, 5.0), candidate("b", np.concatenate([nearly, B], axis=2), 15.0)]
+    losses = subset_losses(noise(4) + (13.0 * A - 10.0 * nearly + 12.0 * B)[:, :, 0], candidates)
+    theta = np.concatenate([values for values, _ in losses.estimates((0, 1))])
+    assert abs(theta[0]) > 6.25
+    assert losses.is_plausible((0, 1))
+    alone = [candidate("a", A, 5.0), candidate("c", B, 5.0)]
+    assert not subset_losses(noise(4, 0.1) + 13.0 * A[:, :, 0] + B[:, :, 0], alone).is_plausible((0, 1))
+
+
+def test_a_gain_in_one_block_is_sure_where_the_others_agree_in_their_shares() -> None:
+    """Nine tenths of the squares lie in one block; in every block the candidate takes half of what is there."""
+    size = np.where(np.arange(ROWS) < ROWS // BLOCKS, 30.0, 1.0)[:, None]
+    A_there = A * size[:, :, None]
+    losses = subset_losses(size * noise(4, 0.5) + A_there[:, :, 0], {"a": A_there}, least_loss=0.0)
+    gain, std = losses.gain((0,), ())
+    assert gain < CRITERIA.least_sigmas * std
+    assert losses.is_sure((0,), ())
+    assert not losses.is_sure((), (0,))

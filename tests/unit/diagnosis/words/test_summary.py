@@ -81,7 +81,7 @@ def test_every_verdict_fits_whatever_there_is_to_say(verdict: Verdict, source: s
         next_measurement=[{"measure": physics, "why": physics}],
     )
     variants = [made]
-    if verdict not in ("identified", "ambiguous", "partial"):
+    if verdict not in ("identified", "likely", "ambiguous", "partial"):
         variants += [replace(made, steps=()), replace(made, steps=(), depends_on=(), constant=None)]
     for variant in variants:
         lines = summary_lines(variant)
@@ -105,8 +105,8 @@ def test_an_unknown_noise_is_never_called_noise() -> None:
 def test_what_was_tried_without_gain_is_not_called_untestable() -> None:
     tried = (CandidateResult("backlash", "no_gain", "takes 0 % of the error away"),)
     made = diagnosis("not_testable", 2.0, 2.0, Noise(0.3, "estimate"), candidates=tried)
-    assert summary_lines(made)[0] == "not_testable: no effect that was tried lowers the error; the noise is not known"
-    assert made.summary.endswith("No effect that was tried lowers it.")
+    assert summary_lines(made)[0] == "not_testable: no effect that was tried surely lowers the error; the noise is not known"
+    assert made.summary.endswith("No effect that was tried surely lowers it.")
 
 
 def test_rows_are_promised_only_where_there_are_any() -> None:

@@ -118,8 +118,8 @@ unexplained: no effect that was tried explains the error of 66 um
 Follows: temperature_frame_degC (linear): 66 -> 12 um; a description, no cause
 Left:    12 um with it; noise 1.3 um (repeats): something else acts as well
 Gross:   11 of 120 rows do not count (up to 104 um off); look at what happened
-         in rows 40 to 47 (a bump, a slipped target, a lost step); single bad
-         readings: 60, 61 and 77
+         in rows 40 to 47 with 4 % of the squared error (a bump, a slipped
+         target, a lost step); single bad readings: 60, 61 and 77
 Sure:    temperature_frame_degC seen in one session only: measure on another
          day; noise alone does this 1 time in 1000
 Next:    change nothing on the machine yet; vary temperature_frame_degC alone,
