@@ -28,7 +28,7 @@ help:
 	@echo "make soak    a running daemon and random faults, held against the truth (4 min; OPTIONS=\"--minutes 60 --seed 7\")"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
 	@echo "make costs   the README's table of what compd costs (cyclictest; half an hour, less with OPTIONS="--rounds 2 --rows 2000000")"
-	@echo "make scoreboard  the diagnosis on 1300 simulated machines (hours; continues where it stopped)"
+	@echo "make scoreboard  the diagnosis on 1600 simulated machines (hours; continues where it stopped)"
 	@echo "make sensitivity  the scoreboard with each threshold of the diagnosis halved and doubled (hours; continues, too)"
 	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench, faults, three hours of soak, the scoreboard"
 	@echo "tests/README.md says what each takes and what .ci/run runs"

@@ -7,17 +7,20 @@ With --set the cases of that set are made, where they are not on disk, and diagn
 from __future__ import annotations
 
 import argparse
+import json
 import os
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tests.scoreboard.cases import FAMILIES, FIRST_SEED, Case, cases, parse_case
+from tests.scoreboard.case import Case
+from tests.scoreboard.cases import FAMILIES, FIRST_SEED, cases, parse_case
 from tests.scoreboard.page import write_page
 from tests.scoreboard.parallel import append_results, in_parallel, read_results
 from tests.scoreboard.real import FAMILY as REAL
 from tests.scoreboard.real import PLACE, prepare_real
+from tests.scoreboard.reliability import UNSTATED, reliability
 from tests.scoreboard.table import report
 from tests.scoreboard.trial import prepared, read_answer, run
 
@@ -40,10 +43,21 @@ def main() -> None:
         page = options.out.with_suffix(".html")
         write_page(page, results, options.campaigns)
         print(report(results))
+        if options.figures:
+            _write_figures(options.figures, results)
         print(f"\n{len(results)} of {len(wanted)} cases; those that are not right, with what was said: {page}")
     for name, why in failed:
         print(f"failed: {name}: {why}")
     raise SystemExit(bool(failed))
+
+
+def _write_figures(path: Path, results: list[dict[str, Any]]) -> None:
+    """Write the reliability as `docs.pictures.reliability` draws it."""
+    found = reliability(results)
+    if found is None:
+        print(f"{path} is not written. {UNSTATED}")
+        return
+    path.write_text(json.dumps(found.as_json(), indent=1) + "\n", encoding="utf-8")
 
 
 def _options() -> argparse.Namespace:
@@ -58,6 +72,7 @@ def _options() -> argparse.Namespace:
     add("--campaigns", type=Path, default=Path("out/campaigns"), help="where they are kept")
     add("--real", type=Path, default=PLACE, help="where the recordings of real machines are, with answers.yaml")
     add("--out", type=Path, default=Path("out/scoreboard.jsonl"), help="results; the page is written beside them")
+    add("--figures", type=Path, default=None, help="write the reliability to this file of the documentation, too")
     return parser.parse_args()
 
 

@@ -10,8 +10,11 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from compd.release import __version__
+from docs.pictures import reliability as reliability_picture
+from tests.scoreboard.commit import commits_text
 from tests.scoreboard.families import FamilyScore, family_scores
 from tests.scoreboard.measures import measures
+from tests.scoreboard.reliability import UNSTATED, reliability
 from tests.scoreboard.scoring import Result, Score
 
 HERE = Path(__file__).parent
@@ -48,11 +51,15 @@ class Row:
 
 def write_page(path: Path, results: Sequence[Result], campaigns: Path) -> None:
     """Write the page; it works offline. campaigns : where the cases are kept, for the commands."""
+    found = reliability(results)
     environment = Environment(loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined)
     page = environment.get_template("page.html").render(
-        title=f"compd {__version__}, {len(results)} cases.",
+        title=f"compd {__version__}, commit {commits_text(results)}, {len(results)} cases.",
         families=[_row(scores, campaigns) for scores in family_scores(results)],
         measures=measures(results),
+        reliability=found,
+        diagram="" if found is None else reliability_picture.draw(found.as_json()),
+        unstated=UNSTATED,
     )
     path.write_text(page, encoding="utf-8")
 
@@ -119,10 +126,12 @@ def said_lines(verdict: dict[str, Any]) -> list[str]:
 def commands(result: Result, campaigns: Path) -> list[str]:
     """The commands that make the case's recordings again and diagnose them."""
     directory = campaigns / result["directory"]
-    machine = f" --machine {directory / 'machine.yaml'}" if result["family"] == "period" else ""
+    options = "".join(
+        f" --{name} {directory / name}.yaml" for name in ("machine", "effects") if (directory / f"{name}.yaml").exists()
+    )
     return [
         f"python -m tests.scoreboard --case '{result['case']}' --campaigns {campaigns} --out again.jsonl",
-        f"compd diagnose {directory / 'train.csv'} {directory / 'other.csv'}{machine}",
+        f"compd diagnose {directory / 'train.csv'} {directory / 'other.csv'}{options}",
     ]
 
 

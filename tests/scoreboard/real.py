@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,9 @@ FAMILY = "real"
 # "... with ia ie an aw in the model": effects that the model has already.
 _WITH, _IN_THE_MODEL = " with ", " in the model"
 # Where nobody planted anything, any word but these may be right if the answers do not say.
-_WORDS = ("identified", "ambiguous", "partial", "unexplained")
+_WORDS = ("identified", "likely", "ambiguous", "partial", "unexplained")
+# "never: [... alone]": not without a rival.
+_ALONE = " alone"
 
 
 def prepare_real(campaigns: Path, place: Path = PLACE) -> list[Path]:
@@ -41,8 +43,14 @@ def _prepare(name: str, entry: dict[str, Any], campaigns: Path, place: Path) -> 
     known = model.removesuffix(_IN_THE_MODEL).split()
     if known:
         (directory / "known.json").write_text(json.dumps(known), encoding="utf-8")
-    entry["verdicts"] = entry.pop("verdict", _WORDS)
+    entry["verdicts"] = _with_likely(entry.pop("verdict", _WORDS))
     entry["groups"] = entry.pop("right", ())
+    entry["may_name"] = tuple(_flat(entry.pop("beside", ())))
+    never = entry.pop("never", ())
+    # a word that is not among the verdicts is not right in any case
+    entry["never"] = [name for name in never if not name.endswith(_ALONE)]
+    alone = [name.removesuffix(_ALONE) for name in never if name.endswith(_ALONE)]
+    entry["never_alone"] = [*entry.pop("never_alone", ()), *alone]
     answer = {
         "case": f"{FAMILY}:{name}",
         "family": FAMILY,
@@ -52,6 +60,16 @@ def _prepare(name: str, entry: dict[str, Any], campaigns: Path, place: Path) -> 
     }
     (directory / "answer.json").write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
     return directory
+
+
+def _with_likely(words: Sequence[str]) -> list[str]:
+    """Where `identified` is right, so is the word for the same with less certainty."""
+    return [*words, *(["likely"] if "identified" in words and "likely" not in words else [])]
+
+
+def _flat(groups: Sequence[Any]) -> Iterator[str]:
+    for group in groups:
+        yield from [group] if isinstance(group, str) else group
 
 
 def _link(source: Path, target: Path) -> None:

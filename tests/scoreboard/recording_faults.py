@@ -1,4 +1,4 @@
-"""What happens to a recording after it was measured: gross rows, useless sensors, a shift, wandering, another frame."""
+"""What happens to a recording after it was measured: gross rows, useless sensors, steps, another frame or target."""
 
 from __future__ import annotations
 
@@ -24,6 +24,10 @@ TILT_RAD, DISTANCE_MM = 0.005, 800.0
 # Correlation time of noise that wanders and comes back, s: 0.95 from one visit to the next.
 WANDER_S = 500.0
 WANDER_FLOORS = (2.0, 6.0)
+# Steps of a display, um, larger than what the tracker scatters.
+STEPS_UM = (0.5, 1.0, 2.0)
+# By how much a target that is mounted again sits elsewhere, rms of its coordinates in floors.
+MOUNTING_FLOORS = (4.0, 12.0)
 
 
 def reference_mm(columns: Columns) -> FloatArray:
@@ -93,3 +97,31 @@ def with_distractors(columns: Columns, rng: np.random.Generator) -> dict[str, Fl
     for name in ("door_open_1", "pump_on_1"):
         extra[name] = (np.cumsum(rng.random(count) < 0.02) % 2).astype(float)
     return {**columns, **{name: np.round(values, 4) for name, values in extra.items()}}
+
+
+def in_steps(columns: Columns, rng: np.random.Generator) -> dict[str, FloatArray]:
+    """The reference rounded to a step that is drawn from STEPS_UM."""
+    step_mm = float(rng.choice(STEPS_UM)) * UM
+    return with_reference(columns, np.round(reference_mm(columns) / step_mm) * step_mm)
+
+
+def with_target_re_mounted(columns: Columns, rng: np.random.Generator) -> tuple[dict[str, FloatArray], float]:
+    """The target sits elsewhere from the beginning of one of the sessions on; also when that is, s."""
+    session = columns["session"]
+    later = session >= rng.choice(np.unique(session)[1:])
+    direction = rng.standard_normal(3)
+    moved_mm = rng.uniform(*MOUNTING_FLOORS) * TRACKER_SIGMA_UM * UM * direction / np.sqrt(np.mean(direction**2))
+    moved = with_reference(columns, reference_mm(columns) + later[:, None] * moved_mm)
+    return moved, float(columns["time_s"][later].min())
+
+
+def on_a_plane(columns: Columns, places_mm: FloatArray) -> dict[str, FloatArray]:
+    """The rows of touched places (P, 3), by their height alone, which is the same everywhere."""
+    place = columns["point"].astype(int) - 1
+    kept = {name: values for name, values in columns.items() if name != "pin"}
+    return {**kept, POSITION_COLUMNS[2]: places_mm[place, 2]}
+
+
+def rms_um(columns: Columns, before: Columns) -> float:
+    """By how much the reference was changed, rms per coordinate."""
+    return float(np.sqrt(np.mean((reference_mm(columns) - reference_mm(before)) ** 2)) / UM)

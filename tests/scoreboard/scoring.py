@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tests.scoreboard.cases import CONSTANT_CAUSES
+from tests.scoreboard.case import CONSTANT_CAUSES
 from tests.scoreboard.expectation import Expectation
 
 # Two-sided 95 % of a normal distribution.
@@ -73,13 +73,18 @@ def score(result: Result) -> Score:
     expected = Expectation.from_json(result["expected"])
     verdict = result["verdict"]
     named, constant, possible = names(result), constant_effects(result), rivals(result)
-    absent = [group for group in expected.groups if not {*named, *constant} & set(group)]
+    # a group may have a covariate as well, where a description says what a cause would
+    told = {*named, *constant, *_followed(result), *(possible if expected.or_rival else ())}
+    absent = [group for group in expected.groups if not told & set(group)]
     hidden = [group for group in absent if not possible & set(group)]
     missing = [f"not named: {' or '.join(group)}" for group in absent]
-    missing += [f"named: {name}" for name in _wrongly_named(result, expected)]
+    missing += [f"named: {name}" for name in wrongly_named(result, expected)]
     missing += [f"not reported as a constant: {' or '.join(group)}" for group in _no_constant(result, expected)]
     missing += [*_not_followed(result, expected), *_change_missing(result, expected)]
     missing += _residual_and_rows(result, expected)
+    if verdict["verdict"] == "identified":
+        unsaid = [group for group in expected.identified_needs if not {*named, *constant} & set(group)]
+        missing += [f"identified without {' or '.join(group)}" for group in unsaid]
     if verdict["verdict"] not in expected.verdicts:
         missing.append(f"verdict {verdict['verdict']}")
     right = not missing
@@ -88,8 +93,11 @@ def score(result: Result) -> Score:
     return Score(right, near, dangerous, tuple(missing))
 
 
-def _wrongly_named(result: Result, expected: Expectation) -> list[str]:
-    """Steps whose effect was not hidden; also those that must not be named, or not without a rival."""
+def wrongly_named(result: Result, expected: Expectation, *, with_rivals: bool = True) -> list[str]:
+    """Steps whose effect was not hidden; also those that must not be named, or not without a rival.
+
+    with_rivals : whether a rival that is there excuses a step, where the expectation has `or_rival`.
+    """
     allowed = {name for group in (*expected.groups, *expected.constant_or) for name in group}
     # the weak disturbances are there, too: none has to be named, and each may be
     allowed |= {*expected.may_name, *expected.constant, *result["answer"].get("weak_disturbances", ())}
@@ -98,12 +106,16 @@ def _wrongly_named(result: Result, expected: Expectation) -> list[str]:
         # nobody planted anything: effects that the answers do not mention may be there
         alone = {step["effect"] for step in steps(result) if not step["rivals"]}
         return forbidden + [name for name in expected.never_alone if name in alone]
-    return [name for name in names(result) if name not in allowed]
+    told = [
+        ({step["effect"], *(step["rivals"] if with_rivals and expected.or_rival else ())}, step["effect"])
+        for step in steps(result)
+    ]
+    return [name for either, name in told if not either & allowed]
 
 
 def _only_wrong_names(result: Result, expected: Expectation) -> bool:
     """Whether an effect is named, without a rival that may be, where none should be."""
-    wrong = _wrongly_named(result, expected)
+    wrong = wrongly_named(result, expected)
     may = set(expected.may_name)
     return not expected.groups and any(s["effect"] in wrong and not may & set(s["rivals"]) for s in steps(result))
 
@@ -124,9 +136,15 @@ def _no_constant(result: Result, expected: Expectation) -> list[tuple[str, ...]]
 
 
 def _not_followed(result: Result, expected: Expectation) -> list[str]:
-    entries = result["verdict"]["depends_on"][: expected.first or None]
-    followed = {name for entry in entries for name in (entry.get("covariate"), *entry.get("beside", ()))}
-    return [f"does not say that it follows {' or '.join(g)}" for g in expected.follows if not followed & set(g)]
+    followed = _followed(result, expected.first)
+    wrong = [f"follows {name}" for name in expected.never_follows if name in followed]
+    return wrong + [f"does not say that it follows {' or '.join(g)}" for g in expected.follows if not followed & set(g)]
+
+
+def _followed(result: Result, first: int = 0) -> set[str | None]:
+    """What the rest follows, by the first findings; 0 for all."""
+    entries = result["verdict"]["depends_on"][: first or None]
+    return {name for entry in entries for name in (entry.get("covariate"), *entry.get("beside", ()))}
 
 
 def _change_missing(result: Result, expected: Expectation) -> list[str]:
@@ -165,8 +183,11 @@ def _residual_and_rows(result: Result, expected: Expectation) -> list[str]:
     left_um = min([verdict["final_rms_um"], *(value for value in described_um if value is not None)])
     if expected.left_um is not None and left_um > expected.left_um:
         missing.append(f"leaves {left_um:.3g} um, not {expected.left_um:g}")
-    if len(verdict["outlier_rows"]) < expected.gross_rows:
-        missing.append(f"{len(verdict['outlier_rows'])} gross rows, not {expected.gross_rows}")
+    if expected.left_um_at_least is not None and left_um < expected.left_um_at_least:
+        missing.append(f"leaves {left_um:.3g} um, where {expected.left_um_at_least:.3g} cannot be taken away")
+    gross, at_most = len(verdict["outlier_rows"]), expected.gross_rows_at_most
+    if gross < expected.gross_rows or (at_most is not None and gross > at_most):
+        missing.append(f"{gross} gross rows, not {expected.gross_rows if at_most is None else f'at most {at_most}'}")
     return missing
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
+from tests.scoreboard import reliability
+from tests.scoreboard.commit import commits_text
 from tests.scoreboard.families import FamilyScore, family_scores
 from tests.scoreboard.measures import floors, measures, named_first
 from tests.scoreboard.scoring import Result
@@ -13,7 +15,14 @@ from tests.scoreboard.scoring import Result
 def report(results: Sequence[Result]) -> str:
     """All tables of these results."""
     families = list(family_scores(results))
-    tables = (_families(families), _measures(results), _by_effect(results), _misses(families))
+    tables = (
+        [f"{len(results)} cases, commit {commits_text(results)}."],
+        _families(families),
+        _measures(results),
+        reliability.lines(reliability.reliability(results)),
+        _by_effect(results),
+        _misses(families),
+    )
     return "\n\n".join(text for table in tables if (text := "\n".join(table)))
 
 

@@ -10,10 +10,11 @@ from typing import Any
 
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording, compare, open_recording, search_constants
-from compd.diagnosis import Criteria, diagnose
+from compd.diagnosis import Criteria, Diagnosis, diagnose
 from compd.errors import CompdError
 from compd.model.effects import Effect, FittedEffect
 from compd.model.library import load_effects, load_library
+from tests.scoreboard.commit import commit
 
 ANSWER = "answer.json"
 # The family for which it is computed what the true effects, fitted, leave on the other recording: a bound, set by the
@@ -33,23 +34,18 @@ def read_answer(directory: Path) -> dict[str, Any]:
 
 def run(directory: Path, criteria: Criteria = Criteria()) -> dict[str, Any]:
     """One result: the diagnosis of the case in this directory beside its answer, which is opened afterwards."""
-    train, other = _open(directory, "train"), _open(directory, "other")
-    if train is None:
-        raise FileNotFoundError(directory / "train.csv")
-    effects = _effects(directory)
-    known, covariance = _known(directory, train, effects)
-    begin_s = time.process_time()
-    diagnosis = diagnose(train, known, covariance, effects, criteria=criteria)
-    took_s = time.process_time() - begin_s
+    diagnosis, took_s = diagnose_case(directory, criteria)
+    train, other = diagnosis.before.aligned, _open(directory, "other")
     answer = read_answer(directory)
     expected = answer["expected"]
     bounded = answer["family"] == BOUNDED
-    true_effects = _fitted(answer["answers"], train, effects)[0] if bounded else ()
+    true_effects = _fitted(answer["answers"], train, _effects(directory))[0] if bounded else ()
     return {
         "case": answer["case"],
         "family": answer["family"],
         "directory": directory.name,
         "verdict": diagnosis.as_json(),
+        "commit": commit(),
         "took_s": round(took_s, 3),
         "other_floor_ratio": _floor_ratio(other, diagnosis.after.fitted),
         "true_floor_ratio": _floor_ratio(other, true_effects) if bounded else None,
@@ -57,6 +53,18 @@ def run(directory: Path, criteria: Criteria = Criteria()) -> dict[str, Any]:
         "expected": expected,
         "answer": answer,
     }
+
+
+def diagnose_case(directory: Path, criteria: Criteria = Criteria()) -> tuple[Diagnosis, float]:
+    """The diagnosis of train.csv, and the processor time that it took, s; the answer is not looked at."""
+    train = _open(directory, "train")
+    if train is None:
+        raise FileNotFoundError(directory / "train.csv")
+    effects = _effects(directory)
+    known, covariance = _known(directory, train, effects)
+    begin_s = time.process_time()
+    diagnosis = diagnose(train, known, covariance, effects, criteria=criteria)
+    return diagnosis, time.process_time() - begin_s
 
 
 def _open(directory: Path, name: str) -> AlignedRecording | None:

@@ -19,6 +19,15 @@ from compd.arrays import FloatArray
 from compd.units import UM_PER_MM
 
 AXES = ("x", "y", "z")
+# Columns that are no quantities.
+FIXED = (
+    *("time_", "session", "visit", "point", "ball", "pin", "skew", "scale_", "joint_", "frame_", "approach_"),
+    *("commanded_", "reference_", "model_", "d_"),
+)
+# Before the name of a column's copy; by how much a row's copy is later, s.
+COPY, COPY_S = "again_", 1e-3
+# Other units, with the factor and the offset of their numbers.
+OTHER_UNITS = {"degC": ("K", 1.0, 273.15), "V": ("mV", 1000.0, 0.0), "A": ("mA", 1000.0, 0.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +44,7 @@ class RecordingFile:
     @property
     def rows(self) -> int:
         """N."""
-        return len(self.columns["time_s"])
+        return len(next(iter(self.columns.values())))
 
     @property
     def reference_columns(self) -> list[str]:
@@ -211,3 +220,53 @@ def move_rows(seed: int, share: float, most_um: float, as_run: bool = False) -> 
         return file.with_columns(columns)
 
     return change
+
+
+def move_origin(seconds: float) -> Change:
+    """The clock began earlier, as where seconds count from 1970."""
+    return lambda file: file.with_columns({"time_s": file.columns["time_s"] + seconds})
+
+
+def double_rows(file: RecordingFile) -> RecordingFile:
+    """Every row at rest twice; a copy is COPY_S later, as no two rows may have one time.
+
+    Rows of a motion stay alone: a copy of them would say that the machine stood still.
+    """
+    point = file.columns.get("point", np.zeros(file.rows))
+    order = np.sort(np.concatenate([np.arange(file.rows), np.flatnonzero(~np.isnan(point))]))
+    is_copy = np.diff(order, prepend=-1) == 0
+    columns = {name: values[order] for name, values in file.columns.items()}
+    if "time_s" in columns:
+        columns["time_s"] = columns["time_s"] + COPY_S * is_copy
+    return replace(file, columns=columns)
+
+
+def double_columns(file: RecordingFile) -> RecordingFile:
+    """Every quantity twice, under another name, in the rows and at machine zero."""
+    doubled = file.with_columns({f"{COPY}{name}": file.columns[name].copy() for name in quantities(file)})
+    at_zero = file.sidecar.get("quantities_at_zero")
+    if at_zero is None:
+        return doubled
+    copies = {f"{COPY}{name}": value for name, value in at_zero.items()}
+    return replace(doubled, sidecar={**file.sidecar, "quantities_at_zero": {**at_zero, **copies}})
+
+
+def in_other_units(file: RecordingFile) -> RecordingFile:
+    """Every quantity whose unit is in OTHER_UNITS in that one, in the formulas too, but those that a library needs.
+
+    A column temperature_..._K would be refused, with how to convert it: it gets a name of its own.
+    """
+    for name in quantities(file):
+        if name in file.sidecar.get("quantities_at_zero", ()):
+            continue
+        for old, (new, factor, offset) in OTHER_UNITS.items():
+            if name.endswith(f"_{old}"):
+                stem = name.removesuffix(old).removeprefix("temperature_")
+                file = other_unit(name, stem + new, factor, offset)(file)
+                break
+    return file
+
+
+def quantities(file: RecordingFile) -> list[str]:
+    """The columns whose meaning a recording's format does not fix, and temperatures, forces and weather."""
+    return [name for name in file.columns if not name.startswith(FIXED)]

@@ -16,7 +16,7 @@ from compd.machine_kinds import KINDS
 from compd.simulation import Mechanism, draw_hidden
 from compd.simulation.causes.catalogue import CAUSES
 from compd.simulation.truth.workspace import draw_points_mm
-from tests.scoreboard.cases import CONSTANT_CAUSES
+from tests.scoreboard.case import CONSTANT_CAUSES
 from tests.support.hidden_run import hidden_run, parse_output
 from tests.support.hidden_visits import visits_to
 from tests.support.simulated import run_directory

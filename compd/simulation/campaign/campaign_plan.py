@@ -11,7 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.warm_up import COLUMNS, Heat
-from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero, WorkshopWeather
+from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero, Weather, WorkshopWeather
 from compd.simulation.truth.workspace import draw_points_mm
 
 SESSIONS = 4
@@ -69,7 +69,7 @@ class CampaignPlan:
     number: int
     items: tuple[CampaignItem, ...]
     points_mm: FloatArray
-    weather: WorkshopWeather
+    weather: Weather
     warm_up_s: float = 0.0
     warm_up: tuple[Heat, ...] = ()
 

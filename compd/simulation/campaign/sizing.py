@@ -36,10 +36,12 @@ class CauseSizer:
         seed: int,
         floor_um: float = TRACKER_SIGMA_UM,
         air_at_zero: AirAtZero = STANDARD_AIR,
+        plan: CampaignPlan | None = None,
     ) -> None:
+        """plan : in which an error has its size; left out: the machine's usual campaign."""
         self._geometry, self._wiring, self._seed, self._floor_um = geometry, wiring, seed, floor_um
         self.mechanism = Mechanism(geometry)
-        self.plan: CampaignPlan = draw_campaign_plan(self.mechanism, seed, air_at_zero=air_at_zero)
+        self.plan = plan or draw_campaign_plan(self.mechanism, seed, air_at_zero=air_at_zero)
         self._short = self.plan.thinned(KEEP_ONE_IN)
 
     def error_in_floors(self, cause: Cause) -> float:

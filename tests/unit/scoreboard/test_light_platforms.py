@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.scoreboard.cases import KINDS_FAMILY, Case
+from tests.scoreboard.case import KINDS_FAMILY, Case
 from tests.scoreboard.prepare import prepare
 from tests.scoreboard.scoring import score
 from tests.scoreboard.trial import run

@@ -68,3 +68,36 @@ def test_ten_sensors_more_and_the_same_reference(columns):
     more = faults.with_distractors(columns, np.random.default_rng(5))
     assert len(more) == len(columns) + 10
     assert all((more[name] == columns[name]).all() for name in columns)
+
+
+def test_values_in_steps_are_multiples_of_one(columns):
+    shown = faults.reference_mm(faults.in_steps(columns, np.random.default_rng(6)))
+    steps = [step for step in faults.STEPS_UM if np.allclose(shown / UM / step, np.round(shown / UM / step), atol=1e-5)]
+    assert steps
+    error = (shown - faults.reference_mm(columns)) / UM
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(steps[-1] / np.sqrt(12), rel=0.1)
+    assert faults.rms_um({**columns, **_reference(shown)}, columns) == pytest.approx(np.sqrt(np.mean(error**2)))
+
+
+def test_a_target_sits_elsewhere_from_a_session_on(columns):
+    sessions = {**columns, "session": 1.0 + np.arange(ROWS) // 150}
+    moved, begin_s = faults.with_target_re_mounted(sessions, np.random.default_rng(7))
+    error = error_um(columns, moved)
+    later = columns["time_s"] >= begin_s
+    assert 0 < later.sum() < ROWS
+    assert later.sum() % 150 == 0
+    assert np.abs(error[~later]).max() < 1e-6
+    assert np.ptp(error[later], axis=0).max() < 1e-5
+    assert 4.0 <= np.sqrt(np.mean(error[later] ** 2)) / TRACKER_SIGMA_UM <= 12.0
+
+
+def test_a_touched_plane_has_one_height_and_no_pin(columns):
+    touched = {name: values for name, values in columns.items() if not name.startswith("reference_")}
+    touched |= {"point": 1.0 + np.arange(ROWS) % 5, "pin": np.ones(ROWS)}
+    plane = faults.on_a_plane(touched, np.array([[x, 0.0, -12.5] for x in range(5)]))
+    assert set(plane["reference_z_mm"]) == {-12.5}
+    assert not {"pin", "reference_x_mm", "reference_y_mm"} & set(plane)
+
+
+def _reference(values):
+    return dict(zip((f"reference_{axis}_mm" for axis in "xyz"), values.T, strict=True))

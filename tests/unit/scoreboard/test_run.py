@@ -10,7 +10,7 @@ import yaml
 from compd.diagnosis import Criteria
 from compd.model.library import load_effects
 from compd.threshold import value_of
-from tests.scoreboard.cases import Case
+from tests.scoreboard.case import Case
 from tests.scoreboard.page import write_page
 from tests.scoreboard.prepare import prepare
 from tests.scoreboard.real import prepare_real

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.scoreboard.cases import CONSTANT_CAUSES, Case
+from tests.scoreboard.case import CONSTANT_CAUSES, Case
 from tests.scoreboard.expectation import Change, Expectation, expectation
 from tests.scoreboard.scoring import intervals, score
 
@@ -171,3 +171,78 @@ def test_intervals_of_numbers_that_have_a_true_value():
     scored = result(CONSTANT, "identified", step("link_zero", parameters=parameters))
     scored["answer"] = {"effects": {"link_zero": [1.1, 2.5, 3.0]}}
     assert [inside for _, inside in intervals(scored)] == [True, False]
+
+
+ONE_OF_TWO = Expectation(("likely", "ambiguous", "partial"), (("link_expansion",),), or_rival=True)
+STEPS = Expectation(NAMED, (("stage_gain",),), left_um_at_least=0.1)
+TOUCHED = Expectation(NAMED, (("link_sag",),), never_follows=("tip_z_mm",))
+SMALL_ONES = Expectation(
+    ("unexplained", *NAMED), may_name=("backlash", "link_sag"), or_rival=True, identified_needs=(("backlash",),)
+)
+HEIGHT = {"covariate": "tip_z_mm", "form": "linear"}
+
+
+@pytest.mark.parametrize(
+    ("scored", "kind"),
+    [
+        (result(ONE_OF_TWO, "likely", step("link_expansion")), "right"),
+        (result(ONE_OF_TWO, "ambiguous", step("tool_expansion", "link_expansion")), "right"),
+        (result(ONE_OF_TWO, "identified", step("link_expansion")), "dangerous"),
+        (result(ONE_OF_TWO, "likely", step("tool_expansion")), "missed"),
+        (result(ONE_OF_TWO, "ambiguous", step("link_expansion"), step("tool_expansion")), "near"),
+        (result(STEPS, "identified", step("stage_gain")), "right"),
+        (result(STEPS, "identified", step("stage_gain"), final_rms_um=4e-7), "dangerous"),
+        (result(STEPS, "partial", step("stage_gain"), final_rms_um=0.05), "near"),
+        (result(TOUCHED, "partial", step("link_sag"), depends_on=[TIME]), "right"),
+        (result(TOUCHED, "partial", step("link_sag"), depends_on=[HEIGHT]), "near"),
+        (result(TOUCHED, "unexplained", depends_on=[HEIGHT]), "missed"),
+        (result(SMALL_ONES, "unexplained"), "right"),
+        (result(SMALL_ONES, "partial", step("link_sag")), "right"),
+        (result(SMALL_ONES, "partial", step("joint_contact", "link_sag")), "right"),
+        (result(SMALL_ONES, "partial", step("joint_contact")), "missed"),
+        (result(SMALL_ONES, "identified", step("backlash")), "right"),
+        (result(SMALL_ONES, "identified", step("link_sag")), "dangerous"),
+        (result(SMALL_ONES, "adequate"), "dangerous"),
+    ],
+)
+def test_where_an_honest_analysis_says_less(scored, kind):
+    assert kinds(scored) == kind
+
+
+def hard(family: str, *causes: str, seed: int = 1, **more: Any) -> Expectation:
+    floors = dict.fromkeys(causes, 3.0)
+    answer = {"answers": list(causes), "follows": [], "error_in_floors": floors, "zero_is_unknown": False, **more}
+    return expectation(Case(family, causes, tuple(floors.values()), seed), answer, 50.0)
+
+
+def test_what_is_expected_of_hard_cases():
+    assert "identified" not in hard("one-warm-up", "link_expansion").verdicts
+    assert hard("rounded", "stage_gain", left_um=0.2, always_there=["stage_offset"]) == Expectation(
+        ("identified", "likely", "ambiguous", "partial"),
+        (("stage_gain",),),
+        may_name=("stage_offset",),
+        left_um_at_least=pytest.approx(0.14),
+        or_rival=True,
+    )
+    assert hard("wrong-noise").verdicts == ("adequate", "unexplained")
+    assert hard("wrong-noise", "backlash").groups == (("backlash",),)
+    assert "tip_z_mm" in hard("plane", "link_sag").never_follows
+    assert hard("re-mounted", "backlash").change == Change(CONSTANT_CAUSES, 50.0)
+    assert hard("many-small", "backlash", "link_zero").identified_needs == (("backlash",), CONSTANT_CAUSES)
+    assert hard("zero-elsewhere", "backlash").may_name == ()
+    assert hard("zero-elsewhere", "backlash", zero_is_unknown=True).may_name == CONSTANT_CAUSES
+
+
+def test_a_description_may_stand_for_a_cause_where_the_answer_says_so():
+    drift = Expectation(NAMED, (("reference_drift", "time_s"),))
+    assert kinds(result(drift, "partial", depends_on=[TIME])) == "right"
+    assert kinds(result(drift, "partial", depends_on=[HUMIDITY])) == "missed"
+
+
+def test_gross_rows_may_be_too_many():
+    at_most_one = Expectation(NAMED, gross_rows_at_most=1)
+    assert score(result(at_most_one, "partial", family="real", outlier_rows=[3, 4])).missing == (
+        "2 gross rows, not at most 1",
+    )
+    assert score(result(at_most_one, "partial", family="real", outlier_rows=[3])).right
+    assert Expectation.from_json(json.loads(json.dumps(at_most_one.as_json()))) == at_most_one

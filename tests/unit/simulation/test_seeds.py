@@ -14,6 +14,7 @@ from compd.simulation.causes.hidden_cause import HiddenCause, draw_hidden
 from compd.simulation.causes.link import LinkZero
 from compd.simulation.truth.mechanism import Mechanism
 from tests.scoreboard import cases as scoreboard
+from tests.scoreboard import draws as scoreboard_draws
 from tests.support.simulated import TRIPOD, hexapod, tripod
 
 MACHINES = (Mechanism(tripod()), Mechanism(hexapod()))
@@ -31,7 +32,7 @@ class AddedCause(LinkZero):
 def add_cause(monkeypatch: pytest.MonkeyPatch) -> None:
     """Put the added cause before all others, so that every place in the list changes."""
     causes = {AddedCause.id: AddedCause, **CAUSES}
-    for module in (catalogue, hidden_cause, sizing, scoreboard):
+    for module in (catalogue, hidden_cause, sizing, scoreboard_draws):
         monkeypatch.setattr(module, "CAUSES", causes)
     assert next(iter(possible_causes(MACHINES[0]))) == AddedCause.id
 
