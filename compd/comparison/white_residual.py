@@ -97,5 +97,5 @@ def _shares(residual: FloatArray) -> tuple[list[float], list[float]]:
     count = len(residual)
     squares = np.maximum(((residual - residual.mean(axis=0)) ** 2).sum(axis=0), 1e-300)
     eta = (np.diff(residual, axis=0) ** 2).sum(axis=0) / squares
-    std = np.sqrt(4.0 * (count - 2) / (count**2 - 1))
+    std = 2.0 * np.sqrt((count - 2) / (count**2 - 1))
     return (1.0 - eta / 2.0).tolist(), ndtr((eta - 2.0) / std).tolist()

@@ -6,8 +6,7 @@ from .findings import CandidateResult as CandidateResult
 from .findings import DiagnosisStep as DiagnosisStep
 from .findings import EmpiricalFinding as EmpiricalFinding
 from .holdout import Holdout as Holdout
-from .holdout import confirmed as confirmed
-from .holdout import evaluate_holdout as evaluate_holdout
+from .holdout import evaluate_holdouts as evaluate_holdouts
 from .recording_diagnosis import candidate_pool as candidate_pool
 from .recording_diagnosis import diagnose as diagnose
 from .search.gross_rows import RowWeights as RowWeights

@@ -72,6 +72,19 @@ class DescriptionCriteria:
         meaning="time constants that are tried for a lag",
         reason="from a fan's minutes to a granite plate's morning, a factor of 2.4 apart",
     )
+    constant_share: float = threshold(
+        0.3,
+        unit="share of the prediction's scatter",
+        meaning="a coordinate of which the reference scatters by less has a constant reference, as a straight edge is",
+        reason="a choice: a reference that follows the machine scatters as the prediction does",
+    )
+    copy_correlation: float = threshold(
+        0.99,
+        unit="correlation",
+        meaning="a column that goes with the prediction so well is its copy, and describes nothing of a residual "
+        "against a constant reference",
+        reason="a choice: a seventh of it (sin of the angle) is its own",
+    )
     step_times: int = threshold(
         24,
         unit="times",

@@ -43,16 +43,6 @@ class Holdout:
         }
 
 
-def confirmed(diagnosis: Diagnosis, holdouts: Sequence[Holdout]) -> Diagnosis:
-    """The diagnosis, identified where it was likely and what it found brings a sealed recording down to its noise."""
-    if diagnosis.verdict != "likely" or not any(
-        holdout.after.floor.known and holdout.after.at_floor for holdout in holdouts
-    ):
-        return diagnosis
-    identified = replace(diagnosis, verdict="identified")
-    return replace(identified, summary=summary(identified))
-
-
 def evaluate_holdout(diagnosis: Diagnosis, aligned: AlignedRecording) -> Holdout:
     """Compare a holdout recording with the model before and after a diagnosis, by the same criteria.
 
@@ -61,3 +51,16 @@ def evaluate_holdout(diagnosis: Diagnosis, aligned: AlignedRecording) -> Holdout
     aligned = replace(aligned, criteria=diagnosis.before.criteria)
     before, after = (compare(aligned, comparison.fitted) for comparison in (diagnosis.before, diagnosis.after))
     return Holdout(before, after)
+
+
+def evaluate_holdouts(diagnosis: Diagnosis, recordings: Sequence[AlignedRecording]) -> tuple[Diagnosis, list[Holdout]]:
+    """Each holdout recording, and the diagnosis with what they say.
+
+    It is identified where it was likely, and what it found brings one of them down to its noise.
+    Raises CompdError as `evaluate_holdout` does.
+    """
+    holdouts = [evaluate_holdout(diagnosis, recording) for recording in recordings]
+    if diagnosis.verdict == "likely" and any(each.after.floor.known and each.after.at_floor for each in holdouts):
+        diagnosis = replace(diagnosis, verdict="identified")
+        diagnosis = replace(diagnosis, summary=summary(diagnosis))
+    return diagnosis, holdouts

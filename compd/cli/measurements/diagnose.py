@@ -43,7 +43,7 @@ def diagnose(
 
     from compd.api import diagnose as diagnose_recording
     from compd.cli.progress import steps_shown
-    from compd.diagnosis import confirmed, evaluate_holdout
+    from compd.diagnosis import evaluate_holdouts
     from compd.report import print_diagnosis
 
     if html is not None:
@@ -54,8 +54,7 @@ def diagnose(
     aligned, all_rows = _open(recordings[0], machine, ranges or (), hold or ())
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
-    holdouts = [evaluate_holdout(diagnosis, recording) for recording in sealed]
-    diagnosis = confirmed(diagnosis, holdouts)
+    diagnosis, holdouts = evaluate_holdouts(diagnosis, sealed)
     if html is not None:
         from compd.report import write_diagnosis_page
 

@@ -197,7 +197,7 @@ def empirical_terms(
     ports = list(_ports(aligned))
     timed = aligned.recording.has_time
     grid_of = _Grids(residual_um[rows], criteria, aligned.criteria.periods)
-    for covariate in search_covariates(aligned, rows):
+    for covariate in search_covariates(aligned, rows, criteria):
         yield from _terms_of(covariate, ports, grid_of, timed=timed, known=aligned.model is not None)
     time = SearchCovariate("time_s", "other", aligned.rows.time_s[rows])
     grids = {"step": step_times_s(time.values, criteria)} if aligned.in_order else {}

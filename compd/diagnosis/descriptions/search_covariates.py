@@ -15,6 +15,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison import AlignedRecording, why_no_covariate
+from compd.diagnosis.candidate_criteria import DescriptionCriteria
 from compd.units import UNIT_KINDS, unit_of
 
 # What a covariate is, by its unit: it decides in which forms a residual may follow it.
@@ -22,10 +23,6 @@ Kind: TypeAlias = Literal["workspace", "place", "angle", "load", "flow", "other"
 
 STAYED_THE_SAME = "stayed the same"
 OWN_PREDICTION = "goes with the model's own prediction, and the reference is constant: the residual is its mirror image"
-# A coordinate of which the reference scatters by less, as a share of the prediction's scatter, has a constant one.
-CONSTANT_SHARE = 0.3
-# Of the correlation with the prediction, from which on a column is a copy of it.
-COPY_CORRELATION = 0.99
 # Smaller changes, as a share of the largest value, are rounding.
 MIN_CHANGE = 1e-9
 # A middle nearer to zero than this share of the covariate's range is zero, and it is rounded to half of that.
@@ -74,30 +71,38 @@ class SearchCovariate:
         return 0.0 if self.kind == "load" else round_middle(self.values)
 
 
-def search_covariates(aligned: AlignedRecording, rows: BoolArray) -> list[SearchCovariate]:
+def search_covariates(
+    aligned: AlignedRecording, rows: BoolArray, criteria: DescriptionCriteria = DescriptionCriteria()
+) -> list[SearchCovariate]:
     """Every measured quantity that a residual may follow, then the coordinates of the tip; of equal columns the first.
 
     rows : (N,) those to look at, of the usable ones.
     """
-    reasons = untried_quantities(aligned)
+    reasons = untried_quantities(aligned, criteria)
     found = [
         SearchCovariate(name, kind_of(name), column[rows])
         for name, column in aligned.gaps_filled.rows.quantities.items()
         if name not in reasons
     ]
     tip: Kind = "place" if aligned.model is None else "workspace"
-    mirrored = _mirrored_predictions(aligned)
+    mirrored = _mirrored_predictions(aligned, criteria)
     for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True):
         values = column[rows]
-        if np.isfinite(values).all() and _changes(values) and not _is_among(values, found) | _is_copy(column, mirrored):
+        if (
+            np.isfinite(values).all()
+            and _changes(values)
+            and not _is_among(values, found) | _is_copy(column, mirrored, criteria)
+        ):
             found.append(SearchCovariate(f"tip_{axis}_mm", tip, values))
     return found
 
 
-def untried_quantities(aligned: AlignedRecording) -> dict[str, str]:
+def untried_quantities(
+    aligned: AlignedRecording, criteria: DescriptionCriteria = DescriptionCriteria()
+) -> dict[str, str]:
     """The measured quantities that are not searched, with the reason in words."""
     usable = aligned.usable.mask
-    mirrored = _mirrored_predictions(aligned)
+    mirrored = _mirrored_predictions(aligned, criteria)
     reasons: dict[str, str] = {}
     for name, column in aligned.gaps_filled.rows.quantities.items():
         known = column[usable & np.isfinite(column)]
@@ -108,7 +113,7 @@ def untried_quantities(aligned: AlignedRecording) -> dict[str, str]:
             reasons[name] = f"empty in {100 * empty:.0f} % of the rows"
         elif not _changes(known):
             reasons[name] = STAYED_THE_SAME
-        elif _is_copy(column, mirrored):
+        elif _is_copy(column, mirrored, criteria):
             reasons[name] = OWN_PREDICTION
     return reasons
 
@@ -141,21 +146,24 @@ def _changes(values: FloatArray) -> bool:
     return len(values) > 0 and float(np.ptp(values)) > MIN_CHANGE * max(1.0, float(np.abs(values).max()))
 
 
-def _mirrored_predictions(aligned: AlignedRecording) -> list[FloatArray]:
+def _mirrored_predictions(aligned: AlignedRecording, criteria: DescriptionCriteria) -> list[FloatArray]:
     """(N,) the prediction of each coordinate of which the reference is constant, as a straight edge's is.
 
     There the residual is the prediction with its sign reversed: whatever goes with that explains it, and says nothing.
     """
     predicted_mm, usable = aligned.predicted_mm({}), aligned.usable.mask
     scatter_mm = [np.nanstd(values[usable], axis=0) for values in (aligned.measured_mm, predicted_mm)]
-    return [predicted_mm[:, k] for k in np.flatnonzero(scatter_mm[0] < CONSTANT_SHARE * scatter_mm[1])]
+    return [predicted_mm[:, k] for k in np.flatnonzero(scatter_mm[0] < criteria.constant_share * scatter_mm[1])]
 
 
-def _is_copy(column: FloatArray, predictions: list[FloatArray]) -> bool:
+def _is_copy(column: FloatArray, predictions: list[FloatArray], criteria: DescriptionCriteria) -> bool:
     """Whether a column (N,) goes with one of some predictions (N,)."""
     for prediction in predictions:
         known = np.isfinite(column) & np.isfinite(prediction)
-        if _changes(column[known]) and abs(np.corrcoef(column[known], prediction[known])[0, 1]) > COPY_CORRELATION:
+        if (
+            _changes(column[known])
+            and abs(np.corrcoef(column[known], prediction[known])[0, 1]) > criteria.copy_correlation
+        ):
             return True
     return False
 

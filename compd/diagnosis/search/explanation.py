@@ -83,11 +83,6 @@ class Explanation:
         """Cross-validated loss of the whole set."""
         return self.losses.loss(self.members)
 
-    @property
-    def reduced_chi_squared(self) -> float:
-        """Mean square that the whole set leaves where it was fitted, in squares of the noise floor."""
-        return min(self.loss, self.losses.reduced_chi_squared(self.members))
-
     def fit_of(self, member: int) -> EmpiricalFit:
         """The term that a description is."""
         return self.fit_by_place[member]

@@ -111,12 +111,6 @@ class SubsetLosses:
         subsets = self.evaluate([members])
         return subsets[0].cv_loss if subsets else float("inf")
 
-    def reduced_chi_squared(self, members: Sequence[int]) -> float:
-        """Mean square that a set leaves where it was fitted, per degree of freedom, in squares of the noise floor."""
-        index = self.index(members)
-        _, _, left = self.equations.estimate(index)
-        return left * self.data.value_count / max(self.data.value_count - len(index), 1)
-
     def log_loss(self, loss: float) -> float:
         """Logarithm of a loss, not below the floor."""
         return float(np.log(max(loss, self._least_loss)))

@@ -105,7 +105,10 @@ def test_an_unknown_noise_is_never_called_noise() -> None:
 def test_what_was_tried_without_gain_is_not_called_untestable() -> None:
     tried = (CandidateResult("backlash", "no_gain", "takes 0 % of the error away"),)
     made = diagnosis("not_testable", 2.0, 2.0, Noise(0.3, "estimate"), candidates=tried)
-    assert summary_lines(made)[0] == "not_testable: no effect that was tried surely lowers the error; the noise is not known"
+    assert (
+        summary_lines(made)[0]
+        == "not_testable: no effect that was tried surely lowers the error; the noise is not known"
+    )
     assert made.summary.endswith("No effect that was tried surely lowers it.")
 
 
