@@ -341,7 +341,6 @@ class Comparison:
             "prediction_std_um": {
                 "total": rms(self.uncertainty.total_um[self.used][:, self.aligned.lengths]),
                 "gauges": rms(self.uncertainty.gauges_um[self.used][:, self.aligned.lengths]),
-                "quantities": rms(self.uncertainty.quantities_um[self.used][:, self.aligned.lengths]),
                 "parameters": rms(self.uncertainty.parameters_um[self.used][:, self.aligned.lengths]),
                 "how": "no gauges of its own" if self.gauges is None else self.gauges.how,
             },

@@ -22,7 +22,7 @@ from compd.display_unit import MM_PER_RAD
 from compd.errors import Problem, RecordingError
 from compd.model import GaugeNoise, link_residuals
 from compd.model.effects import FittedEffect
-from compd.statistics import last_digit_um
+from compd.statistics import copied_rows, last_digit_um
 from compd.units import UM_PER_MM
 
 # Outliers bend nuisance terms a little, and these decide which rows are outliers: two rounds settle it.
@@ -53,7 +53,7 @@ def compare(
     gauges, uncertainty = _uncertainty(aligned, residual_um, used, fitted, covariance, criteria)
     floor = noise_floor(
         residual_um,
-        used,
+        used & ~copied_rows(residual_um, used),
         aligned.recording.visit,
         _declared_um(aligned),
         np.sqrt(np.mean(uncertainty.noise_um[used] ** 2, axis=0)),
@@ -150,7 +150,7 @@ def _uncertainty(
     # who lifts a probe off and sets it down again moves the scales by the seat's noise, which is the reference's
     gauges = gauge_noise(aligned, from_repeats=aligned.ends is None)
     uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
-    repeats = repeat_scatter(residual_um, used, aligned.recording.visit, criteria)
+    repeats = repeat_scatter(residual_um, used & ~copied_rows(residual_um, used), aligned.recording.visit, criteria)
     if repeats is not None:
         gauges_um = np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0))
         # what the gauges' noise alone does to the residual cannot be more than the residual's own scatter

@@ -148,7 +148,8 @@ def explain_residual(
     pool = candidate_pool(before, effects, criteria.candidates)
     problem = build_problem(before, pool, criteria)
     explanation = explain(problem, progress)
-    if not explanation.members and (counted := counted_by_neighbours(before)) is not None:
+    quiet = not explanation.members and problem.may_be_noise(explanation.loss)
+    if quiet and (counted := counted_by_neighbours(before)) is not None:
         before = counted
         problem = build_problem(before, pool, criteria)
         explanation = explain(problem, progress)

@@ -8,6 +8,9 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 
+# Pairs of rows that are alike by chance, from which on likeness proves no copy.
+CHANCE_PAIRS = 0.01
+
 
 class ReplicatePairs(NamedTuple):
     """All pairs of rows within visits.
@@ -53,3 +56,23 @@ def replicate_pairs(use: BoolArray, visit: IntArray | None, max_rows: int) -> Re
     if not first:
         return None
     return ReplicatePairs(np.concatenate(first), np.concatenate(second), np.concatenate(weight))
+
+
+def copied_rows(values: FloatArray, use: BoolArray) -> BoolArray:
+    """(N,) rows of which an earlier one has the same values (N, m) to the last digit, where that is no chance.
+
+    A row that was written twice is no repeat. Of D_k different values on coordinate k, as a coarse display shows,
+    N^2 / 2 / prod(D_k) pairs of rows are alike by chance; where that is a pair in a hundred or more, none is a copy.
+
+    use : (N,) rows among which they are sought.
+    """
+    copies = np.zeros(len(values), dtype=bool)
+    rows = np.flatnonzero(use & np.isfinite(values).all(axis=1))
+    if not len(rows):
+        return copies
+    different = [len(np.unique(column)) for column in values[rows].T]
+    if len(rows) ** 2 / 2 / np.prod(np.asarray(different, dtype=np.float64)) >= CHANCE_PAIRS:
+        return copies
+    _, first = np.unique(values[rows], axis=0, return_index=True)
+    copies[np.setdiff1d(rows, rows[first])] = True
+    return copies

@@ -211,7 +211,7 @@ def empirical_terms(
         return
     for port in ports:
         if port.port == "link":
-            for name, middle, form in _link_covariates(aligned, rows):
+            for name, middle, form in _link_covariates(aligned, rows, criteria):
                 yield replace(port, covariate=name, form=form, middle=middle)
 
 
@@ -283,9 +283,11 @@ def _ports(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
         yield EmpiricalTerm("", "", "reference", 0.0, 0.0, axes=axes, with_constant=with_constant, residual_unit=unit)
 
 
-def _link_covariates(aligned: AlignedRecording, rows: BoolArray) -> Iterator[tuple[str, float, str]]:
+def _link_covariates(
+    aligned: AlignedRecording, rows: BoolArray, criteria: DescriptionCriteria
+) -> Iterator[tuple[str, float, str]]:
     """Covariates that each link has of its own, with their middle and form."""
-    machine, reasons = aligned.rows, untried_quantities(aligned)
+    machine, reasons = aligned.rows, untried_quantities(aligned, criteria)
     links_by_quantity: dict[tuple[str, str], set[int]] = {}
     for name in aligned.recording.quantities:
         # one link's quantity may have stayed the same: the others' did not

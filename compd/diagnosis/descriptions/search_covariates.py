@@ -22,6 +22,7 @@ from compd.units import UNIT_KINDS, unit_of
 Kind: TypeAlias = Literal["workspace", "place", "angle", "load", "flow", "other"]
 
 STAYED_THE_SAME = "stayed the same"
+NOT_AT_ZERO = "was not read at machine zero, from where quantities count: add it to `quantities_at_zero:`"
 OWN_PREDICTION = "goes with the model's own prediction, and the reference is constant: the residual is its mirror image"
 # Smaller changes, as a share of the largest value, are rounding.
 MIN_CHANGE = 1e-9
@@ -79,11 +80,10 @@ def search_covariates(
     rows : (N,) those to look at, of the usable ones.
     """
     reasons = untried_quantities(aligned, criteria)
-    found = [
-        SearchCovariate(name, kind_of(name), column[rows])
-        for name, column in aligned.gaps_filled.rows.quantities.items()
-        if name not in reasons
-    ]
+    found: list[SearchCovariate] = []
+    for name, column in aligned.gaps_filled.rows.quantities.items():
+        if name not in reasons and not _is_among(column[rows], found):
+            found.append(SearchCovariate(name, kind_of(name), column[rows]))
     tip: Kind = "place" if aligned.model is None else "workspace"
     mirrored = _mirrored_predictions(aligned, criteria)
     for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True):
@@ -101,7 +101,7 @@ def untried_quantities(
     aligned: AlignedRecording, criteria: DescriptionCriteria = DescriptionCriteria()
 ) -> dict[str, str]:
     """The measured quantities that are not searched, with the reason in words."""
-    usable = aligned.usable.mask
+    usable, at_zero = aligned.usable.mask, aligned.rows.quantities_at_zero
     mirrored = _mirrored_predictions(aligned, criteria)
     reasons: dict[str, str] = {}
     for name, column in aligned.gaps_filled.rows.quantities.items():
@@ -115,6 +115,8 @@ def untried_quantities(
             reasons[name] = STAYED_THE_SAME
         elif _is_copy(column, mirrored, criteria):
             reasons[name] = OWN_PREDICTION
+        elif at_zero is not None and name not in at_zero:
+            reasons[name] = NOT_AT_ZERO
     return reasons
 
 

@@ -168,7 +168,7 @@ def test_json_has_the_keys_of_the_verdict_and_no_nan(tmp_path: Path) -> None:
     }
     step = again["steps"][0]
     assert set(step) >= {"effect", "rivals", "heldout_rms_um", "explained_fraction", "p_adjusted", "parameters"}
-    assert set(step["parameters"][0]) == {"name", "value", "std", "unit", "plausible"}
+    assert set(step["parameters"][0]) == {"name", "value", "std", "unit", "plausible", "determined"}
     assert step["p_adjusted"] <= 0.01
     assert again["floor_ratio"] == pytest.approx((again["residual_rms_um"] / again["noise_floor_um"]) ** 2)
     wanted = {"effect", "status", "why", "heldout_rms_um", "explained_fraction", "p_adjusted", "parameters"}

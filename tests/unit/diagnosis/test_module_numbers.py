@@ -48,6 +48,8 @@ NUMBERS = {
     "comparison/nuisance.py": {"MIN_SHARE": CONDITIONING, "SCATTER_ROUNDS": ITERATION},
     "comparison/row_faults.py": {"_AGREE_SHARE": WORDS},
     "comparison/shape_search.py": {"FINE": ITERATION},
+    "statistics/replicates.py": {"CHANCE_PAIRS": ROUNDING},
+    "comparison/prediction_uncertainty.py": {"NOISE_SEED": SEED},
     "statistics/last_digit.py": {"PER_STEP": DEFINITION, "STEPS_UM": DEFINITION},
     "statistics/least_squares.py": {
         "RANK_CUT": CONDITIONING,
@@ -123,7 +125,13 @@ NUMBERS = {
     "diagnosis/search/subset_losses.py": {"MIN_LOSS": ROUNDING},
     "diagnosis/unmodelled.py": {"RANK_CUT": CONDITIONING},
     "diagnosis/verdict.py": {"VERDICT_VERSION": WORDS},
-    "diagnosis/words/phrases.py": {"MAX_VALUES": WORDS, "MAX_RIVALS": WORDS, "MAX_ROWS": WORDS},
+    "diagnosis/words/phrases.py": {
+        "MAX_VALUES": WORDS,
+        "MAX_RIVALS": WORDS,
+        "MAX_ROWS": WORDS,
+        "MAX_DOUBTS": WORDS,
+        "CANCELLING": WORDS,
+    },
     "diagnosis/words/summary_lines.py": {
         "MAX_LINES": WORDS,
         "WIDTH": WORDS,
