@@ -156,7 +156,8 @@ def _noise_floor(
     is_declared = bool(np.isfinite(declared_um).all())
     scatter = repeat_scatter(residual_um, use, visit, criteria)
     if scatter is not None and scatter.pairs >= criteria.fewest_pairs:
-        scatter = scatter._replace(by_axis_um=np.maximum(scatter.by_axis_um, digit_um))
+        rounded_um = _rounded_scatter(residual_um, use, visit, digit_um, criteria)
+        scatter = scatter._replace(by_axis_um=np.where(scatter.by_axis_um < digit_um, rounded_um, scatter.by_axis_um))
         if (scatter.by_axis_um > 0).all():
             return _from_repeats(scatter, expected_um if is_declared else None, criteria, units)
     no_repeats = _why_no_repeats(scatter, criteria)
@@ -171,6 +172,22 @@ def _noise_floor(
         how = f"declared: {declared}; {no_repeats}, so nothing tests it"
         return NoiseFloor(expected_um, "declared", how, float("inf"))
     return estimate
+
+
+def _rounded_scatter(
+    residual_um: FloatArray, use: BoolArray, visit: IntArray | None, digit_um: FloatArray, criteria: ComparisonCriteria
+) -> FloatArray:
+    """(m,) noise where repeats differ by less than the last digit's uncertainty: both together.
+
+    What rounding takes off a place is the same in each of its repeats, so that these show only how often the digit
+    turns. A robust scatter does not see that; it is the root mean square of the differences, none larger than a few
+    steps.
+    """
+    pairs = replicate_pairs(use & np.isfinite(residual_um).all(axis=1), visit, criteria.max_rows_of_visit)
+    assert pairs is not None, "there are repeats"
+    most_um = criteria.outlier_sigmas * digit_um
+    difference_um = np.clip(pairs.difference(residual_um), -most_um, most_um)
+    return np.asarray(np.sqrt(digit_um**2 + np.average(difference_um**2, axis=0, weights=pairs.weight)))
 
 
 def _too_large(estimate: NoiseFloor, expected_um: FloatArray, criteria: ComparisonCriteria, units: Units) -> str:

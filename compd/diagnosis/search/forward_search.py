@@ -78,10 +78,10 @@ def right_alone(losses: SubsetLosses, subset: Subset) -> Subset:
     """The set with its effects exchanged where, without its descriptions, as many other effects leave less.
 
     A description of much of the error lets an effect look needed that alone is worse than another. The descriptions are
-    sought anew beside those that are exchanged.
+    sought anew beside those that are exchanged. What changed at a moment stays: it is no other effect's to explain.
     """
-    named = tuple(k for k in subset.members if losses.candidates[k].kind in ("effect", "constant"))
-    if not losses.described(subset.members) or not any(losses.candidates[k].kind == "effect" for k in named):
+    named = tuple(k for k in subset.members if losses.candidates[k].kind in ("effect", "constant", "change"))
+    if len(named) == len(subset.members) or not any(losses.candidates[k].kind == "effect" for k in named):
         return subset
     effects = [k for k, candidate in enumerate(losses.candidates) if candidate.kind in ("effect", "constant")]
     alone = Subset(named, losses.loss(named))

@@ -66,7 +66,20 @@ class DiagnosisProblem:
 
     def is_at_floor(self, loss: float) -> bool:
         """Whether a loss is so near the noise that nothing worth a name is left; never where the noise is not known."""
-        return self.floor_known and loss <= self.criteria.most_at_floor
+        return self.floor_known and loss <= self.criteria.most_at_floor * self.least_loss
+
+    @property
+    def least_loss(self) -> float:
+        """Below which nothing is gained: 1, the noise; more where the last digit makes most of it; 0 where the noise is
+        not known.
+
+        What rounding takes off follows from the value, and over a row of places it is as regular as they are: an effect
+        within half a step, sqrt(3) times the digit's uncertainty, cannot be told from it.
+        """
+        if not self.floor_known:
+            return 0.0
+        half_step = 3.0 * float(np.mean((self.comparison.floor.digit_um / self.sigma_um) ** 2))
+        return max(1.0, half_step / self.criteria.most_at_floor)
 
     def may_be_noise(self, loss: float) -> bool:
         """Whether a loss at which nothing more was found is at the floor, or chance as the floor is from few repeats.
@@ -121,7 +134,7 @@ class DiagnosisProblem:
     def losses(self, candidates: Sequence[Candidate]) -> SubsetLosses:
         """Of all sets of these candidates."""
         values = [self.whiten(candidate.columns_um) for candidate in candidates]
-        return SubsetLosses(self.data, candidates, values, self.criteria, 1.0 if self.floor_known else 0.0)
+        return SubsetLosses(self.data, candidates, values, self.criteria, self.least_loss)
 
     def weigh_beside(self, candidates: Sequence[Candidate]) -> RowWeights:
         """What each row counts beside some candidates alone."""
