@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 # Why a row does not count, beside the reasons of the recording itself, and OUTLIER.
 NO_QUANTITY = "a quantity that an effect needs is empty"
+COPIED = "an earlier row says the same to the last digit"
 # Trends that a notebook shows.
 MAX_TRENDS = 4
 
@@ -249,7 +250,8 @@ class Comparison:
     def why_left_out(self) -> TextArray:
         """(N,) why each row is not used, in words; "" for a row that is used."""
         reason = self.aligned.usable.reason.copy()
-        reason[(reason == "") & ~np.isfinite(self.residual_um).all(axis=1)] = NO_QUANTITY
+        unknown = (reason == "") & ~np.isfinite(self.residual_um).all(axis=1)
+        reason[unknown] = NO_QUANTITY if NO_QUANTITY in self.left_out else COPIED
         reason[self.outlier] = OUTLIER
         return reason
 

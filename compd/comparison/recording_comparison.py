@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 
 from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
-from compd.comparison.comparison import NO_QUANTITY, Comparison
+from compd.comparison.comparison import COPIED, NO_QUANTITY, Comparison
 from compd.comparison.contributions import contributions
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.noise_floor import noise_floor, repeat_scatter
@@ -47,13 +47,15 @@ def compare(
     predicted_mm = aligned.predicted_mm(total)
     known, left_out = _known_rows(aligned, predicted_mm, criteria)
     residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM
+    if (copies := copied_rows(residual_um, known)).any():
+        known, left_out = known & ~copies, {**left_out, COPIED: int(copies.sum())}
     residual_um[~known] = np.nan
     residual_um, along, outlier = _without_nuisance(aligned, fitted, residual_um, known, criteria, outlier)
     used = known & ~outlier
     gauges, uncertainty = _uncertainty(aligned, residual_um, used, fitted, covariance, criteria)
     floor = noise_floor(
         residual_um,
-        used & ~copied_rows(residual_um, used),
+        used,
         aligned.recording.visit,
         _declared_um(aligned),
         np.sqrt(np.mean(uncertainty.noise_um[used] ** 2, axis=0)),
@@ -150,7 +152,7 @@ def _uncertainty(
     # who lifts a probe off and sets it down again moves the scales by the seat's noise, which is the reference's
     gauges = gauge_noise(aligned, from_repeats=aligned.ends is None)
     uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
-    repeats = repeat_scatter(residual_um, used & ~copied_rows(residual_um, used), aligned.recording.visit, criteria)
+    repeats = repeat_scatter(residual_um, used, aligned.recording.visit, criteria)
     if repeats is not None:
         gauges_um = np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0))
         # what the gauges' noise alone does to the residual cannot be more than the residual's own scatter

@@ -19,14 +19,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import FloatArray
 from compd.columns import ROW_ORDER
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import Comparison
 from compd.comparison.covariate import why_no_covariate
 from compd.comparison.noise_floor import Units, from_differences
 from compd.recording import sigma_key
-from compd.statistics import copied_rows
 from compd.text import percent_text
 
 
@@ -61,7 +60,7 @@ def counted_by_neighbours(comparison: Comparison) -> Comparison | None:
     found = _structure(comparison)
     if found is None:
         return None
-    aligned, floor, used = comparison.aligned, comparison.floor, _single_rows(comparison)
+    aligned, floor, used = comparison.aligned, comparison.floor, comparison.used
     orders = tuple(order[used] for order in row_orders(aligned).values())
     estimate = from_differences(comparison.residual_um[used], orders, floor.digit_um, "no visit is repeated")
     units = Units(aligned.unit, floor.angles)
@@ -75,15 +74,10 @@ def counted_by_neighbours(comparison: Comparison) -> Comparison | None:
     return replace(comparison, floor=floor)
 
 
-def _single_rows(comparison: Comparison) -> BoolArray:
-    """(N,) rows that count, without copies."""
-    return comparison.used & ~copied_rows(comparison.residual_um, comparison.used)
-
-
 def _structure(comparison: Comparison) -> Structure | None:
     """What the residual follows most surely; None where that may be chance, or is too little to matter."""
     aligned, criteria = comparison.aligned, comparison.aligned.criteria
-    rows = np.flatnonzero(_single_rows(comparison))
+    rows = np.flatnonzero(comparison.used)
     found: list[Structure] = []
     orders = row_orders(aligned)
     tests = len(orders) * len(aligned.labels)

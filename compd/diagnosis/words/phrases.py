@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -14,6 +15,7 @@ from compd.diagnosis.findings import (
     EmpiricalFinding,
     GrossRows,
     ImplausibleEffect,
+    ParameterEstimate,
     UntestedEffect,
 )
 from compd.diagnosis.thermal_evidence import seen_once
@@ -24,6 +26,10 @@ from compd.model.library import BUNDLED
 from compd.parameter_ranges import TOLERANCE_KEY
 from compd.text import chance_text, estimate_text, estimates_text, join_words, number_text, percent_text
 
+# The link or joint of a fitted number: 4 of k_4, 2 of d_2x.
+_NUMBERED = re.compile(r"_(\d+)[xyz]?$")
+# An effect acts at one of so many places if its numbers there are sure, and those elsewhere a small share of them.
+MIN_PLACES, SURE_SIGMAS, OTHERS_SHARE = 3, 3.0, 0.35
 # What a formula says of its physics where the person who wrote it said nothing.
 _NO_PHYSICS = FormulaDeclaration.model_fields["physics"].default
 _BUNDLED = frozenset(effect.id for effect in BUNDLED)
@@ -85,6 +91,32 @@ def parameter_texts(step: DiagnosisStep, links: int) -> dict[str, str]:
     for name, value in step.fitted.constants.items():
         texts[name] = f"{number_text(value, units.get(name, ''), 3)}, searched"
     return texts
+
+
+def named_with_place(step: DiagnosisStep) -> str:
+    """An effect with the link or joint where it acts, if it acts at one: "scale_gain (scale 4: +28 ppm)"."""
+    place = where_it_acts(step)
+    return f"{step.effect.id} ({place})" if place else step.effect.id
+
+
+def where_it_acts(step: DiagnosisStep) -> str:
+    """The link or joint whose numbers stand out: "scale 4: +28 ppm", "base joint 2"; "" where several do."""
+    numbers: dict[str, list[ParameterEstimate]] = {}
+    for number in step.parameters:
+        if match := _NUMBERED.search(number.name):
+            numbers.setdefault(match[1], []).append(number)
+    if len(numbers) < MIN_PLACES:
+        return ""
+    sizes = {place: math.hypot(*(number.value for number in group)) for place, group in numbers.items()}
+    first, second = sorted(sizes, key=lambda place: -sizes[place])[:2]
+    sure = any(abs(number.value) > SURE_SIGMAS * number.std for number in numbers[first])
+    if not sure or sizes[second] > OTHERS_SHARE * sizes[first]:
+        return ""
+    place = f"{step.effect.ports[0].replace('_', ' ')} {first}"
+    if len(numbers[first]) > 1:
+        return place
+    number = numbers[first][0]
+    return f"{place}: {'+' if number.value > 0 else ''}{number_text(number.value, number.unit, 2)}"
 
 
 def doubts(diagnosis: Diagnosis) -> list[str]:

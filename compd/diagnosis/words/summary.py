@@ -12,6 +12,7 @@ from compd.diagnosis.words.phrases import (
     change_text,
     doubts,
     followed_text,
+    named_with_place,
     question_text,
     rivals_text,
     shown_by,
@@ -35,7 +36,7 @@ def _verdict(diagnosis: Diagnosis) -> str:
     fall = error_fall(diagnosis)
     before, after = number_text(fall.before, fall.unit), number_text(fall.after, fall.unit)
     noise = f"where {fall.noise_text}" if fall.noise_known else CANNOT_KNOW
-    names = join_words([step.effect.id for step in diagnosis.steps])
+    names = join_words([named_with_place(step) for step in diagnosis.steps])
     match diagnosis.verdict:
         case "adequate" if fall.noise_known:
             but = " but for a constant" if diagnosis.constant else ""

@@ -18,6 +18,7 @@ from compd.diagnosis.words.phrases import (
     followed_text,
     gross_texts,
     is_best_a_change,
+    named_with_place,
     parameter_texts,
     physics_clause,
     rivals_text,
@@ -105,13 +106,15 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
     if doubts(diagnosis):
         text = f"{text.partition(';')[0]}; see what speaks against its numbers"
     texts = [text.format(join_words(ids)), text.format(count)]
+    if diagnosis.verdict != "ambiguous":
+        texts.insert(0, text.format(join_words([named_with_place(step) for step in diagnosis.steps])))
     if (asked := diagnosis.asked) is not None:
         takes = f"would take {percent_text(fall.share_of(asked.heldout_rms_um))}, with an implausible number"
         texts = [f"{asked.effect} {takes}", f"an effect {takes}"]
     if wrong := [fault for fault in diagnosis.after.faults if fault.consequence == "mend the column"]:
         texts = [wrong[0].what.partition(":")[0], "columns of the recording seem wrong"]
     headings = [f"{diagnosis.verdict}: {text}" for text in texts]
-    return headings[len(headings[0]) > WIDTH]
+    return next((heading for heading in headings if len(heading) <= WIDTH), headings[-1])
 
 
 def _above_the_noise(diagnosis: Diagnosis, fall: ErrorFall) -> str:
