@@ -16,7 +16,7 @@ from typing import Any
 import compd
 from compd.cli.app import app
 from compd.configuration import shipped_configuration
-from compd.diagnosis import Diagnosis, evaluate_holdout
+from compd.diagnosis import Diagnosis, evaluate_holdouts
 from compd.report import write_comparison_page, write_diagnosis_page
 from docs.gallery.cases import Case
 
@@ -51,7 +51,7 @@ def run_case(case: Case, directory: Path) -> Result:
         _compd(case.other_days_command)
         learn, other = compd.open_recording("learn.csv"), compd.open_recording("other.csv")
         diagnosis = compd.diagnose(learn)
-        holdout = evaluate_holdout(diagnosis, other)
+        diagnosis, (holdout,) = evaluate_holdouts(diagnosis, [other])
         write_comparison_page(directory / f"{case.name}-comparison.html", [diagnosis.before], shared_script=True)
         write_diagnosis_page(directory / f"{case.name}-diagnosis.html", diagnosis, [holdout], shared_script=True)
         formulas = _formulas(diagnosis)

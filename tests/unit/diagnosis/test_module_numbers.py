@@ -131,6 +131,9 @@ NUMBERS = {
         "MAX_ROWS": WORDS,
         "MAX_DOUBTS": WORDS,
         "CANCELLING": WORDS,
+        "MIN_PLACES": WORDS,
+        "SURE_SIGMAS": WORDS,
+        "OTHERS_SHARE": WORDS,
     },
     "diagnosis/words/summary_lines.py": {
         "MAX_LINES": WORDS,
