@@ -162,6 +162,18 @@ class Criteria:
         meaning="by so much a temperature has to turn to count as heated or cooled again",
         reason="a choice: less is the control of a heater, or a draught",
     )
+    left_confidence: float = threshold(
+        0.9,
+        unit="probability",
+        meaning="that the error on another day lies within the limits that are said",
+        reason="a choice: one day in ten surprises",
+    )
+    other_share: float = threshold(
+        0.1,
+        unit="share of the rows",
+        meaning="a sealed recording with more of them outside what the diagnosis has seen is of other conditions",
+        reason="a choice: fewer change its error by little",
+    )
     disturbance: float = threshold(
         0.28,
         unit="standard deviations of the noise, rms per coordinate",

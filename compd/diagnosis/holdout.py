@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording, Comparison, compare
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.summary import summary
+from compd.model.effects import needed_quantities
+from compd.text import nan_to_null
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,11 +22,16 @@ class Holdout:
     """A recording that took no part in a diagnosis.
 
     before, after : against the model as it was, and with the effects that the diagnosis found, parameters as fitted
-    elsewhere.
+        elsewhere.
+    expected_um : between which errors it was to lie with 90 %, um; nan where that is not known.
+    other_conditions : quantities that were elsewhere than in the recording of the diagnosis, in words: what is to be
+        expected there is not known.
     """
 
     before: Comparison
     after: Comparison
+    expected_um: tuple[float, float] = (math.nan, math.nan)
+    other_conditions: tuple[str, ...] = ()
 
     @property
     def summary(self) -> str:
@@ -28,8 +39,16 @@ class Holdout:
         aligned = self.after.aligned
         return (
             f"Sealed until now, {aligned.recording.path}: {self.before.rms_um:.3g} -> {self.after.rms_um:.3g} "
-            f"{aligned.unit}, {self.after.floor_ratio:.3g} times the noise squared (1 = nothing left)."
+            f"{aligned.unit}, {self.after.floor_ratio:.3g} times the noise squared (1 = nothing left). "
+            f"Expected: {self._expected()}."
         )
+
+    def _expected(self) -> str:
+        """What was to be expected, in words."""
+        if self.other_conditions:
+            return f"not known: other conditions ({'; '.join(self.other_conditions)})"
+        low, high = self.expected_um
+        return "not known" if math.isnan(low) else f"{low:.3g} to {high:.3g} {self.after.aligned.unit}, with 90 %"
 
     def as_json(self) -> dict[str, Any]:
         """One entry of `sealed`, beside the verdict's own keys."""
@@ -40,6 +59,8 @@ class Holdout:
             "floor_ratio": self.before.floor_ratio,
             "final_rms_um": self.after.rms_um,
             "final_floor_ratio": self.after.floor_ratio,
+            "expected_um": None if self.other_conditions else nan_to_null(list(self.expected_um)),
+            "other_conditions": list(self.other_conditions),
         }
 
 
@@ -50,7 +71,31 @@ def evaluate_holdout(diagnosis: Diagnosis, aligned: AlignedRecording) -> Holdout
     """
     aligned = replace(aligned, criteria=diagnosis.before.criteria)
     before, after = (compare(aligned, comparison.fitted) for comparison in (diagnosis.before, diagnosis.after))
-    return Holdout(before, after)
+    return Holdout(before, after, diagnosis.left_interval_um, _other_conditions(diagnosis, after))
+
+
+def _other_conditions(diagnosis: Diagnosis, after: Comparison) -> tuple[str, ...]:
+    """Places, and quantities by which the error goes, that are outside what the diagnosis has seen in many rows."""
+    found, links = [], after.aligned.rows.links
+    read = {name for fitted in diagnosis.after.fitted for name in needed_quantities(fitted.effect, links)}
+    read |= {name for finding in diagnosis.depends_on[:1] for name in (finding.covariate, *finding.beside)}
+    here, there = _conditions(diagnosis.after), _conditions(after)
+    for name, values in there.items():
+        if name not in read.union("xyz") or name not in here or not len(here[name]) or not len(values):
+            continue
+        low, high = float(here[name].min()), float(here[name].max())
+        margin = diagnosis.criteria.range_slack * (high - low)
+        outside = float(np.mean((values < low - margin) | (values > high + margin)))
+        if outside > diagnosis.criteria.other_share:
+            found.append(f"{name} was {low:.4g} to {high:.4g}, is {values.min():.4g} to {values.max():.4g}")
+    return tuple(found)
+
+
+def _conditions(comparison: Comparison) -> dict[str, FloatArray]:
+    """By name what is known of the tip's place and of each measured quantity, on the rows that count."""
+    rows, used = comparison.aligned.rows, comparison.used
+    columns = {**dict(zip("xyz", rows.tip_M_mm.T, strict=True)), **rows.quantities}
+    return {name: values[used & np.isfinite(values)] for name, values in columns.items()}
 
 
 def evaluate_holdouts(diagnosis: Diagnosis, recordings: Sequence[AlignedRecording]) -> tuple[Diagnosis, list[Holdout]]:

@@ -35,6 +35,7 @@ from compd.diagnosis.findings import (
 )
 from compd.diagnosis.implausible_effect import implausible_effect
 from compd.diagnosis.intercepts import beside, with_intercepts
+from compd.diagnosis.left_interval import left_interval_um
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.rival_selection import named_members
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
@@ -202,6 +203,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         start=_states(problem, explanation),
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
+        left_interval_um=left_interval_um(problem, losses, explanation.named),
         criteria=criteria,
     )
     return replace(

@@ -69,6 +69,9 @@ class Diagnosis:
         Error on rows that were left out with the model as it was, without its constant, um per coordinate.
     heldout_after_um : float
         The same with the effects of `steps`.
+    left_interval_um : tuple of float
+        Between which errors another recording under the same conditions lies with 90 %, um per coordinate; nan where
+        that is not known.
     criteria : Criteria
         The numbers on which it rests, each with unit, meaning and reason.
     summary : str
@@ -89,6 +92,7 @@ class Diagnosis:
     start: UnknownStates | None = None
     heldout_before_um: float = float("nan")
     heldout_after_um: float = float("nan")
+    left_interval_um: tuple[float, float] = (float("nan"), float("nan"))
     summary: str = ""
     criteria: Criteria = Criteria()
 
@@ -157,6 +161,7 @@ class Diagnosis:
             "floor_ratio": self.before.floor_ratio,
             "heldout_before_um": self.heldout_before_um,
             "heldout_after_um": self.heldout_after_um,
+            "left_interval_um": list(self.left_interval_um),
             "constant": None if self.constant is None else self.constant.as_json(),
             "steps": [step.as_json() for step in self.steps],
             **({} if self.start is None else {"start": self.start.as_json()}),

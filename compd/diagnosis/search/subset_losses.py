@@ -227,6 +227,14 @@ class SubsetLosses:
         std = float(share.std(ddof=1)) / np.sqrt(len(share)) if len(share) > 1 else np.inf
         return gain > 0 and float(share.mean()) >= self.criteria.least_sigmas * std
 
+    def fold_losses(self, members: Sequence[int]) -> FloatArray:
+        """(F,) mean square per value in each fold of the first split, by parameters learned without it; empty where it
+        cannot test the set."""
+        if not self._testable[list(members), 0].all():
+            return np.zeros(0)
+        squares = self.equations.fold_losses(self.index(members)[None])[0][self.data.split_of_fold == 0]
+        return np.asarray(squares / (np.bincount(self.data.splits[0]) * self.data.y.shape[1]))
+
     def _block_losses(self, members: Sequence[int], without: Sequence[int]) -> tuple[FloatArray, FloatArray]:
         """(B,) sums of squares that two sets leave in each block of rows, in the splits that test both."""
         testable: BoolArray = np.asarray(self._testable[[*members, *without]].all(axis=0))

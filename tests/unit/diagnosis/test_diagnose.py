@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +182,21 @@ def test_a_holdout_recording_is_looked_at_with_what_was_learned_elsewhere(tmp_pa
     holdout = evaluate_holdout(diagnosis, record_with_effects(tmp_path / "other.csv", 9, {"link_expansion": (1.5,)}))
     assert holdout.after.floor_ratio < 1.2 < holdout.before.floor_ratio
     assert np.array_equal(holdout.after.fitted[0].theta, diagnosis.after.fitted[0].theta)
+    low, high = holdout.expected_um
+    assert low < holdout.after.rms_um < high < 1.6 * low
+    assert not holdout.other_conditions
+    assert " um, with 90 %." in holdout.summary
+
+
+def test_of_a_sealed_recording_under_other_conditions_nothing_is_expected(tmp_path: Path) -> None:
+    diagnosis = diagnose_with_effects(tmp_path, {"link_expansion": (1.5,)})
+    other = record_with_effects(tmp_path / "other.csv", 9, {"link_expansion": (1.5,)})
+    name = "temperature_link_1_degC"
+    quantities = {**other.rows.quantities, name: other.rows.quantities[name] + 40.0}
+    holdout = evaluate_holdout(diagnosis, replace(other, rows=replace(other.rows, quantities=quantities)))
+    assert [text.split(" was ")[0] for text in holdout.other_conditions] == [name]
+    assert "Expected: not known: other conditions (temperature_link_1_degC was " in holdout.summary
+    assert holdout.as_json()["expected_um"] is None
 
 
 @pytest.mark.long

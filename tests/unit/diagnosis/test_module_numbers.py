@@ -124,6 +124,7 @@ NUMBERS = {
     "diagnosis/search/significance.py": {"SEED": SEED, "ROUNDING": ROUNDING},
     "diagnosis/search/subset_losses.py": {"MIN_LOSS": ROUNDING},
     "diagnosis/unmodelled.py": {"RANK_CUT": CONDITIONING},
+    "diagnosis/left_interval.py": {"MIN_FOLDS": DEFINITION},
     "diagnosis/verdict.py": {"VERDICT_VERSION": WORDS},
     "diagnosis/words/phrases.py": {
         "MAX_VALUES": WORDS,
