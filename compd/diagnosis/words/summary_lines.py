@@ -103,7 +103,7 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
             text = "no effect can be tested; nothing that drives one was varied"
         case _:
             text = _above_the_noise(diagnosis, fall)
-    if doubts(diagnosis):
+    if diagnosis.verdict != "ambiguous" and doubts(diagnosis):
         text = f"{text.partition(';')[0]}; see what speaks against its numbers"
     texts = [text.format(join_words(ids)), text.format(count)]
     if diagnosis.verdict != "ambiguous":

@@ -150,3 +150,37 @@ def test_every_effect_of_the_library_says_its_physics_in_a_clause(effect: Any) -
 
 def test_a_formula_without_words_says_itself() -> None:
     assert physics_clause(formula("mine", "b * position_mm", "")) == "delta = b * position_mm, along x"
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "place"),
+    [
+        ("scale_gain", [0.4, -1.1, 27.7], "scale_gain (scale 3: +28 ppm)"),
+        ("scale_gain", [-27.7, 1.0, 0.4], "scale_gain (scale 1: -28 ppm)"),
+        ("scale_gain", [15.0, 1.0, 27.7], "scale_gain"),
+        ("scale_gain", [0.4, 0.3, 2.0], "scale_gain"),
+        ("base_joint_position", [0.001] * 3 + [0.05, -0.08, 0.01] + [0.002] * 3, "base_joint_position (base joint 2)"),
+        ("tool_offset", [0.1, 0.0, 0.0], "tool_offset"),
+    ],
+    ids=["one scale", "less", "two scales", "none is sure", "a joint has three numbers", "no link of its own"],
+)
+def test_the_headline_says_at_which_link_or_joint_an_effect_acts(effect: str, values: list[float], place: str) -> None:
+    found = step(effect, values, 1.0 if effect == "scale_gain" else 0.001, 0.2)
+    made = diagnosis("identified", 1.4, 0.2, Noise(0.2), steps=[found])
+    assert made.summary.startswith(f"What is missing is {place}: with it")
+    heading = f"identified: What is missing is {place}: 1.4 -> 0.20 um"
+    assert (summary_lines(made)[0] == heading) is (len(heading) <= WIDTH)
+
+
+def test_numbers_outside_their_ranges_and_undetermined_ones_are_in_the_headline() -> None:
+    found = step("scale_gain", [27.7, 3.0, 2.0], 1.0, 0.2)
+    near, far, unknown = found.parameters
+    numbers = (
+        replace(near, low=0.0, high=20.0),
+        replace(far, low=-30.0, high=30.0),
+        replace(unknown, low=0.0, high=0.5),
+    )
+    made = diagnosis("partial", 1.4, 0.2, Noise(0.1), steps=[replace(found, parameters=numbers)])
+    assert summary_lines(made)[0].endswith("see what speaks against its numbers")
+    assert "k_1 of scale_gain is 27.7 +- 1.0 ppm, and 0 to 20 is usual" in made.summary
+    assert made.summary.endswith("these rows do not determine k_3 of scale_gain.")
