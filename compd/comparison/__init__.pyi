@@ -13,9 +13,9 @@ from .nuisance import nuisance_beside as nuisance_beside
 from .nuisance import nuisance_columns as nuisance_columns
 from .open import open_recording as open_recording
 from .open import read_with_machine as read_with_machine
-from .period_search import longest_period as longest_period
 from .period_search import neighbouring_periods as neighbouring_periods
 from .period_search import promising_constants as promising_constants
+from .period_search import told_periods as told_periods
 from .recording_comparison import compare as compare
 from .shape_search import search_constants as search_constants
 from .stream.block_comparison import compare_blocks as compare_blocks

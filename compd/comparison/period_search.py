@@ -24,7 +24,7 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.model.effects import Constant, ConstantValues, Effect, evaluate_basis, port_size
 from compd.model.formula import column_values
-from compd.statistics import PeriodLimits, solve_least_squares, strongest_periods
+from compd.statistics import PeriodLimits, shortest_period, solve_least_squares, strongest_periods
 from compd.units import UM_PER_MM
 
 
@@ -74,11 +74,19 @@ def promising_constants(
     return PromisingConstants(trials[: criteria.trials], search.independent)
 
 
-def longest_period(effect: Effect, constant: Constant, aligned: AlignedRecording) -> float:
-    """The longest period that is seen to repeat: the rows cover a turn of it, to a quarter of one.
+def told_periods(effect: Effect, constant: Constant, aligned: AlignedRecording) -> tuple[float, float]:
+    """The shortest period that is told from its images, and the longest that is seen to repeat.
 
-    Over less a sine of any period and phase is a slope and a bend, and would take the place of what makes these.
+    At places on an even grid a period below twice its distance makes what a longer one makes. The rows cover a turn of
+    the longest, to a quarter of one: over less a sine of any period and phase is a slope and a bend, and would take the
+    place of what makes these.
     """
+    quantity = column_values(aligned.rows, constant.period_of, effect.ports[0])
+    known = quantity[np.isfinite(quantity).all(axis=1)]
+    return shortest_period(known, constant.low, aligned.criteria.periods), _longest_period(effect, constant, aligned)
+
+
+def _longest_period(effect: Effect, constant: Constant, aligned: AlignedRecording) -> float:
     return min(constant.high, _span(effect, constant, aligned) / (1 - aligned.criteria.periods.neighbour_turns))
 
 
@@ -92,7 +100,7 @@ def neighbouring_periods(
     turns = _span(effect, constant, aligned) / period
     apart = aligned.criteria.periods.neighbour_turns
     share = min(apart / max(turns, apart), 0.5)
-    longest = max(longest_period(effect, constant, aligned), period)
+    longest = max(_longest_period(effect, constant, aligned), period)
     return max(period / (1 + share), min(constant.low, period)), min(period / (1 - share), longest)
 
 

@@ -40,6 +40,7 @@ from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.rival_selection import named_members
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
 from compd.diagnosis.search.gross_rows import gross_rows
+from compd.diagnosis.search.place_significance import place_p_value
 from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
 from compd.diagnosis.search.rivals import find_rivals
 from compd.diagnosis.search.significance import Family, OrthogonalComplement, p_values
@@ -322,16 +323,22 @@ def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float
     library = [k for k, candidate in enumerate(losses.candidates) if candidate.kind == "effect"]
     member_by_name = {losses.name(k): k for k in members if k in library}
     constant = [k for k in members if losses.candidates[k].kind == "constant"]
-    families = {}
+    families, by_place = {}, []
+    tried = sum(losses.candidates[k].best_of for k in library)
     for name in dict.fromkeys(losses.name(k) for k in library):
         others = beside(losses, members, member_by_name[name]) if name in member_by_name else constant
-        complement = OrthogonalComplement(losses.nuisance_with(others).values)
+        nuisance = losses.nuisance_with(others).values
+        complement = OrthogonalComplement(nuisance)
         own = [k for k in library if losses.name(k) == name]
         variants = [complement(losses.values[k]) for k in own]
         best_of = [losses.candidates[k].best_of for k in own]
         families[name] = Family(variants, complement(losses.data.y), best_of)
+        values = [losses.values[k] for k in own]
+        by_place.append(
+            place_p_value(losses.data.y, nuisance, values, tried, losses.data.place, losses.criteria.search)
+        )
     found = p_values(list(families.values()), losses.data.block, losses.criteria.search.sign_flips)
-    return dict(zip(families, found.tolist(), strict=True))
+    return dict(zip(families, np.maximum(found, by_place).tolist(), strict=True))
 
 
 def _untested(

@@ -53,6 +53,12 @@ class SearchCriteria:
         meaning="p-values rest on so many",
         reason="the smallest p-value that can be stated is then 1 / 1000",
     )
+    place_share: float = threshold(
+        0.9,
+        unit="share of a column's variance",
+        meaning="an effect of which so much is between places is compared with what is left from place to place",
+        reason="a choice: within a place it changes with weather, load or direction, of which repeats say enough",
+    )
 
 
 @dataclass(frozen=True)

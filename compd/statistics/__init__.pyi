@@ -13,6 +13,7 @@ from .least_squares import solve_normal as solve_normal
 from .least_squares import solve_ridge as solve_ridge
 from .period_criteria import PeriodCriteria as PeriodCriteria
 from .periodogram import PeriodLimits as PeriodLimits
+from .periodogram import shortest_period as shortest_period
 from .periodogram import strongest_periods as strongest_periods
 from .replicates import copied_rows as copied_rows
 from .replicates import replicate_pairs as replicate_pairs

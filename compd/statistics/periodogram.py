@@ -98,7 +98,9 @@ def strongest_periods(
         return PeriodSearch((), (), 0)
     y = _without_slow(quantity, series, criteria)
     explained, window = _spectrum(quantity, y, first, step, size)
-    size = min(size, _frequencies_below_images(window, first, step, span, criteria))
+    image = _first_image(quantity, window, first, step, criteria)
+    if image is not None:
+        size = min(size, max(int((image / 2 - first) / step) + 1, 0))
     frequencies = first + step * _peaks(explained[:size], int(LOBES / (span * step)), count)
     refined = sorted((_refined(quantity, y, peak, step) for peak in frequencies.tolist()), key=lambda peak: -peak[1])
     return PeriodSearch(
@@ -106,6 +108,24 @@ def strongest_periods(
         tuple(square for _, square in refined),
         int(np.ceil(size * step * span)),
     )
+
+
+def shortest_period(quantity: FloatArray, shortest: float, criteria: PeriodCriteria = PeriodCriteria()) -> float:
+    """The shortest period, down to `shortest`, that the values of a quantity (N, S) tell from its images.
+
+    Values on an even grid tell none below twice its distance; 0 where no values are on one.
+    """
+    span = float(np.ptp(quantity, axis=0).max()) if len(quantity) else 0.0
+    if not span > 0:
+        return 0.0
+    # half of an image's frequency counts: images are looked for to twice the highest frequency
+    first, step = 1.0 / span, 1.0 / (OVERSAMPLING * span)
+    size = int((min(2.0 / shortest, criteria.max_turns / span) - first) / step) + 1
+    if size < 1:
+        return 0.0
+    _, window = _spectrum(quantity, np.zeros((len(quantity), 0)), first, step, size)
+    image = _first_image(quantity, window, first, step, criteria)
+    return 0.0 if image is None else 2.0 / image
 
 
 def _without_slow(quantity: FloatArray, series: FloatArray, criteria: PeriodCriteria) -> FloatArray:
@@ -137,21 +157,29 @@ def _peaks(explained: FloatArray, apart: int, count: int) -> IntArray:
     return np.array(chosen, dtype=np.int64)
 
 
-def _frequencies_below_images(
-    window: FloatArray, first: float, step: float, span: float, criteria: PeriodCriteria
-) -> int:
-    """How many frequencies are below half of the first at which the spectral window shows images.
+def _first_image(
+    quantity: FloatArray, window: FloatArray, first: float, step: float, criteria: PeriodCriteria
+) -> float | None:
+    """The first frequency at which the spectral window shows images; None where there is none.
 
     Below 1 / span, where the window falls from 1, there is none. The images of an even grid come again at every
     multiple; those of a few sessions, far apart, fade.
     """
-    frequency = first + step * np.arange(len(window))
-    for image in frequency[(window > criteria.image_window) & (frequency > 1.0 / span)].tolist():
+    last = first + step * (len(window) - 1)
+    places = np.flatnonzero(window > criteria.image_window)
+    for frequency in (first + step * places[first + step * places > OVERSAMPLING * step]).tolist():
+        nearby = frequency + np.linspace(-step, step, REFINED)
+        image = float(nearby[np.argmax(_window(quantity, nearby))])
         multiples = np.arange(1, criteria.image_multiples + 1) * image
-        places = np.rint((multiples[multiples <= frequency[-1]] - first) / step).astype(np.int64)
-        if (window[places] > criteria.image_window).all():
-            return max(int((image / 2 - first) / step) + 1, 0)
-    return len(window)
+        if (_window(quantity, multiples[multiples <= last + step]) > criteria.image_window).all():
+            return image
+    return None
+
+
+def _window(quantity: FloatArray, frequencies: FloatArray) -> FloatArray:
+    """The spectral window at some frequencies (F,): the rms over the series of |mean exp(2 pi i f q)|."""
+    phase_rad = 2 * np.pi * frequencies[:, None, None] * quantity
+    return np.asarray(np.sqrt(np.mean(np.abs(np.mean(np.exp(1j * phase_rad), axis=1)) ** 2, axis=1)))
 
 
 def _refined(quantity: FloatArray, y: FloatArray, frequency: float, step: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison import AlignedRecording, longest_period, promising_constants
+from compd.comparison import AlignedRecording, promising_constants, told_periods
 from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.model.effects import ConstantValues, Effect, unmet_needs
@@ -123,11 +123,11 @@ def periodic_candidates(
 def _seen_to_repeat(
     effect: Effect, grid: Sequence[dict[str, float]], aligned: AlignedRecording
 ) -> Sequence[dict[str, float]]:
-    """Values of the nonlinear constants without the searched periods of which the rows cover less than one."""
+    """Values of the nonlinear constants without the searched periods that the rows cannot tell from others."""
     for constant in effect.constants:
         if constant.period_of and len({constants[constant.name] for constants in grid}) > 1:
-            longest = longest_period(effect, constant, aligned)
-            grid = [constants for constants in grid if constants[constant.name] <= longest]
+            shortest, longest = told_periods(effect, constant, aligned)
+            grid = [constants for constants in grid if shortest <= constants[constant.name] <= longest]
     return grid
 
 

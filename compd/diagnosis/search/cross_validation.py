@@ -125,19 +125,13 @@ def _split_by_values(aligned: AlignedRecording, values: FloatArray, criteria: Fo
 
 def _split_by_place(aligned: AlignedRecording, criteria: FoldCriteria) -> IntArray | None:
     """(N,) sectors with equally many places each; None with fewer than two axes, or two places per sector."""
-    tip_mm = aligned.rows.tip_M_mm
-    extent_mm = np.array([np.ptp(axis[np.isfinite(axis)]) if np.isfinite(axis).any() else 0.0 for axis in tip_mm.T])
-    axes = np.flatnonzero(extent_mm > criteria.same_place_share * extent_mm.max())[:2]
-    if len(axes) < 2:
-        return None
-    at_mm, extent_mm = tip_mm[:, axes], extent_mm[axes]
-    known: BoolArray = np.asarray(np.isfinite(at_mm).all(axis=1))
-    cell = np.rint(at_mm / (criteria.same_place_share * extent_mm))
-    # rows without a prediction count nowhere, and are one place
-    place = _places(aligned, np.where(known[:, None], cell, np.inf))
+    axes, _ = _workspace(aligned, criteria)
+    place = row_places(aligned, criteria)
     count = int(place.max()) + 1
-    if count < 2 * criteria.sectors:
+    if len(axes) < 2 or count < 2 * criteria.sectors:
         return None
+    at_mm = aligned.rows.tip_M_mm[:, axes[:2]]
+    known: BoolArray = np.asarray(np.isfinite(at_mm).all(axis=1))
     middle_mm = at_mm[known].mean(axis=0)
     azimuth_rad = np.array([_azimuth_rad(at_mm[known & (place == k)] - middle_mm) for k in range(count)])
     sector = np.empty(count, dtype=np.int64)
@@ -145,8 +139,23 @@ def _split_by_place(aligned: AlignedRecording, criteria: FoldCriteria) -> IntArr
     return sector[place]
 
 
-def _places(aligned: AlignedRecording, cell: FloatArray) -> IntArray:
-    """(N,) number of each row's place: its `point`; where there is none, its cell (N, 2), of a visit's first row."""
+def _workspace(aligned: AlignedRecording, criteria: FoldCriteria) -> tuple[IntArray, FloatArray]:
+    """The axes along which the tip moves, and by how much, mm."""
+    tip_mm = aligned.rows.tip_M_mm
+    extent_mm = np.array([np.ptp(axis[np.isfinite(axis)]) if np.isfinite(axis).any() else 0.0 for axis in tip_mm.T])
+    axes = np.flatnonzero(extent_mm > criteria.same_place_share * extent_mm.max())
+    return axes, extent_mm[axes]
+
+
+def row_places(aligned: AlignedRecording, criteria: FoldCriteria = FoldCriteria()) -> IntArray:
+    """(N,) number of each row's place, from 0: its `point`; where there is none, its cell, of a visit's first row.
+
+    Rows without a prediction count nowhere, and are one place.
+    """
+    axes, extent_mm = _workspace(aligned, criteria)
+    at_mm = aligned.rows.tip_M_mm[:, axes]
+    known = np.isfinite(at_mm).all(axis=1)
+    cell = np.where(known[:, None], np.rint(at_mm / (criteria.same_place_share * extent_mm)), np.inf)
     number = aligned.recording.first_of_visit(np.unique(cell, axis=0, return_inverse=True)[1].ravel())
     point = aligned.recording.point
     if point is not None:

@@ -13,7 +13,7 @@ from compd.comparison import AlignedRecording, Comparison, neighbour_blocks, nui
 from compd.diagnosis.candidates.candidates import Candidate, CandidatePool
 from compd.diagnosis.candidates.constant import constant_candidate, split_constants
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.search.cross_validation import row_splits
+from compd.diagnosis.search.cross_validation import row_places, row_splits
 from compd.diagnosis.search.gross_rows import RowWeights, weigh_rows
 from compd.diagnosis.search.regression import RegressionData, Regressors, normal_equations
 from compd.diagnosis.search.subset_losses import SubsetLosses
@@ -174,6 +174,7 @@ def build_problem(
         tuple(_renumbered(fold[rows]) for fold in row_splits(aligned, criteria.folds)),
         _renumbered(neighbour_blocks(aligned.recording, aligned.criteria.blocks)[rows]),
         Regressors(nuisance[rows] * root[:, None, None], np.full(nuisance.shape[2], np.inf)),
+        _renumbered(row_places(aligned, criteria.folds)[rows]),
     )
     return DiagnosisProblem(
         comparison=comparison,

@@ -55,12 +55,14 @@ class RegressionData:
     splits : each (R,), the fold of each row, numbered from 0.
     block : (R,) block of neighbouring rows within which residuals may be correlated, numbered from 0.
     nuisance : columns of what every fit contains: the effects of the model, and the instrument's frame.
+    place : (R,) where the tip was in each row, numbered from 0.
     """
 
     y: FloatArray
     splits: tuple[IntArray, ...]
     block: IntArray
     nuisance: Regressors
+    place: IntArray
 
     @property
     def value_count(self) -> int:
@@ -115,7 +117,7 @@ class NormalEquations:
     (Hastie, Tibshirani, Friedman, The Elements of Statistical Learning, 2nd ed. (2009), 3.4.1 ridge regression and
     7.10 cross-validation.) An example, one column without noise, four rows in two folds::
 
-        data = RegressionData(y, (np.array([0, 0, 1, 1]),), np.arange(4), Regressors(np.zeros((4, 1, 0)), np.zeros(0)))
+        data = RegressionData(y, (np.array([0, 0, 1, 1]),), np.arange(4), Regressors(np.zeros((4, 1, 0)), np.zeros(0)), np.arange(4))
         equations, (index,) = normal_equations(data, [Regressors(column, np.array([np.inf]))])
         equations.cv_losses([index], np.array([[True]]))  # about 0.0: each fold predicts the other
     """
