@@ -94,14 +94,17 @@ def right_alone(losses: SubsetLosses, subset: Subset) -> Subset:
 
 
 def _standing_alone(losses: SubsetLosses, subset: Subset) -> Subset:
-    """The set without the effects that are worth their price only beside a description: these are not named."""
+    """The set without the effects that are worth their price only beside a description: these are not named.
+
+    What changed at a moment stays, as in `right_alone`.
+    """
     unseen = True
     while unseen and losses.described(subset.members):
         unseen = False
-        named = tuple(k for k in subset.members if losses.candidates[k].kind in ("effect", "constant"))
-        for member in named:
-            without = losses.loss(k for k in named if k != member)
-            if losses.log_loss(without) - losses.log_loss(losses.loss(named)) < losses.price(member):
+        alone = tuple(k for k in subset.members if losses.candidates[k].kind in ("effect", "constant", "change"))
+        for member in (k for k in alone if losses.candidates[k].kind != "change"):
+            without = losses.loss(k for k in alone if k != member)
+            if losses.log_loss(without) - losses.log_loss(losses.loss(alone)) < losses.price(member):
                 subset, unseen = Subset(*_rest(losses, subset, member)), True
                 break
     return subset

@@ -67,15 +67,16 @@ def _between(columns: FloatArray, place: IntArray) -> float:
 
 def _by_place(columns: FloatArray, place: IntArray) -> FloatArray:
     """(C, m, P) mean of columns (R, m, P) at each place."""
-    flat = columns.reshape(len(place), -1)
     count = np.bincount(place)
-    sums = np.stack([np.bincount(place, column) for column in flat.T], axis=1) if flat.shape[1] else flat[: len(count)]
-    return np.asarray((sums / count[:, None]).reshape(len(count), *columns.shape[1:]))
+    sums = np.zeros((len(count), *columns.shape[1:]))
+    np.add.at(sums, place, columns)
+    return np.asarray(sums / count[:, None, None])
 
 
 def _means(columns: FloatArray, place: IntArray) -> FloatArray:
     """(C m, P) of columns (R, m, P)."""
-    return _by_place(columns, place).reshape(-1, columns.shape[2])
+    by_place = _by_place(columns, place)
+    return by_place.reshape(by_place.shape[0] * by_place.shape[1], columns.shape[2])
 
 
 def _basis(columns: FloatArray) -> FloatArray:
