@@ -168,9 +168,9 @@ def _first_image(
     last = first + step * (len(window) - 1)
     places = np.flatnonzero(window > criteria.image_window)
     for frequency in (first + step * places[first + step * places > OVERSAMPLING * step]).tolist():
-        nearby = frequency + np.linspace(-step, step, REFINED)
+        nearby: FloatArray = np.asarray(frequency + np.linspace(-step, step, REFINED))
         image = float(nearby[np.argmax(_window(quantity, nearby))])
-        multiples = np.arange(1, criteria.image_multiples + 1) * image
+        multiples: FloatArray = np.asarray(np.arange(1, criteria.image_multiples + 1) * image)
         if (_window(quantity, multiples[multiples <= last + step]) > criteria.image_window).all():
             return image
     return None

@@ -53,7 +53,7 @@ def subset_losses(
     rows = np.arange(ROWS)
     splits = (rows * SESSIONS // ROWS, np.random.default_rng(99).integers(0, SECTORS, ROWS))
     beside = np.zeros((ROWS, COORDINATES, 0)) if nuisance is None else nuisance
-    data = RegressionData(y, splits, rows * BLOCKS // ROWS, Regressors(beside, np.full(beside.shape[2], np.inf)))
+    data = RegressionData(y, splits, rows * BLOCKS // ROWS, Regressors(beside, np.full(beside.shape[2], np.inf)), rows)
     if isinstance(candidates, Mapping):
         candidates = [candidate(name, values) for name, values in candidates.items()]
     return SubsetLosses(data, candidates, [each.columns_um for each in candidates], criteria, least_loss)

@@ -154,7 +154,7 @@ def row_places(aligned: AlignedRecording, criteria: FoldCriteria = FoldCriteria(
     """
     axes, extent_mm = _workspace(aligned, criteria)
     at_mm = aligned.rows.tip_M_mm[:, axes]
-    known = np.isfinite(at_mm).all(axis=1)
+    known: BoolArray = np.asarray(np.isfinite(at_mm).all(axis=1))
     cell = np.where(known[:, None], np.rint(at_mm / (criteria.same_place_share * extent_mm)), np.inf)
     number = aligned.recording.first_of_visit(np.unique(cell, axis=0, return_inverse=True)[1].ravel())
     point = aligned.recording.point

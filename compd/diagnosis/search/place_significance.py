@@ -30,8 +30,10 @@ def place_p_value(
     """Probability that places which are uneven by chance let the best of some variants gain as much; 0 where they
     change within places, of which unevenness says nothing.
 
-    y : (R, m).  nuisance : (R, m, Q) what is fitted beside them.  variants : each (R, m, P).  tried : how many were,
-    unlike one another, with those of all other effects (Sidak, J. Am. Stat. Assoc. 62 (1967) 626).  place : (R,) of each row, numbered from 0.
+    y : (R, m).  nuisance : (R, m, Q) what is fitted beside them.  variants : each (R, m, P).
+    tried : how many were, unlike one another, with those of all other effects (Sidak, J. Am. Stat. Assoc. 62 (1967)
+        626).
+    place : (R,) of each row, numbered from 0.
 
     For example, ten rows at each of three places::
 

@@ -117,7 +117,8 @@ class NormalEquations:
     (Hastie, Tibshirani, Friedman, The Elements of Statistical Learning, 2nd ed. (2009), 3.4.1 ridge regression and
     7.10 cross-validation.) An example, one column without noise, four rows in two folds::
 
-        data = RegressionData(y, (np.array([0, 0, 1, 1]),), np.arange(4), Regressors(np.zeros((4, 1, 0)), np.zeros(0)), np.arange(4))
+        nothing = Regressors(np.zeros((4, 1, 0)), np.zeros(0))
+        data = RegressionData(y, (np.array([0, 0, 1, 1]),), np.arange(4), nothing, np.arange(4))
         equations, (index,) = normal_equations(data, [Regressors(column, np.array([np.inf]))])
         equations.cv_losses([index], np.array([[True]]))  # about 0.0: each fold predicts the other
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compd.statistics import PeriodLimits, strongest_periods
+from compd.statistics import PeriodLimits, shortest_period, strongest_periods
 
 RNG = np.random.default_rng(4)
 PLACES_MM = RNG.uniform(-60, 60, (300, 3))
@@ -46,6 +46,17 @@ def test_even_places_resolve_nothing_below_twice_their_distance() -> None:
     assert min(search.periods) >= 10.0
     # 195 mm / 10 mm, less two turns at the long end
     assert search.independent == pytest.approx(17.5, abs=1.0)
+
+
+@pytest.mark.parametrize("distance_mm", [3.0, 5.0, 20.0])
+def test_even_places_tell_no_period_below_twice_their_distance(distance_mm: float) -> None:
+    places_mm = np.tile(np.arange(10) * distance_mm, 4)[:, None]
+    assert shortest_period(places_mm, 0.2) == pytest.approx(2 * distance_mm, rel=0.01)
+
+
+def test_uneven_places_tell_every_period() -> None:
+    assert shortest_period(PLACES_MM, 0.01) == 0.0
+    assert shortest_period(np.ones((9, 1)), 0.1) == 0.0
 
 
 def test_two_places_have_no_period() -> None:

@@ -16,7 +16,9 @@ def random_data(seed: int, rows: int = 120) -> RegressionData:
     rng = np.random.default_rng(seed)
     splits = (np.arange(rows) * 4 // rows, rng.integers(0, 5, rows))
     nuisance = Regressors(rng.standard_normal((rows, 3, 2)), np.full(2, np.inf))
-    return RegressionData(rng.standard_normal((rows, 3)), splits, np.arange(rows) * 12 // rows, nuisance)
+    return RegressionData(
+        rng.standard_normal((rows, 3)), splits, np.arange(rows) * 12 // rows, nuisance, np.arange(rows)
+    )
 
 
 def test_cv_loss_is_that_of_fits_without_the_fold() -> None:
