@@ -43,9 +43,10 @@ class SearchCriteria:
     )
     promising_changes: int = threshold(
         6,
-        unit="changes in time",
-        meaning="so many of those that explain most where they were fitted compete",
-        reason="a choice: at more moments nothing happens in one recording",
+        unit="effects",
+        meaning="so many effects that may have changed compete, each at its best moment: those that score best where they "
+        "were fitted",
+        reason="a choice: more than these explain nearly the same",
     )
     sign_flips: int = threshold(
         999,

@@ -47,13 +47,13 @@ def change_candidates(
     times_s: Sequence[float],
     criteria: CandidateCriteria = CandidateCriteria(),
 ) -> list[ChangeCandidate]:
-    """Each of some effects from each moment on; what it did before stays as it is."""
+    """Each of some effects from each moment on; what it did before stays as it is. A drift begins at nought."""
     time_s = aligned.rows.time_s
     return [
         ChangeCandidate(
             name=f"{candidate.name} change",
             effect=candidate.effect,
-            columns_um=_after(candidate.columns_um, time_s, moment_s),
+            columns_um=_after(candidate.columns_um, time_s, moment_s, drifts=candidate.effect.needs == ("time",)),
             limits=np.ptp(candidate.limits, axis=1)[:, None] * [-1.0, 1.0],
             searched_parameters=candidate.searched_parameters + criteria.searched_constant,
             constants=candidate.constants,
@@ -66,5 +66,8 @@ def change_candidates(
     ]
 
 
-def _after(columns_um: FloatArray, time_s: FloatArray, moment_s: float) -> FloatArray:
-    return np.where((time_s >= moment_s)[:, None, None], columns_um, 0.0)
+def _after(columns_um: FloatArray, time_s: FloatArray, moment_s: float, *, drifts: bool) -> FloatArray:
+    after = time_s >= moment_s
+    if drifts and after.any():
+        columns_um = columns_um - columns_um[np.argmax(after)]
+    return np.where(after[:, None, None], columns_um, 0.0)

@@ -224,9 +224,16 @@ class _Competitors:
                 self.fit_by_place[len(self.candidates)] = fit
                 self.candidates.append(fit.candidate(fit.columns_um(self._problem.aligned)))
         complement = OrthogonalComplement(nuisance)
-        squares = explained_squares(self._change_values, complement(self._problem.data.y), complement)
-        for k in np.argsort(-squares)[: self._problem.criteria.search.promising_changes]:
-            change = self._changes[k]
+        residual = complement(self._problem.data.y)
+        squares = explained_squares(self._change_values, residual, complement)
+        left = (float((residual**2).sum()) - squares) / residual.size
+        prices = [change.price(self._problem.criteria) for change in self._changes]
+        scores = [losses.log_loss(loss) + price for loss, price in zip(left.tolist(), prices, strict=True)]
+        # of each effect the best moment: the next one explains nearly the same
+        best: dict[str, ChangeCandidate] = {}
+        for k in np.argsort(scores, kind="stable"):
+            best.setdefault(self._changes[k].name, self._changes[k])
+        for change in [*best.values()][: self._problem.criteria.search.promising_changes]:
             if self._is_new((change.name, change.time_s)):
                 self.candidates.append(change)
         return fits

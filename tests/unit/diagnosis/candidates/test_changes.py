@@ -60,6 +60,19 @@ def test_a_change_acts_from_its_moment_on_and_may_have_either_sign(tmp_path: Pat
     assert late.parameter_count == 1 + CandidateCriteria.searched_constant
 
 
+def test_a_drift_that_begins_does_so_at_nought(tmp_path: Path) -> None:
+    """From its first value on it would be a step, which something that was moved makes."""
+    aligned = stage(tmp_path / "run.csv", 2.0, 2.0)
+    drift = along("x", "drift", "k * time_s / 3600")
+    (whole,) = library_pool(aligned, [drift], []).candidates
+    (change,) = change_candidates([whole], aligned, [1200.0])
+    column = change.columns_um[:, 0, 0]
+    after = aligned.rows.time_s >= 1200.0
+    assert not column[~after].any()
+    assert column[after][0] == 0.0
+    np.testing.assert_allclose(np.diff(column[after]), np.diff(whole.columns_um[after, 0, 0]))
+
+
 def test_play_that_grows_is_found_with_its_time_beside_the_play_that_was_there(tmp_path: Path) -> None:
     diagnosis = diagnose(stage(tmp_path / "run.csv", 2.0, 5.0), (), None, [PLAY, GAIN])
     assert diagnosis.verdict == "partial"
