@@ -44,8 +44,8 @@ class SearchCriteria:
     promising_changes: int = threshold(
         6,
         unit="effects",
-        meaning="so many effects that may have changed compete, each at its best moment: those that score best where they "
-        "were fitted",
+        meaning="so many effects that may have changed compete, each at its best moment: those that score best where "
+        "they were fitted",
         reason="a choice: more than these explain nearly the same",
     )
     sign_flips: int = threshold(
