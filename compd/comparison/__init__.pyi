@@ -28,4 +28,3 @@ from .stream.sample import draw_sample as draw_sample
 from .stream.streamed_comparison import StreamedComparison as StreamedComparison
 from .thinning import thinned as thinned
 from .white_residual import counted_by_neighbours as counted_by_neighbours
-from .white_residual import counted_by_what_is_left as counted_by_what_is_left

@@ -58,11 +58,20 @@ def row_orders(aligned: AlignedRecording) -> dict[str, FloatArray]:
     return {"time" if recording.has_time else ROW_ORDER: recording.time_s, **places, **measured}
 
 
-def counted_by_neighbours(comparison: Comparison) -> Comparison | None:
-    """The comparison with what neighbouring rows show as its noise, where the residual is not white although it is no
-    larger than a declaration; None where it is white, or where repeats show the noise."""
+def counted_by_neighbours(comparison: Comparison, left_um: FloatArray | None = None) -> Comparison | None:
+    """The comparison with what neighbouring rows show as its noise, where they contradict a declaration; None where
+    they do not, or where repeats show the noise.
+
+    left_um : (N, m) what an explanation leaves of the residual, where that is more than what is declared; nan in rows
+        that do not count. None where the residual itself is no more.
+    """
     if comparison.floor.source != "declared":
         return None
+    return _not_white(comparison) if left_um is None else _white_and_larger(comparison, left_um)
+
+
+def _not_white(comparison: Comparison) -> Comparison | None:
+    """The comparison counted anew where the residual is not white although it is no larger than the declaration."""
     found = _follows(comparison.aligned, comparison.residual_um, comparison.used)
     if found is None:
         return None
@@ -76,18 +85,16 @@ def counted_by_neighbours(comparison: Comparison) -> Comparison | None:
     return _counted_by(comparison, estimate, "the residual is not white, as noise is", remark)
 
 
-def counted_by_what_is_left(comparison: Comparison, left_um: FloatArray) -> Comparison | None:
-    """The comparison with what neighbouring rows show as its noise, where that is much more than a declaration and most
-    of what an explanation leaves is white; None where it is not, or where repeats show the noise.
+def _white_and_larger(comparison: Comparison, left_um: FloatArray) -> Comparison | None:
+    """The comparison counted anew where neighbouring rows scatter by much more than the declaration, and most of what
+    is left is white.
 
     What is white may be an effect that changes from row to row as well: the estimate proves nothing. Repeats that agree
     better than neighbours, however few, show that it is one.
-
-    left_um : (N, m) what is left of the residual; nan in rows that do not count.
     """
     aligned, floor, criteria = comparison.aligned, comparison.floor, comparison.criteria
     used = comparison.used & np.isfinite(left_um).all(axis=1)
-    if floor.source != "declared" or used.sum() < criteria.min_trend_rows:
+    if used.sum() < criteria.min_trend_rows:
         return None
     estimate = _estimate(comparison, left_um, used)
     factor = contradicting_factor(estimate.by_axis_um, estimate.dof, floor.by_axis_um, criteria)

@@ -13,7 +13,6 @@ from compd.comparison import (
     Comparison,
     compare,
     counted_by_neighbours,
-    counted_by_what_is_left,
     fit,
     initial_effect,
     thinned,
@@ -168,7 +167,7 @@ def _counted_anew(explanation: Explanation) -> Comparison | None:
     problem = explanation.problem
     if not problem.may_be_noise(explanation.loss):
         left_um = problem.residual_beside_um(explanation.losses, explanation.members)
-        return counted_by_what_is_left(problem.comparison, left_um)
+        return counted_by_neighbours(problem.comparison, left_um)
     return None if explanation.members else counted_by_neighbours(problem.comparison)
 
 

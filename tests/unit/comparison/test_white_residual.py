@@ -11,7 +11,6 @@ from compd.comparison import (
     Comparison,
     compare,
     counted_by_neighbours,
-    counted_by_what_is_left,
     open_recording,
 )
 from tests.support.external import Floats, write_external
@@ -64,7 +63,7 @@ def what_is_left(
 ) -> tuple[Comparison, Comparison | None]:
     """A comparison whose residual is left, and the same counted by it."""
     before = compared(directory, left_um, declared_um, **columns)
-    return before, counted_by_what_is_left(before, before.residual_um)
+    return before, counted_by_neighbours(before, before.residual_um)
 
 
 def test_a_declaration_that_is_too_small_gives_way_to_what_neighbours_show(tmp_path: Path) -> None:
