@@ -186,7 +186,7 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     contradiction = diagnosis.before.floor.contradiction
     remarks = [contradiction] if contradiction else []
     left = fall.after if described is None else described.heldout_rms_um
-    text = number_text(left, fall.unit) + (" with it" if described else "")
+    text = number_text(left, fall.unit) + (" with it" if described else _on_another_day(diagnosis, fall))
     if not fall.noise_known:
         given_up = not math.isnan(diagnosis.before.floor.declared_um)
         check = f"check `{sigma_key(fall.unit)}`"
@@ -201,6 +201,15 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     else:
         meaning = "these rows do not show what acts"
     return [f"{text}; noise {number_text(fall.noise, fall.unit)} ({fall.source}): {meaning}", *remarks]
+
+
+def _on_another_day(diagnosis: Diagnosis, fall: ErrorFall) -> str:
+    """Within which limits the error on another day lies, in brackets; "" where they are not known."""
+    low, high = diagnosis.left_interval_um
+    if math.isnan(low):
+        return ""
+    confidence = percent_text(diagnosis.criteria.left_confidence)
+    return f" (another day: {number_text(low)} to {number_text(high, fall.unit)} with {confidence})"
 
 
 def _sure(diagnosis: Diagnosis) -> list[str]:

@@ -66,7 +66,7 @@ def test_a_thermometer_is_told_by_its_unit(tmp_path: Path) -> None:
         each.quantity: each for each in proxy_candidates(machining(tmp_path / "run.csv", 5.0, **own), [SPINDLE], ())
     }
     assert set(found) == {"temperature_motor_degC", "motor_2_degC", "motor_3_K"}
-    np.testing.assert_allclose(found["motor_3_K"].columns_um, found["motor_2_degC"].columns_um, atol=1e-9)
+    np.testing.assert_allclose(found["motor_3_K"].columns_um, found["motor_2_degC"].columns_um, atol=1e-5)
 
 
 def test_the_choice_of_a_thermometer_is_a_search_and_has_its_price(tmp_path: Path) -> None:
