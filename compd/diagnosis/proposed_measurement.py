@@ -46,8 +46,8 @@ def propose_measurement(
             return [
                 {
                     "measure": "some of the first rows once more: is the machine as it was then?",
-                    "why": f"{finding.effect or 'everything'} changed at {clock_text(finding.time_s)}: look what happened "
-                    "there",
+                    "why": f"{finding.effect or 'everything'} changed at {clock_text(finding.time_s)}: look what "
+                    "happened there",
                 }
             ]
     if not problem.floor_known:

@@ -16,6 +16,7 @@ from compd.diagnosis.descriptions.search_covariates import (
     STAYED_THE_SAME,
     Kind,
     SearchCovariate,
+    mirrored_predictions,
     round_middle,
     round_within,
     search_covariates,
@@ -197,7 +198,9 @@ def empirical_terms(
     ports = list(_ports(aligned))
     timed = aligned.recording.has_time
     grid_of = _Grids(residual_um[rows], criteria, aligned.criteria.periods)
-    for covariate in search_covariates(aligned, rows, criteria):
+    mirrored = mirrored_predictions(aligned, criteria)
+    reasons = untried_quantities(aligned, criteria, mirrored)
+    for covariate in search_covariates(aligned, rows, criteria, mirrored, reasons):
         yield from _terms_of(covariate, ports, grid_of, timed=timed, known=aligned.model is not None)
     time = SearchCovariate("time_s", "other", aligned.rows.time_s[rows])
     grids = {"step": step_times_s(time.values, criteria)} if aligned.in_order else {}
@@ -211,7 +214,7 @@ def empirical_terms(
         return
     for port in ports:
         if port.port == "link":
-            for name, middle, form in _link_covariates(aligned, rows, criteria):
+            for name, middle, form in _link_covariates(aligned, rows, reasons):
                 yield replace(port, covariate=name, form=form, middle=middle)
 
 
@@ -284,10 +287,13 @@ def _ports(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
 
 
 def _link_covariates(
-    aligned: AlignedRecording, rows: BoolArray, criteria: DescriptionCriteria
+    aligned: AlignedRecording, rows: BoolArray, reasons: Mapping[str, str]
 ) -> Iterator[tuple[str, float, str]]:
-    """Covariates that each link has of its own, with their middle and form."""
-    machine, reasons = aligned.rows, untried_quantities(aligned, criteria)
+    """Covariates that each link has of its own, with their middle and form.
+
+    reasons : of the quantities that are not searched.
+    """
+    machine = aligned.rows
     links_by_quantity: dict[tuple[str, str], set[int]] = {}
     for name in aligned.recording.quantities:
         # one link's quantity may have stayed the same: the others' did not
