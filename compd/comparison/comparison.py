@@ -64,6 +64,8 @@ class Comparison:
         Rows whose residual no noise explains; they are not used.
     left_out : dict
         Reason, and the number of rows that cannot be used for it.
+    reason : (N,) array of str
+        Why each row cannot be used; "" for a row that can.
     floor : NoiseFloor
         What noise alone makes of the residual: `floor.um` per coordinate, `floor.how` says where it is from,
         `floor.known` whether it was measured or declared.
@@ -90,6 +92,7 @@ class Comparison:
     used: BoolArray
     outlier: BoolArray
     left_out: Mapping[str, int]
+    reason: TextArray
     floor: NoiseFloor
     uncertainty: Uncertainty
     gauges: GaugeNoise | None
@@ -249,11 +252,7 @@ class Comparison:
     @property
     def why_left_out(self) -> TextArray:
         """(N,) why each row is not used, in words; "" for a row that is used."""
-        reason = self.aligned.usable.reason.copy()
-        unknown = (reason == "") & ~np.isfinite(self.residual_um).all(axis=1)
-        reason[unknown] = NO_QUANTITY if NO_QUANTITY in self.left_out else COPIED
-        reason[self.outlier] = OUTLIER
-        return reason
+        return np.where(self.outlier, OUTLIER, self.reason)
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per row of the recording, as a pandas data frame.

@@ -188,6 +188,13 @@ class ComparisonCriteria:
         meaning="a residual of which no more follows the order of time, of a place or of a quantity is taken for white",
         reason="two disturbances of a fifth of the noise are 0.07 of the whole",
     )
+    neighbours_share: float = threshold(
+        0.5,
+        unit="share of a coordinate's scatter",
+        meaning="where more of what is left follows an order, or neighbouring rows differ more than others by "
+        "`white_share`, the scatter of neighbouring rows is not set against a smaller declaration",
+        reason="a choice: most of what is left is the same in any order",
+    )
     quiet_floor_ratio: float = threshold(
         1.2,
         unit="squares of the noise floor",

@@ -7,7 +7,8 @@ repeats : pure error, the standard deviation of replicates (rows of one visit), 
     the visits about their means, and not less than the uncertainty of the reference's last digit. A declaration that
     agrees with it is pooled.
 declared : the reference's standard uncertainty and the gauges' noise at the tip, sqrt(u_reference^2 + u_gauges^2).
-    Neighbouring rows that differ by much less contradict it: then the estimate is the unit to count in.
+    Neighbouring rows that differ by much less contradict it: then the estimate is the unit to count in. So do rows
+    that differ by much more where what a diagnosis leaves is white (`white_residual`).
 estimate : from differences of neighbouring rows, s = trimmed_scale((r_{i+1} - r_i) / sqrt(2)). What changes from row
     to row counts as noise, be it noise or not: it is a unit to count in, and no floor.
 
@@ -44,6 +45,7 @@ class NoiseFloor:
     by_axis_um : (m,) per coordinate.  source : where it is from.  how : the same in a sentence.
     dof : degrees of freedom, over all coordinates; inf for a declaration that nothing tests.
     contradiction : a remark where repeats or neighbours and the declaration are far apart; "" where they are not.
+    declared_um : root mean square of a declaration that an estimate takes the place of; nan without one.
     angles : how many of the coordinates, the last ones, are an attitude's, in urad.
     digit_um : (m,) standard uncertainty of the reference's last digit, 0 where unknown.
     """
@@ -53,6 +55,7 @@ class NoiseFloor:
     how: str
     dof: float
     contradiction: str = ""
+    declared_um: float = float("nan")
     angles: int = 0
     digit_um: FloatArray = field(default_factory=lambda: np.zeros(1))
 
@@ -65,6 +68,11 @@ class NoiseFloor:
     def least_um(self) -> FloatArray:
         """(m,) below which scatter says nothing: the noise where it is known, and the uncertainty of the last digit."""
         return np.maximum(self.by_axis_um if self.known else 0.0, self.digit_um)
+
+    @property
+    def above_declared(self) -> bool:
+        """Whether it is an estimate that is larger than what is declared."""
+        return self.um > self.declared_um
 
     @property
     def known(self) -> bool:
@@ -133,10 +141,14 @@ class Units(NamedTuple):
     unit: str
     angles: int
 
+    def length_rms(self, by_axis: FloatArray) -> float:
+        """Root mean square of those of the values (m,) that are no attitude's."""
+        return rms(by_axis[: len(by_axis) - self.angles])
+
     def text(self, by_axis: FloatArray) -> str:
         """Root mean square of values (m,) by their units, for people: "0.16 um and 2.0 urad"."""
         lengths = len(by_axis) - self.angles
-        length = format_error(rms(by_axis[:lengths]), self.unit, 3)
+        length = format_error(self.length_rms(by_axis), self.unit, 3)
         return f"{length} and {format_error(rms(by_axis[lengths:]), 'urad', 3)}" if self.angles else length
 
 
@@ -165,7 +177,7 @@ def _noise_floor(
     if is_declared:
         if remark := _too_large(estimate, expected_um, criteria, units):
             how = f"an estimate, from differences of neighbouring rows: {no_repeats}, and the declared noise is larger"
-            return replace(estimate, how=how, contradiction=remark)
+            return replace(estimate, how=how, contradiction=remark, declared_um=units.length_rms(expected_um))
         declared = f"the reference's {units.text(declared_um)}"
         if not np.isnan(gauges_um).any():
             declared += f" with the gauges' {units.text(gauges_um)} at the tip"
@@ -193,16 +205,26 @@ def _rounded_scatter(
 def _too_large(estimate: NoiseFloor, expected_um: FloatArray, criteria: ComparisonCriteria, units: Units) -> str:
     """Why declared noise (m,) is no floor: neighbouring rows differ by far less; "" where they do not.
 
-    F test as of repeats. What changes from row to row only adds to differences, so that nothing excuses small ones.
+    What changes from row to row only adds to differences, so that nothing excuses small ones.
     """
-    ratio = float(np.mean((estimate.by_axis_um / expected_um) ** 2))
-    below = float(fdtr(estimate.dof, criteria.declared_dof * len(expected_um), ratio))
-    if below >= criteria.contradiction_p_value / 2 or np.sqrt(ratio) > 1 / criteria.declared_ratio:
+    if contradicting_factor(estimate.by_axis_um, estimate.dof, expected_um, criteria) > 1 / criteria.declared_ratio:
         return ""
     return (
         f"neighbouring rows scatter by {units.text(estimate.by_axis_um)}, and {units.text(expected_um)} is declared: "
         f"check `{sigma_key(units.unit)}`; what it holds beside noise, these rows do not show"
     )
+
+
+def contradicting_factor(
+    scatter_um: FloatArray, dof: float, expected_um: FloatArray, criteria: ComparisonCriteria
+) -> float:
+    """Scatter (m,) of `dof` degrees of freedom over declared noise (m,), rms; 1 where they do not contradict.
+
+    F test of the ratio of both variances, averaged over the coordinates, with `declared_dof` for the declaration.
+    """
+    ratio = float(np.mean((scatter_um / expected_um) ** 2))
+    below = float(fdtr(dof, criteria.declared_dof * len(expected_um), ratio))
+    return 1.0 if min(below, 1 - below) >= criteria.contradiction_p_value / 2 else float(np.sqrt(ratio))
 
 
 def _why_no_repeats(scatter: Scatter | None, criteria: ComparisonCriteria) -> str:
@@ -217,10 +239,7 @@ def _why_no_repeats(scatter: Scatter | None, criteria: ComparisonCriteria) -> st
 def _from_repeats(
     scatter: Scatter, expected_um: FloatArray | None, criteria: ComparisonCriteria, units: Units
 ) -> NoiseFloor:
-    """The repeats, pooled with a declaration (m,) that they do not contradict, weighted by degrees of freedom.
-
-    F test of the ratio of both variances, averaged over the coordinates, with `declared_dof` for the declaration.
-    """
+    """The repeats, pooled with a declaration (m,) that they do not contradict, weighted by degrees of freedom."""
     axes = len(scatter.by_axis_um)
     dof = scatter.dof * axes
     scattered = units.text(scatter.by_axis_um)
@@ -228,10 +247,9 @@ def _from_repeats(
     if expected_um is None:
         return NoiseFloor(scatter.by_axis_um, "repeats", how, dof)
     declared = f"declared noise of {units.text(expected_um)}"
-    ratio = float(np.mean((scatter.by_axis_um / expected_um) ** 2))
-    below = float(fdtr(dof, criteria.declared_dof * axes, ratio))
-    if min(below, 1 - below) < criteria.contradiction_p_value / 2:
-        remark = _contradiction(float(np.sqrt(ratio)), criteria.declared_ratio, sigma_key(units.unit))
+    factor = contradicting_factor(scatter.by_axis_um, dof, expected_um, criteria)
+    if factor != 1.0:
+        remark = _contradiction(factor, criteria.declared_ratio, sigma_key(units.unit))
         return NoiseFloor(scatter.by_axis_um, "repeats", f"{how} and contradict the {declared}", dof, remark)
     pooled_dof = scatter.dof + criteria.declared_dof
     variance = (scatter.dof * scatter.by_axis_um**2 + criteria.declared_dof * expected_um**2) / pooled_dof

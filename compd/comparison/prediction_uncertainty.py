@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.noise_floor import repeat_scatter
 from compd.model import (
@@ -50,13 +50,14 @@ class Uncertainty(NamedTuple):
         return np.asarray(np.sqrt(self.noise_um**2 + self.parameters_um**2 + self.frame_um**2))
 
 
-def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True) -> GaugeNoise:
+def gauge_noise(aligned: AlignedRecording, from_repeats: bool = True, usable: BoolArray | None = None) -> GaugeNoise:
     """Of each gauge: its scatter within visits, but at least the uncertainty of its last digit; else that alone.
 
     from_repeats : False where the machine moves within a visit, so that the gauges' scatter is no noise.
+    usable : (N,) rows that count; None for all complete ones.
     """
     recording, rows = aligned.recording, aligned.rows
-    usable = aligned.usable.mask
+    usable = aligned.usable.mask if usable is None else usable
     noise_mm: dict[str, FloatArray] = {}
     repeated = False
     for port in GAUGE_PORTS:

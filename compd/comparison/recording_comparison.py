@@ -22,6 +22,7 @@ from compd.display_unit import MM_PER_RAD
 from compd.errors import Problem, RecordingError
 from compd.model import GaugeNoise, link_residuals
 from compd.model.effects import FittedEffect
+from compd.recording import UsableRows
 from compd.statistics import copied_rows, last_digit_um
 from compd.units import UM_PER_MM
 
@@ -45,14 +46,14 @@ def compare(
     criteria = aligned.criteria
     by_effect, total = effect_deltas(fitted, aligned.rows)
     predicted_mm = aligned.predicted_mm(total)
-    known, left_out = _known_rows(aligned, predicted_mm, criteria)
+    usable = _usable_rows(aligned, predicted_mm, criteria)
     residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM
-    if (copies := copied_rows(residual_um, known)).any():
-        known, left_out = known & ~copies, {**left_out, COPIED: int(copies.sum())}
+    usable = usable.without(copied_rows(residual_um, usable.mask), COPIED)
+    known = usable.mask
     residual_um[~known] = np.nan
     residual_um, along, outlier = _without_nuisance(aligned, fitted, residual_um, known, criteria, outlier)
     used = known & ~outlier
-    gauges, uncertainty = _uncertainty(aligned, residual_um, used, fitted, covariance, criteria)
+    gauges, uncertainty = _uncertainty(aligned, residual_um, known, used, fitted, covariance, criteria)
     floor = noise_floor(
         residual_um,
         used,
@@ -75,7 +76,8 @@ def compare(
         residual_um=residual_um,
         used=used,
         outlier=outlier,
-        left_out=left_out,
+        left_out=usable.left_out,
+        reason=usable.reason,
         floor=floor,
         uncertainty=uncertainty,
         gauges=gauges,
@@ -87,26 +89,20 @@ def compare(
     )
 
 
-def _known_rows(
-    aligned: AlignedRecording, predicted_mm: FloatArray, criteria: ComparisonCriteria
-) -> tuple[BoolArray, dict[str, int]]:
-    """(N,) rows with a measured and a predicted value; and reason -> number of the other rows."""
-    usable = aligned.usable.mask
-    known = usable & np.isfinite(predicted_mm).all(axis=1)
-    left_out = dict(aligned.usable.left_out)
-    if (usable & ~known).any():
-        left_out[NO_QUANTITY] = int((usable & ~known).sum())
-    if known.sum() < criteria.fewest_rows:
+def _usable_rows(aligned: AlignedRecording, predicted_mm: FloatArray, criteria: ComparisonCriteria) -> UsableRows:
+    """Rows with a measured and a predicted value."""
+    usable = aligned.usable.without(np.asarray(~np.isfinite(predicted_mm).all(axis=1)), NO_QUANTITY)
+    if (count := int(usable.mask.sum())) < criteria.fewest_rows:
         raise RecordingError(
             Problem(
                 where=str(aligned.recording.path),
                 what="too few rows can be compared",
-                value=str(int(known.sum())),
+                value=str(count),
                 allowed=f"{criteria.fewest_rows} or more",
-                next_step="; ".join(f"{count} rows: {reason}" for reason, count in left_out.items()),
+                next_step="; ".join(f"{rows} rows: {reason}" for reason, rows in usable.left_out.items()),
             )
         )
-    return known, left_out
+    return usable
 
 
 def _without_nuisance(
@@ -139,25 +135,29 @@ def _without_nuisance(
 def _uncertainty(
     aligned: AlignedRecording,
     residual_um: FloatArray,
+    known: BoolArray,
     used: BoolArray,
     fitted: Sequence[FittedEffect],
     covariance: FloatArray | None,
     criteria: ComparisonCriteria,
 ) -> tuple[GaugeNoise | None, Uncertainty]:
-    """The gauges' noise, None for an external model, and the prediction's uncertainty."""
+    """The gauges' noise, None for an external model, and the prediction's uncertainty.
+
+    known : (N,) rows of which residual_um (N, m) is known.  used : (N,) those of them that count.
+    """
     if covariance is None:
         covariance = block_diag(*(effect.covariance for effect in fitted)) if fitted else np.zeros((0, 0))
     if aligned.model is None:
         return None, first_order_uncertainty(aligned, None, fitted, covariance)
     # who lifts a probe off and sets it down again moves the scales by the seat's noise, which is the reference's
-    gauges = gauge_noise(aligned, from_repeats=aligned.ends is None)
+    gauges = gauge_noise(aligned, from_repeats=aligned.ends is None, usable=known)
     uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
     repeats = repeat_scatter(residual_um, used, aligned.recording.visit, criteria)
     if repeats is not None:
         gauges_um = np.sqrt(np.mean(uncertainty.gauges_um[used] ** 2, axis=0))
         # what the gauges' noise alone does to the residual cannot be more than the residual's own scatter
         if (gauges_um > criteria.most_gauge_share * repeats.by_axis_um).any():
-            gauges = gauge_noise(aligned, from_repeats=False)
+            gauges = gauge_noise(aligned, from_repeats=False, usable=known)
             uncertainty = first_order_uncertainty(aligned, gauges, fitted, covariance)
     return gauges, uncertainty
 

@@ -36,6 +36,12 @@ class CandidateCriteria:
         meaning="so many the search among the choices of a constant counts for",
         reason="the better of two fits noise about as one parameter does: log 2 = 0.7",
     )
+    coldest_K: float = threshold(
+        200.0,
+        unit="K",
+        meaning="a column in kelvin with smaller values is a difference, which stands for no thermometer",
+        reason="no machine is measured at -73 degC",
+    )
     moments: int = threshold(
         8,
         unit="moments",

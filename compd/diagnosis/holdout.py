@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,28 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording, Comparison, compare
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.phrases import best_description, followed_text
 from compd.diagnosis.words.summary import summary
-from compd.model.effects import needed_quantities
-from compd.text import nan_to_null
+from compd.errors import CompdError
+from compd.model.effects import FittedEffect, needed_quantities
+from compd.model.library import find_effect
+from compd.text import join_words, nan_to_null
+
+
+@dataclass(frozen=True, eq=False)
+class HoldoutDescription:
+    """What a diagnosis said that the rest follows, tried on a recording that took no part in it.
+
+    name : what it follows, in words.
+    rms_um : error with the description beside the effects, um; nan where it cannot be tried.
+    holds : whether it lowers the error by its price.
+    why_not : why it cannot be tried; "" where it was.
+    """
+
+    name: str
+    rms_um: float = math.nan
+    holds: bool = False
+    why_not: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +45,14 @@ class Holdout:
     expected_um : between which errors it was to lie with 90 %, um; nan where that is not known.
     other_conditions : quantities that were elsewhere than in the recording of the diagnosis, in words: what is to be
         expected there is not known.
+    described : what the rest followed in the diagnosis, tried here; None where it followed nothing.
     """
 
     before: Comparison
     after: Comparison
     expected_um: tuple[float, float] = (math.nan, math.nan)
     other_conditions: tuple[str, ...] = ()
+    described: HoldoutDescription | None = None
 
     @property
     def summary(self) -> str:
@@ -40,7 +61,7 @@ class Holdout:
         return (
             f"Sealed until now, {aligned.recording.path}: {self.before.rms_um:.3g} -> {self.after.rms_um:.3g} "
             f"{aligned.unit}, {self.after.floor_ratio:.3g} times the noise squared (1 = nothing left). "
-            f"Expected: {self._expected()}."
+            f"Expected: {self._expected()}.{self._described()}"
         )
 
     def _expected(self) -> str:
@@ -49,6 +70,15 @@ class Holdout:
             return f"not known: other conditions ({'; '.join(self.other_conditions)})"
         low, high = self.expected_um
         return "not known" if math.isnan(low) else f"{low:.3g} to {high:.3g} {self.after.aligned.unit}, with 90 %"
+
+    def _described(self) -> str:
+        """Whether the description holds here, as a sentence behind others; "" without one."""
+        if (found := self.described) is None:
+            return ""
+        if found.why_not:
+            return f" What the rest followed, {found.name}, cannot be tried here: {found.why_not}."
+        fall = f"{self.after.rms_um:.3g} -> {found.rms_um:.3g} {self.after.aligned.unit}"
+        return f" What the rest followed, {found.name}, {'holds' if found.holds else 'does not hold'} here: {fall}."
 
     def as_json(self) -> dict[str, Any]:
         """One entry of `sealed`, beside the verdict's own keys."""
@@ -61,6 +91,7 @@ class Holdout:
             "final_floor_ratio": self.after.floor_ratio,
             "expected_um": None if self.other_conditions else nan_to_null(list(self.expected_um)),
             "other_conditions": list(self.other_conditions),
+            **({} if self.described is None else {"described": nan_to_null(asdict(self.described))}),
         }
 
 
@@ -71,7 +102,33 @@ def evaluate_holdout(diagnosis: Diagnosis, aligned: AlignedRecording) -> Holdout
     """
     aligned = replace(aligned, criteria=diagnosis.before.criteria)
     before, after = (compare(aligned, comparison.fitted) for comparison in (diagnosis.before, diagnosis.after))
-    return Holdout(before, after, diagnosis.left_interval_um, _other_conditions(diagnosis, after))
+    conditions = _other_conditions(diagnosis, after)
+    return Holdout(before, after, diagnosis.left_interval_um, conditions, _description(diagnosis, after))
+
+
+def _description(diagnosis: Diagnosis, after: Comparison) -> HoldoutDescription | None:
+    """What the rest follows best, with its numbers as fitted in the diagnosis; a change belongs to its own day.
+
+    It holds where it lowers the logarithm of the mean square by its price, as in the diagnosis.
+    """
+    finding = best_description(diagnosis)
+    if finding is None or not finding.formula_effects:
+        return None
+    name, links = followed_text(finding), after.aligned.rows.links
+    fitted = []
+    for declaration, values in zip(finding.formula_effects, finding.parameters, strict=True):
+        effect = find_effect(declaration, "description")
+        theta = np.array([values[column.name] for column in effect.columns(links)])
+        fitted.append(FittedEffect(effect, theta, covariance=np.full((len(theta), len(theta)), np.nan)))
+    needed = {need for each in fitted for need in needed_quantities(each.effect, links)}
+    if missing := sorted(needed - set(after.aligned.rows.quantities)):
+        return HoldoutDescription(name, why_not=f"{join_words(missing)} was not recorded")
+    try:
+        described = compare(after.aligned, [*after.fitted, *fitted], outlier=after.outlier)
+    except CompdError as error:
+        return HoldoutDescription(name, why_not=str(error))
+    gain = 2.0 * math.log(after.rms_um / described.rms_um)
+    return HoldoutDescription(name, described.rms_um, gain >= diagnosis.criteria.description_price)
 
 
 def _other_conditions(diagnosis: Diagnosis, after: Comparison) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from compd.diagnosis.search.explanation import Explanation
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.verdict import Diagnosis
 from compd.planning import measurement_of_constant, measurement_to_test, next_measurement
+from compd.text import clock_text
 
 # Covariates that the proposal names.
 MAX_COVARIATES = 2
@@ -45,8 +46,8 @@ def propose_measurement(
             return [
                 {
                     "measure": "some of the first rows once more: is the machine as it was then?",
-                    "why": f"{finding.effect or 'everything'} changed at {finding.time_s:.0f} s: look what happened "
-                    "there",
+                    "why": f"{finding.effect or 'everything'} changed at {clock_text(finding.time_s)}: look what "
+                    "happened there",
                 }
             ]
     if not problem.floor_known:

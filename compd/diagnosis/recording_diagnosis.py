@@ -150,8 +150,7 @@ def explain_residual(
     pool = candidate_pool(before, effects, criteria.candidates)
     problem = build_problem(before, pool, criteria)
     explanation = explain(problem, progress)
-    quiet = not explanation.members and problem.may_be_noise(explanation.loss)
-    if quiet and (counted := counted_by_neighbours(before)) is not None:
+    if (counted := _counted_anew(explanation)) is not None:
         before = counted
         problem = build_problem(before, pool, criteria)
         explanation = explain(problem, progress)
@@ -162,6 +161,15 @@ def explain_residual(
     explanation = explain_again(problem, explanation, progress)
     named = named_members(explanation.losses, explanation.members)
     return replace(explanation, members=with_intercepts(explanation.losses, named))
+
+
+def _counted_anew(explanation: Explanation) -> Comparison | None:
+    """The comparison with what neighbouring rows show as its noise, where what is left contradicts the declared one."""
+    problem = explanation.problem
+    if not problem.may_be_noise(explanation.loss):
+        left_um = problem.residual_beside_um(explanation.losses, explanation.members)
+        return counted_by_neighbours(problem.comparison, left_um)
+    return None if explanation.members else counted_by_neighbours(problem.comparison)
 
 
 def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagnosis:
@@ -239,7 +247,8 @@ def _verdict(
     """At the floor nothing, one or several effects are missing; above it, or where it is not known, the rest remains.
 
     Beside effects that are named the unnamed ones may leave what their standard errors allow for. Where the noise is
-    not known, whether something is missing can be told only by finding it.
+    not known, whether something is missing can be told only by finding it; a declaration that is smaller says that
+    something is.
 
     grown : by how much the variance of the noise grows by that of the quantities from which effects are computed.
     """
@@ -256,7 +265,8 @@ def _verdict(
         )
     if steps:
         return "partial"
-    if not found and (not problem.floor_known or all(c.status == "not_testable" for c in candidates)):
+    may_be_noise = not problem.floor_known and not problem.comparison.floor.above_declared
+    if not found and (may_be_noise or all(c.status == "not_testable" for c in candidates)):
         return "not_testable"
     return "unexplained"
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.data_fault import DataFault
+from compd.recording.fault_criteria import LIMITS
 from compd.statistics import last_digit_um, trimmed_scale
 from compd.text import join_words
 from compd.units import unit_of
@@ -18,28 +19,6 @@ from compd.units import unit_of
 _SLOW = re.compile(r"(?:temperature|pressure|humidity)_\w+|\w+_(?:degC|hPa)")
 # Loads may be put on for a single row.
 _LOADS = frozenset({"N", "mN", "kN", "kgf", "kg", "g", "Nm"})
-# Fewer known values say nothing of each other.
-MIN_VALUES = 12
-# Rows around, by whose median a value is judged; it holds against two wild ones in a row.
-NEIGHBOURS = 7
-# A jump there and back is wild beyond so many robust standard deviations of the steps, last digits, and this share of
-# the range of the others (5 to 95 %).
-MIN_STEP_SIGMAS = 20.0
-MIN_RANGE_SHARE = 0.5
-# More of the rows are no wild values, but what happened.
-MAX_WILD_SHARE = 0.02
-# A number that is so many ranges of all others away, repeated to the last digit, stands for no reading.
-MIN_RANGES_SLOW, MIN_RANGES = 3.0, 10.0
-MAX_SENTINEL_SHARE = 0.3
-# Of the others so many must differ: settings repeat their numbers, readings do not.
-MIN_DIFFERENT = 10
-MIN_DIFFERENT_SHARE = 0.2
-# A gauge hangs where digits that change with a chance p repeat so long that chance makes it once in 1e9.
-MIN_HANGING_ROWS = 12
-MAX_HANGING_CHANCE = 1e-9
-# It comes back with a jump, of so many of its usual steps (95 %), or not at all.
-MIN_CHANGING = 0.5
-MIN_JUMP = 4.0
 # Numbers that devices and people write where nothing was read.
 _SENTINELS = frozenset({85.0, -127.0, 127.0, 32767.0, -32768.0, 65535.0, 3276.7, -3276.8, 6553.5, 327.67, -327.68})
 _NINES = re.compile(r"-?9{3,}(?:\.9+)?|-?9{2,}\.9+")
@@ -55,7 +34,7 @@ def quantity_faults(quantities: Mapping[str, FloatArray], row: IntArray) -> list
     faults: list[DataFault] = []
     for name, values in quantities.items():
         known = np.flatnonzero(np.isfinite(values))
-        if len(known) < MIN_VALUES or np.ptp(values[known]) == 0:
+        if len(known) < LIMITS.min_values or np.ptp(values[known]) == 0:
             continue
         slow = _SLOW.fullmatch(name) is not None
         of_known, sure = _sentinels(values[known], slow, unit_of(name) in _LOADS)
@@ -85,7 +64,7 @@ def hanging_reference(columns: Mapping[str, FloatArray], row: IntArray, told: Se
     faults: list[DataFault] = []
     for name, values in columns.items():
         known = np.flatnonzero(np.isfinite(values) & ~np.isin(row, list(rows_told)))
-        if not re.fullmatch(r"reference_(?:[xyz]|link_\d+|distance)_\w+", name) or len(known) < MIN_VALUES:
+        if not re.fullmatch(r"reference_(?:[xyz]|link_\d+|distance)_\w+", name) or len(known) < LIMITS.min_values:
             continue
         if (hanging := _hanging(values[known])).any():
             what = f"is {values[known][hanging][0]:.10g} all the time, where else it changes: does the instrument hang?"
@@ -111,15 +90,15 @@ def _sentinels(values: FloatArray, slow: bool, load: bool) -> tuple[BoolArray, b
         far = rest[np.argmax(np.abs(rest - np.median(rest)))]
         new = values == far
         others = values[~wild & ~new]
-        if len(others) < MIN_VALUES or (wild | new).mean() > MAX_SENTINEL_SHARE:
+        if len(others) < LIMITS.min_values or (wild | new).mean() > LIMITS.max_sentinel_share:
             break
         low, high = float(others.min()), float(others.max())
         gap = low - far if far < low else far - high
         different = len(np.unique(others))
-        if different < max(MIN_DIFFERENT, MIN_DIFFERENT_SHARE * len(others)) or high == low:
+        if different < max(LIMITS.min_different, LIMITS.min_different_share * len(others)) or high == low:
             break
         special = far in _SENTINELS or _NINES.fullmatch(f"{far:.10g}") is not None or abs(far) >= MIN_ABSURD
-        if gap <= (MIN_RANGES_SLOW if slow or special else MIN_RANGES) * (high - low):
+        if gap <= (LIMITS.min_ranges_slow if slow or special else LIMITS.min_ranges) * (high - low):
             break
         wild |= new
         sure = sure and (not load or special or new.sum() > 1)
@@ -132,7 +111,7 @@ def _jumps_back(values: FloatArray) -> BoolArray:
     digit = float(last_digit_um(values[:, None])[0])
     scale = max(float(trimmed_scale(steps[:, None])[0]) / np.sqrt(2.0), digit)
     low, high = np.quantile(values, [0.05, 0.95])
-    limit = max(MIN_STEP_SIGMAS * scale, MIN_RANGE_SHARE * float(high - low))
+    limit = max(LIMITS.min_step_sigmas * scale, LIMITS.min_range_share * float(high - low))
     if limit == 0:
         return np.zeros(len(values), dtype=bool)
     wild: BoolArray = np.abs(values - _of_neighbours(values)) > limit
@@ -140,15 +119,15 @@ def _jumps_back(values: FloatArray) -> BoolArray:
         # a value that something leads up to, or away from, is on its way
         steps_there = [abs(steps[edge]) for edge in (begin - 1, end - 1) if 0 <= edge < len(steps)]
         beyond = [abs(steps[edge]) for edge in (begin - 2, end) if 0 <= edge < len(steps)]
-        if end - begin > 2 or min(steps_there) <= max(limit, MIN_JUMP * max(beyond)):
+        if end - begin > 2 or min(steps_there) <= max(limit, LIMITS.min_jump * max(beyond)):
             wild[begin:end] = False
-    return wild if 0 < wild.sum() <= max(2.0, MAX_WILD_SHARE * len(values)) else np.zeros_like(wild)
+    return wild if 0 < wild.sum() <= max(2.0, LIMITS.max_wild_share * len(values)) else np.zeros_like(wild)
 
 
 def _of_neighbours(values: FloatArray) -> FloatArray:
     """(K,) median of the values around each."""
-    around = np.pad(values, NEIGHBOURS // 2, mode="reflect")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(around, NEIGHBOURS), axis=1))
+    around = np.pad(values, LIMITS.neighbours // 2, mode="reflect")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(around, LIMITS.neighbours), axis=1))
 
 
 def _hanging(values: FloatArray) -> BoolArray:
@@ -160,18 +139,18 @@ def _hanging(values: FloatArray) -> BoolArray:
         return nothing
     begin, end = stretches[0]
     rest = np.delete(same, np.arange(begin, end))
-    if end - begin < MIN_HANGING_ROWS or len(rest) < MIN_HANGING_ROWS:
+    if end - begin < LIMITS.min_hanging_rows or len(rest) < LIMITS.min_hanging_rows:
         return nothing
     changing = 1.0 - float(rest.mean())
     second = stretches[1][1] - stretches[1][0] if len(stretches) > 1 else 0
-    if changing < MIN_CHANGING or end - begin < 3 * second:
+    if changing < LIMITS.min_changing or end - begin < 3 * second:
         return nothing
-    if (1.0 - min(changing, 0.99)) ** (end - begin) > MAX_HANGING_CHANCE:
+    if (1.0 - min(changing, 0.99)) ** (end - begin) > LIMITS.max_hanging_chance:
         return nothing
     if end < len(same):
         # what stands while a slow thing turns, or is held, goes on without a jump
         usual = float(np.quantile(np.abs(np.delete(np.diff(values), np.arange(begin, min(end + 1, len(same))))), 0.95))
-        if abs(values[end + 1] - values[end]) <= MIN_JUMP * usual:
+        if abs(values[end + 1] - values[end]) <= LIMITS.min_jump * usual:
             return nothing
     elif values[end] == round(values[end]):
         return nothing  # a temperature that is held shows the number at which it is set

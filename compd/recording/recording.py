@@ -42,6 +42,15 @@ class UsableRows(NamedTuple):
     left_out: Mapping[str, int]
     reason: TextArray
 
+    def without(self, rows: BoolArray, reason: str) -> UsableRows:
+        """Those that are not among `rows` (N,), which are left out for one more reason."""
+        new = rows & self.mask
+        if not new.any():
+            return self
+        return UsableRows(
+            self.mask & ~new, {**self.left_out, reason: int(new.sum())}, np.where(new, reason, self.reason)
+        )
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -244,19 +253,15 @@ class Recording:
 
         Raises KeyError for a column that the recording does not have.
         """
-        left_out: dict[str, int] = {}
-        reason = np.full(self.rows, "", dtype=object)
         lacking = {"excluded by a person": self.excluded}
         for fault in self.faults:
             if fault.consequence == "rows left out":
                 lacking[fault.reason] = lacking.get(fault.reason, False) | np.isin(self.row, fault.rows)
         lacking |= {f"{name} is empty": np.isnan(self.columns[name]) for name in needed}
-        for text, rows in lacking.items():
-            new = rows & (reason == "")
-            if new.any():
-                left_out[text] = int(new.sum())
-                reason[new] = text
-        return UsableRows(reason == "", left_out, reason)
+        usable = UsableRows(np.ones(self.rows, dtype=bool), {}, np.full(self.rows, "", dtype=object))
+        for reason, rows in lacking.items():
+            usable = usable.without(np.asarray(rows), reason)
+        return usable
 
     @cached_property
     def fold(self) -> IntArray:

@@ -36,6 +36,7 @@ from compd.recording.checks import (
     check_values,
     largest_joint_um,
 )
+from compd.recording.kept_rows import kept_rows
 from compd.recording.layout import Layout, machine_problems, read_layout
 from compd.recording.quantity_faults import hanging_reference, quantity_faults, without_wild
 from compd.recording.quaternion import with_rotation_vectors
@@ -163,13 +164,12 @@ class RecordingBuilder:
     def _recording(
         self, table: Table, sidecar: Sidecar, layout: Layout, excluded: BoolArray, warnings: tuple[Problem, ...]
     ) -> Recording:
-        """The rows in the order of time; those without a time are left out and counted."""
-        timed = ~np.isnan(table.columns["time_s"])
-        kept = np.argsort(table.columns["time_s"], kind="stable")[: int(timed.sum())]
+        """The rows in the order of time; those that are left out are counted."""
+        kept, left_out = kept_rows(table.columns)
         columns = {name: values[kept] for name, values in table.columns.items()}
         if self._begin_s is None and len(kept):
             self._begin_s = float(columns["time_s"][0])
-        left_out = {"time_s is empty": int((~timed).sum()), "empty row": self._blank_rows(table)}
+        left_out["empty row"] = self._blank_rows(table)
 
         def stack(names: Iterable[str]) -> FloatArray | None:
             present = [columns[name] for name in names if name in columns]

@@ -10,19 +10,8 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.data_fault import DataFault
+from compd.recording.fault_criteria import LIMITS
 from compd.statistics import trimmed_scale
-
-# Distance (mm) of places that every reference instrument tells apart.
-PLACE_MM = 0.1
-# How many last digits, and how many robust standard deviations of what the model misses, are another place.
-MIN_DIGITS = 10.0
-MIN_SIGMAS = 20.0
-# A standing machine with a moving reference is told from a motion of so many mm on: less, an effect can make.
-MIN_UNFOLLOWED_MM = 1.0
-# A column that holds one number in more of its rows is constant.
-MAX_SHARE = 0.8
-# Fewer rows of one axis with the same digits happen by chance.
-MIN_RUN = 3
 
 
 class _Pair(NamedTuple):
@@ -118,7 +107,7 @@ def _missed(pair: _Pair) -> tuple[FloatArray, FloatArray]:
 
 def _place_mm(pair: _Pair) -> float:
     """How far apart places are that the reference must tell apart."""
-    return max(PLACE_MM, MIN_DIGITS * max(map(_last_digit_mm, pair.reference_mm.T)))
+    return max(LIMITS.place_mm, LIMITS.min_digits * max(map(_last_digit_mm, pair.reference_mm.T)))
 
 
 def _last_digit_mm(values_mm: FloatArray) -> float:
@@ -138,7 +127,7 @@ def _no_reading(pair: _Pair) -> BoolArray:
     number = np.abs(values[:, 0])
     nines = (number >= 99) & np.isin(number, 10.0 ** np.arange(2, 13) - 1)
     suspicious = (values == values[:, :1]).all(axis=1) & ((number == 0) | nines)
-    if not suspicious.any() or suspicious.mean() > MAX_SHARE:
+    if not suspicious.any() or suspicious.mean() > LIMITS.max_share:
         return np.zeros(len(values), dtype=bool)
     good = values[~suspicious & np.isfinite(values).all(axis=1)]
     if len(good) < 2:
@@ -147,7 +136,7 @@ def _no_reading(pair: _Pair) -> BoolArray:
         others = pair._replace(reference_mm=np.where(suspicious[:, None], np.nan, values))
         _, scale = _missed(others)
         usual = np.nanmedian(others.reference_mm - others.own_mm, axis=0)
-        far = np.abs(values - pair.own_mm - usual) > np.maximum(MIN_SIGMAS * scale, _place_mm(others))
+        far = np.abs(values - pair.own_mm - usual) > np.maximum(LIMITS.min_sigmas * scale, _place_mm(others))
         return np.asarray(suspicious & far.any(axis=1))
     if values.shape[1] < 2:
         return np.zeros(len(values), dtype=bool)
@@ -174,7 +163,7 @@ def _frozen(pair: _Pair, use: BoolArray) -> tuple[BoolArray, int, int]:
     place_mm = _place_mm(pair)
     for begin, end in _runs(pair.reference_mm, use):
         number = _different_places(pair.own_mm[begin:end], place_mm)
-        if number < 2 or end - begin > MAX_SHARE * len(use):
+        if number < 2 or end - begin > LIMITS.max_share * len(use):
             continue
         if len(pair.reference) == 1 and not _is_missed(pair, begin, end, place_mm):
             continue
@@ -186,7 +175,7 @@ def _frozen(pair: _Pair, use: BoolArray) -> tuple[BoolArray, int, int]:
 
 def _is_missed(pair: _Pair, begin: int, end: int, place_mm: float) -> bool:
     """Whether in a run of one axis the model moves by far more than it misses elsewhere."""
-    if end - begin < MIN_RUN:
+    if end - begin < LIMITS.min_run:
         return False
     rest = np.ones(len(pair.own_mm), dtype=bool)
     rest[begin:end] = False
@@ -196,7 +185,7 @@ def _is_missed(pair: _Pair, begin: int, end: int, place_mm: float) -> bool:
         return False
     scale = float(trimmed_scale((missed - np.median(missed))[:, None])[0])
     return bool(
-        np.nanmax(pair.own_mm[begin:end]) - np.nanmin(pair.own_mm[begin:end]) > max(MIN_SIGMAS * scale, place_mm)
+        np.nanmax(pair.own_mm[begin:end]) - np.nanmin(pair.own_mm[begin:end]) > max(LIMITS.min_sigmas * scale, place_mm)
     )
 
 
@@ -206,15 +195,15 @@ def _unfollowed(pair: _Pair, use: BoolArray) -> tuple[BoolArray, int]:
     standing, first = np.zeros(len(use), dtype=bool), -1
     if len(pair.reference) == 1:
         return standing, first
-    limit_mm = MIN_UNFOLLOWED_MM
+    limit_mm = LIMITS.min_unfollowed_mm
     if pair.aligned:
-        limit_mm = max(limit_mm, MIN_SIGMAS * float(np.max(_missed(pair)[1])))
+        limit_mm = max(limit_mm, LIMITS.min_sigmas * float(np.max(_missed(pair)[1])))
     for begin, end in _runs(pair.own_mm, use):
-        if end - begin < MIN_RUN or end - begin > MAX_SHARE * len(use):
+        if end - begin < LIMITS.min_run or end - begin > LIMITS.max_share * len(use):
             continue
         reference_mm = pair.reference_mm[begin:end]
         reference_mm = reference_mm[np.isfinite(reference_mm).all(axis=1)]
-        if len(reference_mm) < MIN_RUN:
+        if len(reference_mm) < LIMITS.min_run:
             continue
         away = np.abs(reference_mm - np.median(reference_mm, axis=0)).max(axis=1)
         if np.mean(away > limit_mm) > 1 / 2 and _different_places(reference_mm, limit_mm) > 2:

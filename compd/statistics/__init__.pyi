@@ -16,6 +16,7 @@ from .periodogram import PeriodLimits as PeriodLimits
 from .periodogram import shortest_period as shortest_period
 from .periodogram import strongest_periods as strongest_periods
 from .replicates import copied_rows as copied_rows
+from .replicates import doubled_rows as doubled_rows
 from .replicates import replicate_pairs as replicate_pairs
 from .robust import MIN_SIGMA as MIN_SIGMA
 from .robust import SCALE_EFFICIENCY as SCALE_EFFICIENCY

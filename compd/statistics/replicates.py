@@ -8,7 +8,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 
-# Pairs of rows that are alike by chance, from which on likeness proves no copy.
+# Pairs of rows, or tables, that are alike by chance, from which on likeness proves no copy.
 CHANCE_PAIRS = 0.01
 
 
@@ -75,4 +75,23 @@ def copied_rows(values: FloatArray, use: BoolArray) -> BoolArray:
         return copies
     _, first = np.unique(values[rows], axis=0, return_index=True)
     copies[np.setdiff1d(rows, rows[first])] = True
+    return copies
+
+
+def doubled_rows(columns: FloatArray) -> BoolArray:
+    """(N,) the second of each two rows, where every row of a table (N, k) was written twice, one behind the other.
+
+    A row alone may be alike another by chance, as of a coarse display. All rows are not: in a doubled table each run of
+    equal rows has an even number of them. Of K runs this happens by chance in one table of 2^K; where that is one of a
+    hundred or more, none is a copy. An empty cell, nan, equals another.
+    """
+    copies = np.zeros(len(columns), dtype=bool)
+    if not columns.size:
+        return copies
+    equal = (columns[1:] == columns[:-1]) | (np.isnan(columns[1:]) & np.isnan(columns[:-1]))
+    bounds = np.append(np.flatnonzero(~np.append(False, equal.all(axis=1))), len(columns))
+    length = np.diff(bounds)
+    if (length % 2).any() or 0.5 ** len(length) >= CHANCE_PAIRS:
+        return copies
+    copies[1::2] = True
     return copies

@@ -4,6 +4,7 @@ from .json_text import nan_to_null as nan_to_null
 from .json_text import omit_unknown as omit_unknown
 from .labelled_lines import LabelledText as LabelledText
 from .labelled_lines import fit_lines as fit_lines
+from .moments import clock_text as clock_text
 from .numbers_as_text import chance_text as chance_text
 from .numbers_as_text import estimate_text as estimate_text
 from .numbers_as_text import estimates_text as estimates_text

@@ -11,6 +11,7 @@ from typing import Any
 from compd.comparison import ComparisonCriteria
 from compd.diagnosis import Criteria
 from compd.fleet.criteria import FleetCriteria
+from compd.recording.fault_criteria import FaultCriteria
 from compd.threshold import thresholds
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target, term
 
@@ -65,6 +66,12 @@ by its name on this page:
 """
 
 
+DATA = """\
+These hold wherever a recording is read, before any other criterion. Rows that are right all the same are named under
+`trusted_rows:` in the sidecar.
+"""
+
+
 def page() -> str:
     """Markdown, from the fields of the classes and their metadata."""
     return join(
@@ -74,6 +81,8 @@ def page() -> str:
         _part("Diagnosis", "diagnosis", Criteria),
         _part("Comparison", "comparison", ComparisonCriteria),
         _part("A fleet of machines", "fleet", FleetCriteria),
+        _part("Data that are wrong", "data", FaultCriteria),
+        DATA,
     )
 
 

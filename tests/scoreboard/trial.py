@@ -10,7 +10,7 @@ from typing import Any
 
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording, compare, open_recording, search_constants
-from compd.diagnosis import Criteria, Diagnosis, diagnose
+from compd.diagnosis import Criteria, Diagnosis, Holdout, diagnose, evaluate_holdouts
 from compd.errors import CompdError
 from compd.model.effects import Effect, FittedEffect
 from compd.model.library import load_effects, load_library
@@ -39,6 +39,7 @@ def run(directory: Path, criteria: Criteria = Criteria()) -> dict[str, Any]:
     answer = read_answer(directory)
     expected = answer["expected"]
     bounded = answer["family"] == BOUNDED
+    holdout = _on_other_day(diagnosis, other)
     true_effects = _fitted(answer["answers"], train, _effects(directory))[0] if bounded else ()
     return {
         "case": answer["case"],
@@ -47,7 +48,8 @@ def run(directory: Path, criteria: Criteria = Criteria()) -> dict[str, Any]:
         "verdict": diagnosis.as_json(),
         "commit": commit(),
         "took_s": round(took_s, 3),
-        "other_floor_ratio": _floor_ratio(other, diagnosis.after.fitted),
+        "other_day": None if holdout is None else holdout.as_json(),
+        "other_floor_ratio": None if holdout is None else holdout.after.floor_ratio,
         "true_floor_ratio": _floor_ratio(other, true_effects) if bounded else None,
         "times_s": train.rows.time_s.tolist() if "change" in expected else [],
         "expected": expected,
@@ -71,6 +73,14 @@ def _open(directory: Path, name: str) -> AlignedRecording | None:
     """A recording of the case; None where there is none."""
     path, machine = directory / f"{name}.csv", directory / "machine.yaml"
     return open_recording(path, machine if machine.exists() else None) if path.exists() else None
+
+
+def _on_other_day(diagnosis: Diagnosis, other: AlignedRecording | None) -> Holdout | None:
+    """The other recording with what was found; None without one, or where it lacks what this needs."""
+    try:
+        return None if other is None else evaluate_holdouts(diagnosis, [other])[1][0]
+    except CompdError:
+        return None
 
 
 def _floor_ratio(other: AlignedRecording | None, fitted: Sequence[FittedEffect]) -> float | None:

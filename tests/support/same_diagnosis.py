@@ -40,6 +40,12 @@ def differences(
         yield f"the rest followed {first or 'nothing'}, and now {now or 'nothing'}"
 
 
+def assert_same(before: Diagnosis, after: Diagnosis, *, standard_errors: float = 1.0, factor: float = 1.0) -> None:
+    """The same verdict, effects, numbers and covariate; arguments as of `differences`."""
+    found = [*differences(before, after, standard_errors=standard_errors, factor=factor)]
+    assert not found, f"{before.summary} -> {after.summary}"
+
+
 def effects_of(diagnosis: Diagnosis) -> set[str]:
     """Ids of what is named."""
     return {step.effect.id for step in diagnosis.steps}

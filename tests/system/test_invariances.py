@@ -41,7 +41,7 @@ from tests.support.changed_recordings import (
 )
 from tests.support.hidden_effects import NOISE_UM, campaign, record_with_effects
 from tests.support.own_machines import milling_table, rotary_axis
-from tests.support.same_diagnosis import differences, effects_of
+from tests.support.same_diagnosis import assert_same, effects_of
 
 VISITS = 96
 FLOORS_MOVED = 300.0
@@ -226,4 +226,4 @@ def test_the_diagnosis_stays_the_same(
     # there a constant is fitted where it is needed only, and takes a share of what effects do
     standard_errors = 2.0 if change == CONSTANT and own_frame else 1.0
     factor = 1 / URAD_PER_MRAD if change == "the reference in another unit" else 1.0
-    assert not [*differences(before, after, standard_errors=standard_errors, factor=factor)], after.summary
+    assert_same(before, after, standard_errors=standard_errors, factor=factor)

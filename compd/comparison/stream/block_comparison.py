@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import NO_QUANTITY
 from compd.comparison.contributions import deltas_without
@@ -61,11 +61,8 @@ def _block_residuals(
     """What the block adds to the totals."""
     recording = aligned.recording
     predicted_mm = aligned.predicted_mm(sum_deltas(list(by_effect.values())))
-    usable = aligned.usable
-    known: BoolArray = usable.mask & np.isfinite(predicted_mm).all(axis=1)
-    left_out = dict(usable.left_out)
-    if without_value := int((usable.mask & ~known).sum()):
-        left_out[NO_QUANTITY] = without_value
+    usable = aligned.usable.without(np.asarray(~np.isfinite(predicted_mm).all(axis=1)), NO_QUANTITY)
+    known = usable.mask
     terms = fixed.terms[NOTHING]
     registration_um = nuisance.registration_um @ terms.registration
     residual_um = (aligned.measured_mm - predicted_mm) * UM_PER_MM - terms.explained_um(nuisance)
@@ -90,7 +87,7 @@ def _block_residuals(
         distance_um=_distance_um(aligned, used_um),
         registration_um=registration_um[used].sum(axis=0),
         outlier_row=recording.row[outlier],
-        left_out=left_out,
+        left_out=usable.left_out,
         contributions=contributions,
     )
 

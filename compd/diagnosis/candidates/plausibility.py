@@ -34,11 +34,9 @@ def is_plausible(limits: tuple[float, float], theta: float, std: float, criteria
     usual: every range reaches to nought. Where it ends there, beyond it is the wrong sign, and only the standard error
     counts. An unknown standard error (nan) excuses nothing.
     """
-    low, high = min(limits[0], 0.0), max(limits[1], 0.0)
     margin = criteria.range_sigmas * float(np.nan_to_num(std))
-    slack = criteria.range_slack * (high - low)
-    below, above = (margin if end == 0 else max(margin, slack) for end in (low, high))
-    return bool(low - below <= theta <= high + above)
+    ((low, high),) = with_slack(np.array([limits]), criteria)
+    return bool(min(low, min(limits[0], 0.0) - margin) <= theta <= max(high, max(limits[1], 0.0) + margin))
 
 
 def with_slack(limits: FloatArray, criteria: Criteria) -> FloatArray:

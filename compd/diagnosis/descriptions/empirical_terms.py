@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from compd.diagnosis.descriptions.search_covariates import (
     STAYED_THE_SAME,
     Kind,
     SearchCovariate,
+    mirrored_predictions,
     round_middle,
     round_within,
     search_covariates,
@@ -49,6 +50,10 @@ _UNITS_OF_STRAIN = {"k": "ppm/{}", "c": "ppm"}
 UNKNOWN_RANGE = 1e3
 RANGE_PER_SIZE = 3
 SOURCE = "describes a residual; its cause is not known"
+
+
+# By covariate, form, middle, whether with a constant, and value of the nonlinear constant.
+FactorsUm: TypeAlias = dict[tuple[str, str, float, bool, float | None], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -97,17 +102,25 @@ class EmpiricalTerm:
         """The nonlinear constants of `effect`, by name, at a value of the term's; None for a term without one."""
         return {} if value is None else {self.constant: value}
 
-    def columns_um(self, aligned: AlignedRecording, effect: Effect, value: float | None) -> FloatArray:
+    def columns_um(
+        self, aligned: AlignedRecording, effect: Effect, value: float | None, factors_um: FactorsUm | None = None
+    ) -> FloatArray:
         """(N, m, P) by how many um each parameter moves the prediction: all of the first axis, then of the next.
 
         effect : as from `effect`.  value : of the nonlinear constant; None for a term without one. The few empty cells
         of a covariate are filled.
+        factors_um : what formulas make of their covariates, (N, P), as far as ports that take a vector have had them;
+            the same formula at another port makes the same of them.
         """
         aligned, constants = aligned.gaps_filled, self.constant_values(value)
         if self.axes == ("",):
             return aligned.columns(effect, constants) * UM_PER_MM
-        basis, _ = evaluate_basis(effect, aligned.rows, constants, None)
-        factors = basis[:, "xyz".index(self.axes[0])] * UM_PER_MM
+        key = (self.covariate, self.form, self.middle, self.with_constant, value)
+        known = {} if factors_um is None else factors_um
+        if key not in known:
+            basis, _ = evaluate_basis(effect, aligned.rows, constants, None)
+            known[key] = basis[:, "xyz".index(self.axes[0])] * UM_PER_MM
+        factors = known[key]
         along = self._measured_along_axes(aligned)
         return np.asarray((along[:, :, :, None] * factors[:, None, None, :]).reshape(*along.shape[:2], -1))
 
@@ -197,7 +210,9 @@ def empirical_terms(
     ports = list(_ports(aligned))
     timed = aligned.recording.has_time
     grid_of = _Grids(residual_um[rows], criteria, aligned.criteria.periods)
-    for covariate in search_covariates(aligned, rows, criteria):
+    mirrored = mirrored_predictions(aligned, criteria)
+    reasons = untried_quantities(aligned, criteria, mirrored)
+    for covariate in search_covariates(aligned, rows, criteria, mirrored, reasons):
         yield from _terms_of(covariate, ports, grid_of, timed=timed, known=aligned.model is not None)
     time = SearchCovariate("time_s", "other", aligned.rows.time_s[rows])
     grids = {"step": step_times_s(time.values, criteria)} if aligned.in_order else {}
@@ -211,7 +226,7 @@ def empirical_terms(
         return
     for port in ports:
         if port.port == "link":
-            for name, middle, form in _link_covariates(aligned, rows, criteria):
+            for name, middle, form in _link_covariates(aligned, rows, reasons):
                 yield replace(port, covariate=name, form=form, middle=middle)
 
 
@@ -284,10 +299,13 @@ def _ports(aligned: AlignedRecording) -> Iterator[EmpiricalTerm]:
 
 
 def _link_covariates(
-    aligned: AlignedRecording, rows: BoolArray, criteria: DescriptionCriteria
+    aligned: AlignedRecording, rows: BoolArray, reasons: Mapping[str, str]
 ) -> Iterator[tuple[str, float, str]]:
-    """Covariates that each link has of its own, with their middle and form."""
-    machine, reasons = aligned.rows, untried_quantities(aligned, criteria)
+    """Covariates that each link has of its own, with their middle and form.
+
+    reasons : of the quantities that are not searched.
+    """
+    machine = aligned.rows
     links_by_quantity: dict[tuple[str, str], set[int]] = {}
     for name in aligned.recording.quantities:
         # one link's quantity may have stayed the same: the others' did not

@@ -8,6 +8,7 @@ from the nearest row in time (`compd.statistics.gaps`).
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -73,19 +74,22 @@ class SearchCovariate:
 
 
 def search_covariates(
-    aligned: AlignedRecording, rows: BoolArray, criteria: DescriptionCriteria = DescriptionCriteria()
+    aligned: AlignedRecording,
+    rows: BoolArray,
+    criteria: DescriptionCriteria,
+    mirrored: Sequence[FloatArray],
+    reasons: Mapping[str, str],
 ) -> list[SearchCovariate]:
     """Every measured quantity that a residual may follow, then the coordinates of the tip; of equal columns the first.
 
-    rows : (N,) those to look at, of the usable ones.
+    rows : (N,) those to look at, of the usable ones.  mirrored : as from `mirrored_predictions`.
+    reasons : of the quantities that are not searched, as from `untried_quantities`.
     """
-    reasons = untried_quantities(aligned, criteria)
     found: list[SearchCovariate] = []
     for name, column in aligned.gaps_filled.rows.quantities.items():
         if name not in reasons and not _is_among(column[rows], found):
             found.append(SearchCovariate(name, kind_of(name), column[rows]))
     tip: Kind = "place" if aligned.model is None else "workspace"
-    mirrored = _mirrored_predictions(aligned, criteria)
     for axis, column in zip("xyz", aligned.rows.tip_M_mm.T, strict=True):
         values = column[rows]
         if (
@@ -98,11 +102,13 @@ def search_covariates(
 
 
 def untried_quantities(
-    aligned: AlignedRecording, criteria: DescriptionCriteria = DescriptionCriteria()
+    aligned: AlignedRecording, criteria: DescriptionCriteria, mirrored: Sequence[FloatArray]
 ) -> dict[str, str]:
-    """The measured quantities that are not searched, with the reason in words."""
+    """The measured quantities that are not searched, with the reason in words.
+
+    mirrored : as from `mirrored_predictions`.
+    """
     usable, at_zero = aligned.usable.mask, aligned.rows.quantities_at_zero
-    mirrored = _mirrored_predictions(aligned, criteria)
     reasons: dict[str, str] = {}
     for name, column in aligned.gaps_filled.rows.quantities.items():
         known = column[usable & np.isfinite(column)]
@@ -148,7 +154,7 @@ def _changes(values: FloatArray) -> bool:
     return len(values) > 0 and float(np.ptp(values)) > MIN_CHANGE * max(1.0, float(np.abs(values).max()))
 
 
-def _mirrored_predictions(aligned: AlignedRecording, criteria: DescriptionCriteria) -> list[FloatArray]:
+def mirrored_predictions(aligned: AlignedRecording, criteria: DescriptionCriteria) -> list[FloatArray]:
     """(N,) the prediction of each coordinate of which the reference is constant, as a straight edge's is.
 
     There the residual is the prediction with its sign reversed: whatever goes with that explains it, and says nothing.
@@ -158,7 +164,7 @@ def _mirrored_predictions(aligned: AlignedRecording, criteria: DescriptionCriter
     return [predicted_mm[:, k] for k in np.flatnonzero(scatter_mm[0] < criteria.constant_share * scatter_mm[1])]
 
 
-def _is_copy(column: FloatArray, predictions: list[FloatArray], criteria: DescriptionCriteria) -> bool:
+def _is_copy(column: FloatArray, predictions: Sequence[FloatArray], criteria: DescriptionCriteria) -> bool:
     """Whether a column (N,) goes with one of some predictions (N,)."""
     for prediction in predictions:
         known = np.isfinite(column) & np.isfinite(prediction)

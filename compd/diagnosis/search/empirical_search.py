@@ -12,7 +12,7 @@ from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording
 from compd.diagnosis.candidates.candidates import Candidate
 from compd.diagnosis.criteria import Criteria
-from compd.diagnosis.descriptions.empirical_terms import EmpiricalTerm, empirical_terms
+from compd.diagnosis.descriptions.empirical_terms import EmpiricalTerm, FactorsUm, empirical_terms
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.regression import Regressors
 from compd.diagnosis.search.significance import OrthogonalComplement
@@ -79,11 +79,12 @@ class EmpiricalSearch:
         # which term is worth a contest shows on few rows
         self._screened = slice(None, None, max(1, len(problem.data.y) // self._criteria.screened_rows))
         self._fits: list[EmpiricalFit] = []
+        factors_um: FactorsUm = {}
         for term in empirical_terms(problem.aligned, problem.comparison.residual_um, self._criteria):
             effect = term.effect()
             searched = searched_constant if term.constant else 0
             for constant in term.grid or (None,):
-                values = self._columns(term, effect, constant)
+                values = problem.whiten(term.columns_um(problem.aligned, effect, constant, factors_um))
                 if np.isfinite(values).all() and values.any():
                     self._fits.append(EmpiricalFit(term, effect, constant, values[self._screened], searched))
 

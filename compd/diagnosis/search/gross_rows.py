@@ -84,7 +84,8 @@ def weigh_rows(
     size = np.sqrt(np.mean(distance**2, axis=1))
     full = criteria.full_weight_sigmas
     weight = np.minimum(1.0, full / np.maximum(size, full))
-    weight[_in_runs((size > full) & known & ~gross, criteria.gross.min_in_run)] = 1.0
+    # a row that is not known, as a copy, lies between no others
+    weight[known] = np.where(_in_runs(((size > full) & ~gross)[known], criteria.gross.min_in_run), 1.0, weight[known])
     weight /= consistency(m, full)
     return RowWeights(gross, np.where(known & ~gross, weight, 0.0))
 

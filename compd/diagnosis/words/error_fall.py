@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from compd.diagnosis.verdict import Diagnosis
 from compd.text import fall_text, number_text, percent_text
 
+CANNOT_KNOW = "how much of it is noise cannot be known"
 # Where a floor is from, in words.
 _SOURCES = {"repeats": "repeats", "declared": "declared"}
 
@@ -20,6 +21,7 @@ class ErrorFall:
     steps : with the first effect, with the first two, ...
     noise : the noise floor; nan where it is not known.  source : of the noise, in words.
     left_out : whether before and after are from rows that were left out.
+    unknown : that the noise is not known, and what contradicts a declaration.
     """
 
     before: float
@@ -29,6 +31,7 @@ class ErrorFall:
     source: str
     unit: str
     left_out: bool
+    unknown: str = CANNOT_KNOW
 
     @property
     def noise_known(self) -> bool:
@@ -76,4 +79,15 @@ def error_fall(diagnosis: Diagnosis) -> ErrorFall:
         source=_SOURCES.get(floor.source, ""),
         unit=diagnosis.before.aligned.unit,
         left_out=left_out,
+        unknown=_unknown(floor.um, floor.declared_um, diagnosis.before.aligned.unit),
+    )
+
+
+def _unknown(shown: float, declared: float, unit: str) -> str:
+    """That the noise is not known; with what neighbouring rows show where that is not what is declared."""
+    if math.isnan(declared):
+        return CANNOT_KNOW
+    return (
+        f"{CANNOT_KNOW} ({number_text(declared, unit)} is declared, neighbouring rows scatter by "
+        f"{number_text(shown, unit)})"
     )

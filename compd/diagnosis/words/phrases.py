@@ -24,7 +24,7 @@ from compd.model.effects import Effect
 from compd.model.formula import FormulaDeclaration
 from compd.model.library import BUNDLED
 from compd.parameter_ranges import TOLERANCE_KEY
-from compd.text import chance_text, estimate_text, estimates_text, join_words, number_text, percent_text
+from compd.text import chance_text, clock_text, estimate_text, estimates_text, join_words, number_text, percent_text
 
 # The link or joint of a fitted number: 4 of k_4, 2 of d_2x.
 _NUMBERED = re.compile(r"_(\d+)[xyz]?$")
@@ -212,10 +212,10 @@ def question_text(asked: ImplausibleEffect, share: str, tolerance_mm: float) -> 
 
 
 def moment_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
-    """When something changed: "6000 s on (row 410)"; "row 410 on" in a recording without time."""
+    """When something changed: "6000 s on (row 410)", or a date; "row 410 on" in a recording without time."""
     recording = diagnosis.after.aligned.recording
     row = recording.row[min(int(np.searchsorted(recording.time_s, finding.time_s)), recording.rows - 1)]
-    return f"{finding.time_s:.0f} s on (row {row})" if recording.has_time else f"row {row} on"
+    return f"{clock_text(finding.time_s)} on (row {row})" if recording.has_time else f"row {row} on"
 
 
 def _how_it_changed(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:

@@ -22,7 +22,6 @@ from compd.text import join_words, number_text
 
 # What confirms a thermal cause.
 CONFIRM = "measure on another day, or let it cool down and warm up again"
-CANNOT_KNOW = "how much of it is noise cannot be known"
 
 
 def summary(diagnosis: Diagnosis) -> str:
@@ -35,7 +34,7 @@ def _verdict(diagnosis: Diagnosis) -> str:
     """The verdict in one or two sentences."""
     fall = error_fall(diagnosis)
     before, after = number_text(fall.before, fall.unit), number_text(fall.after, fall.unit)
-    noise = f"where {fall.noise_text}" if fall.noise_known else CANNOT_KNOW
+    noise = f"where {fall.noise_text}" if fall.noise_known else fall.unknown
     names = join_words([named_with_place(step) for step in diagnosis.steps])
     match diagnosis.verdict:
         case "adequate" if fall.noise_known:
@@ -58,7 +57,7 @@ def _verdict(diagnosis: Diagnosis) -> str:
             return " ".join([f"The error is {before}, {noise}. No effect {tried}.", *question(diagnosis)])
     if diagnosis.steps:
         verb = "explains" if len(diagnosis.steps) == 1 else "explain"
-        remains = f"{fall.noise_text}, so something else acts as well" if fall.noise_known else CANNOT_KNOW
+        remains = f"{fall.noise_text}, so something else acts as well" if fall.noise_known else fall.unknown
         share = f"{names} {verb} {fall.share_text(fall.after)} ({fall.text(fall.after)}); {remains}."
         return " ".join([share, *question(diagnosis), *_rest(diagnosis, "The rest")])
     unexplained = f"No effect that was tried explains the error of {before}, {noise}."

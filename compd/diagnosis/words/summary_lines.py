@@ -3,6 +3,8 @@ what else it could be, and what to do next."""
 
 from __future__ import annotations
 
+import math
+
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.advice import advice
 from compd.diagnosis.words.error_fall import ErrorFall, error_fall
@@ -27,7 +29,8 @@ from compd.diagnosis.words.phrases import (
     untested_here,
     was_any_tried,
 )
-from compd.diagnosis.words.summary import CANNOT_KNOW, question
+from compd.diagnosis.words.summary import question
+from compd.recording import sigma_key
 from compd.text import LabelledText, fall_text, fit_lines, join_words, number_text, percent_text
 
 # What a terminal shows without scrolling, and its usual width.
@@ -183,9 +186,11 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     contradiction = diagnosis.before.floor.contradiction
     remarks = [contradiction] if contradiction else []
     left = fall.after if described is None else described.heldout_rms_um
-    text = number_text(left, fall.unit) + (" with it" if described else "")
+    text = number_text(left, fall.unit) + (" with it" if described else _on_another_day(diagnosis, fall))
     if not fall.noise_known:
-        return [f"{text}; {CANNOT_KNOW}", *remarks]
+        given_up = not math.isnan(diagnosis.before.floor.declared_um)
+        check = f"check `{sigma_key(fall.unit)}`"
+        return [f"{text}; {fall.unknown}", *([check] if given_up else remarks)]
     at_floor = left**2 <= diagnosis.criteria.most_at_floor * fall.noise**2
     if diagnosis.verdict in ("adequate", "identified", "likely", "ambiguous") or at_floor:
         meaning = "only noise is left"
@@ -196,6 +201,15 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     else:
         meaning = "these rows do not show what acts"
     return [f"{text}; noise {number_text(fall.noise, fall.unit)} ({fall.source}): {meaning}", *remarks]
+
+
+def _on_another_day(diagnosis: Diagnosis, fall: ErrorFall) -> str:
+    """Within which limits the error on another day lies, in brackets; "" where they are not known."""
+    low, high = diagnosis.left_interval_um
+    if math.isnan(low):
+        return ""
+    confidence = percent_text(diagnosis.criteria.left_confidence)
+    return f" (another day: {number_text(low)} to {number_text(high, fall.unit)} with {confidence})"
 
 
 def _sure(diagnosis: Diagnosis) -> list[str]:

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.comparison import read_with_machine
+from compd.comparison import AlignedRecording, read_with_machine
 from compd.comparison.alignment.align_recording import align_recording
 from compd.diagnosis.holdout import evaluate_holdout
 from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
-from tests.support.hidden_effects import LIBRARY, record_with_effects
+from tests.support.hidden_effects import LIBRARY, campaign, record_with_effects
 from tests.support.paths import SHARED
 from tests.support.sampled import sampled
 
@@ -197,6 +197,30 @@ def test_of_a_sealed_recording_under_other_conditions_nothing_is_expected(tmp_pa
     assert [text.split(" was ")[0] for text in holdout.other_conditions] == [name]
     assert "Expected: not known: other conditions (temperature_link_1_degC was " in holdout.summary
     assert holdout.as_json()["expected_um"] is None
+
+
+@pytest.mark.parametrize(("there", "says"), [(0.1, "holds here: "), (0.0, "does not hold here: ")])
+def test_a_description_is_tried_on_a_sealed_recording(tmp_path: Path, there: float, says: str) -> None:
+    def recorded(seed: int, per_pct: float) -> AlignedRecording:
+        humid_um = per_pct * (campaign(seed)["humidity_pct"][:, None] - 50.0) * (0.3, -0.5, 1.0)
+        return record_with_effects(tmp_path / f"{seed}.csv", seed, {}, extra_um=humid_um)
+
+    diagnosis = diagnose(recorded(4, 0.1), (), None, EFFECTS)
+    assert diagnosis.depends_on[0].covariate == "humidity_pct"
+    holdout = evaluate_holdout(diagnosis, recorded(9, there))
+    assert holdout.described is not None
+    assert f"What the rest followed, {holdout.described.name}, {says}" in holdout.summary
+    assert holdout.described.holds == (holdout.described.rms_um < holdout.after.rms_um)
+    assert (holdout.described.rms_um < 1.1 * holdout.after.floor.um) == (there > 0)
+
+
+def test_a_description_needs_its_quantity_on_a_sealed_recording(tmp_path: Path) -> None:
+    humid_um = 0.1 * (campaign(4)["humidity_pct"][:, None] - 50.0) * (0.3, -0.5, 1.0)
+    diagnosis = diagnose(record_with_effects(tmp_path / "4.csv", 4, {}, extra_um=humid_um), (), None, EFFECTS)
+    other = record_with_effects(tmp_path / "9.csv", 9, {})
+    quantities = {name: values for name, values in other.rows.quantities.items() if name != "humidity_pct"}
+    holdout = evaluate_holdout(diagnosis, replace(other, rows=replace(other.rows, quantities=quantities)))
+    assert "cannot be tried here: humidity_pct was not recorded." in holdout.summary
 
 
 @pytest.mark.long

@@ -14,7 +14,9 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.search_criteria import SearchCriteria
 from compd.diagnosis.verdict import Diagnosis
+from compd.diagnosis.words.summary_lines import summary_lines
 from compd.model.effects import Effect
+from compd.text import number_text
 from tests.support.external_recordings import SIGMA_UM, along, record_external
 from tests.support.sampled import sampled
 
@@ -117,6 +119,17 @@ def test_noise_that_is_larger_than_declared_has_no_cause(tmp_path: Path, seed: i
     noise_um = np.random.default_rng(seed).normal(0, 5 * SIGMA_UM, ROWS)
     diagnosis = verdict(tmp_path, noise_um, stage_columns(seed))
     assert (diagnosis.verdict, diagnosis.steps, diagnosis.depends_on) == ("unexplained", (), ())
+
+
+@pytest.mark.parametrize("factor", [0.1, 0.3])
+def test_beside_a_declaration_that_is_too_small_what_is_left_may_be_noise(tmp_path: Path, factor: float) -> None:
+    diagnosis = verdict(tmp_path, 3 * MOVED, declared_um=factor * SIGMA_UM)
+    assert (diagnosis.verdict, ids(diagnosis), diagnosis.depends_on) == ("partial", ["play"], ())
+    floor = diagnosis.before.floor
+    assert (floor.source, floor.um) == ("estimate", pytest.approx(SIGMA_UM, rel=0.25))
+    assert "how much of it is noise cannot be known" in diagnosis.summary
+    for text in (diagnosis.summary, " ".join(" ".join(summary_lines(diagnosis)).split())):
+        assert f"({number_text(factor * SIGMA_UM)} um is declared, neighbouring rows scatter by" in text
 
 
 def test_twins_at_one_speed_are_rivals_at_the_floor_and_above_it(tmp_path: Path) -> None:

@@ -59,6 +59,16 @@ def test_every_thermometer_that_moved_stands_in_for_the_missing_one(tmp_path: Pa
     assert {each.kind for each in found} == {"proxy"}
 
 
+def test_a_thermometer_is_told_by_its_unit(tmp_path: Path) -> None:
+    warm = np.linspace(20, 30, ROWS)
+    own = {"motor_2_degC": warm, "motor_3_K": warm + 273.15, "rise_K": warm - 20, "humidity_pct": warm}
+    found = {
+        each.quantity: each for each in proxy_candidates(machining(tmp_path / "run.csv", 5.0, **own), [SPINDLE], ())
+    }
+    assert set(found) == {"temperature_motor_degC", "motor_2_degC", "motor_3_K"}
+    np.testing.assert_allclose(found["motor_3_K"].columns_um, found["motor_2_degC"].columns_um, atol=1e-5)
+
+
 def test_the_choice_of_a_thermometer_is_a_search_and_has_its_price(tmp_path: Path) -> None:
     aligned = machining(tmp_path / "run.csv", 5.0)
     (plain,) = proxy_candidates(aligned, [SPINDLE], ())

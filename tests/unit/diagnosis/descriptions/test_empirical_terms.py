@@ -10,6 +10,7 @@ import pytest
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording
 from compd.comparison.alignment.align_recording import align_recording
+from compd.diagnosis.candidate_criteria import DescriptionCriteria
 from compd.diagnosis.descriptions.empirical_terms import EmpiricalTerm, empirical_terms
 from compd.diagnosis.descriptions.search_covariates import round_within, untried_quantities
 from compd.diagnosis.descriptions.term_formula import formula_text
@@ -150,7 +151,7 @@ def test_labels_and_derivatives_are_no_covariates_and_are_told(tmp_path: Path) -
     aligned = record_external(tmp_path / "run.csv", columns, {"x": NOISE_UM})
     tried = {covariate for covariate, _ in terms_of(aligned)}
     assert tried == {"lamp_1", "turns_1", "slide_mm", "time_s"}
-    assert untried_quantities(aligned) == {
+    assert untried_quantities(aligned, DescriptionCriteria(), ()) == {
         "star_1": "only counts or names rows",
         "frames_1": "only counts or names rows",
         "d_radius_x_mm": "a derivative of the model's prediction, which belongs to an effect",

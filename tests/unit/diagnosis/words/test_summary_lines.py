@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -184,3 +185,9 @@ def test_the_lines_word_for_word(situation: Callable[[], Diagnosis]) -> None:
 
 def test_every_situation_has_its_lines() -> None:
     assert set(GOLDEN) == set(SITUATIONS)
+
+
+def test_what_is_left_has_limits_for_another_day_where_they_are_known() -> None:
+    lines = summary_lines(replace(one_effect(), left_interval_um=(0.16, 0.21)))
+    left = " ".join(" ".join(lines).split())
+    assert "Left: 0.18 um (another day: 0.16 to 0.21 um with 90 %); noise 0.16 um (repeats): only noise" in left
