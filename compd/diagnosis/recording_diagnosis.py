@@ -36,6 +36,7 @@ from compd.diagnosis.findings import (
 from compd.diagnosis.implausible_effect import implausible_effect
 from compd.diagnosis.intercepts import beside, with_intercepts
 from compd.diagnosis.left_interval import left_interval_um
+from compd.diagnosis.named_probability import named_probability
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.rival_selection import named_members
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
@@ -183,6 +184,13 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     steps = _steps(problem, explanation, named, p_value_by_effect)
     candidates = candidate_results(problem, losses, steps, p_value_by_effect)
     verdict = _verdict(problem, explanation, steps, candidates, _noise_grows(before, after))
+    probability = named_probability(
+        explanation,
+        tested=verdict != "not_testable",
+        above_noise=problem.floor_known and verdict in ("partial", "unexplained"),
+    )
+    if verdict == "identified" and not probability.confirms:
+        verdict = "likely"
     above = verdict in ("partial", "unexplained", "not_testable")
     asked = implausible_effect(problem, explanation) if above else None
     depends_on = describe_remainder(problem, explanation) if above else ()
@@ -204,6 +212,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
         left_interval_um=left_interval_um(problem, losses, explanation.named),
+        probability_from=probability,
         criteria=criteria,
     )
     return replace(

@@ -1,0 +1,70 @@
+"""The probability that the named set is right: the odds that the held-out scores of the sets that were seen give."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from compd.diagnosis.probability_criteria import ProbabilityCriteria
+from compd.diagnosis.search.better_sets import better_sets
+from compd.diagnosis.search.explanation import Explanation
+from compd.text import nan_to_null
+
+NOT_TESTED = "no effect could be tested, so that none was compared with another"
+
+
+@dataclass(frozen=True)
+class NamedProbability:
+    """How probable it is that all that has to be named is named, and nothing else.
+
+    Attributes
+    ----------
+    better_sets : float
+        Expected number of the sets that were seen, name something else, and would score better on rows like these; nan
+        where none was compared.
+    above_noise : bool
+        Whether a part of the error above the noise has neither name nor description.
+    unknown : str
+        Why no probability can be stated; ``""`` where one is.
+    criteria : ProbabilityCriteria
+        The numbers by which odds follow from these.
+    """
+
+    better_sets: float = math.nan
+    above_noise: bool = False
+    unknown: str = ""
+    criteria: ProbabilityCriteria = field(default=ProbabilityCriteria(), repr=False)
+
+    @property
+    def value(self) -> float:
+        """The probability, 0 to 1; nan where none can be stated."""
+        criteria = self.criteria
+        better = math.log1p(self.better_sets / criteria.unseen)
+        odds = criteria.certain - criteria.per_better * better - criteria.above_noise * self.above_noise
+        return 1.0 / (1.0 + math.exp(-odds))
+
+    @property
+    def confirms(self) -> bool:
+        """Whether the set is probable enough to be called identified."""
+        return not self.value < self.criteria.identified_from
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys of the verdict."""
+        evidence = {"better_sets": self.better_sets, "above_noise": self.above_noise}
+        return {
+            "probability": nan_to_null(self.value),
+            "probability_from": {**evidence, **({"unknown": self.unknown} if self.unknown else {})},
+        }
+
+
+def named_probability(explanation: Explanation, *, tested: bool, above_noise: bool) -> NamedProbability:
+    """The probability of the set that an explanation names.
+
+    tested : whether any effect was compared with another.  above_noise : whether the whole set leaves more than noise.
+    """
+    criteria = explanation.problem.criteria.probability
+    if not tested:
+        return NamedProbability(unknown=NOT_TESTED, criteria=criteria)
+    found = better_sets(explanation.losses, explanation.members)
+    return NamedProbability(found, above_noise and not explanation.described, criteria=criteria)
