@@ -136,6 +136,7 @@ NUMBERS = {
         "MIN_PLACES": WORDS,
         "SURE_SIGMAS": WORDS,
         "OTHERS_SHARE": WORDS,
+        "LEAST": WORDS,
     },
     "diagnosis/words/summary_lines.py": {
         "MAX_LINES": WORDS,
