@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from compd.diagnosis.probability_criteria import ProbabilityCriteria
-from compd.diagnosis.search.better_sets import better_sets
-from compd.diagnosis.search.explanation import Explanation
 from compd.text import nan_to_null
 
 NOT_TESTED = "no effect could be tested, so that none was compared with another"
@@ -24,7 +22,7 @@ class NamedProbability:
         Expected number of the sets that were seen, name something else, and would score better on rows like these; nan
         where none was compared.
     above_noise : bool
-        Whether a part of the error above the noise has neither name nor description.
+        Whether effects are named and more than noise is left.
     unknown : str
         Why no probability can be stated; ``""`` where one is.
     criteria : ProbabilityCriteria
@@ -56,15 +54,3 @@ class NamedProbability:
             "probability": nan_to_null(self.value),
             "probability_from": {**evidence, **({"unknown": self.unknown} if self.unknown else {})},
         }
-
-
-def named_probability(explanation: Explanation, *, tested: bool, above_noise: bool) -> NamedProbability:
-    """The probability of the set that an explanation names.
-
-    tested : whether any effect was compared with another.  above_noise : whether the whole set leaves more than noise.
-    """
-    criteria = explanation.problem.criteria.probability
-    if not tested:
-        return NamedProbability(unknown=NOT_TESTED, criteria=criteria)
-    found = better_sets(explanation.losses, explanation.members)
-    return NamedProbability(found, above_noise and not explanation.described, criteria=criteria)

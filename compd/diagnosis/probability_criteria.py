@@ -15,7 +15,7 @@ class ProbabilityCriteria:
 
         log(p / (1 - p)) = certain - per_better log((N + unseen) / unseen) - above_noise a
 
-    a is 1 where a part of the error above the noise has neither name nor description, else 0.
+    a is 1 where effects are named and more than noise is left, else 0.
     """
 
     certain: float = threshold(
@@ -33,7 +33,7 @@ class ProbabilityCriteria:
     above_noise: float = threshold(
         1.0,
         unit="logarithm of odds",
-        meaning="what an error above the noise takes off that nothing describes",
+        meaning="what an error above the noise takes off that is left beside named effects",
         reason=_FITTED,
     )
     unseen: float = threshold(

@@ -36,9 +36,10 @@ from compd.diagnosis.findings import (
 from compd.diagnosis.implausible_effect import implausible_effect
 from compd.diagnosis.intercepts import beside, with_intercepts
 from compd.diagnosis.left_interval import left_interval_um
-from compd.diagnosis.named_probability import named_probability
+from compd.diagnosis.named_probability import NOT_TESTED, NamedProbability
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.rival_selection import named_members
+from compd.diagnosis.search.better_sets import better_sets
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
 from compd.diagnosis.search.gross_rows import gross_rows
 from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
@@ -184,11 +185,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     steps = _steps(problem, explanation, named, p_value_by_effect)
     candidates = candidate_results(problem, losses, steps, p_value_by_effect)
     verdict = _verdict(problem, explanation, steps, candidates, _noise_grows(before, after))
-    probability = named_probability(
-        explanation,
-        tested=verdict != "not_testable",
-        above_noise=problem.floor_known and verdict in ("partial", "unexplained"),
-    )
+    probability = _probability(explanation, verdict)
     if verdict == "identified" and not probability.confirms:
         verdict = "likely"
     above = verdict in ("partial", "unexplained", "not_testable")
@@ -267,6 +264,16 @@ def _verdict(
     if not found and (not problem.floor_known or all(c.status == "not_testable" for c in candidates)):
         return "not_testable"
     return "unexplained"
+
+
+def _probability(explanation: Explanation, verdict: Verdict) -> NamedProbability:
+    """How probable it is that the named set is right; what is left above the noise counts beside named effects."""
+    problem = explanation.problem
+    criteria = problem.criteria.probability
+    if verdict == "not_testable":
+        return NamedProbability(unknown=NOT_TESTED, criteria=criteria)
+    found = better_sets(explanation.losses, explanation.members)
+    return NamedProbability(found, problem.floor_known and verdict == "partial", criteria=criteria)
 
 
 def _steps(
