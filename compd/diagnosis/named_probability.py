@@ -19,10 +19,12 @@ class NamedProbability:
     Attributes
     ----------
     better_sets : float
-        Expected number of the sets that were seen, name something else, and would score better on rows like these; nan
-        where none was compared.
+        Expected number of the sets that were seen, name something else, and would score better on rows like these; 0
+        where descriptions refuse every effect, nan where none was compared.
+    sets_told : int
+        How many sets the verdict itself tells as possible: with each named effect or a rival in its place.
     above_noise : bool
-        Whether effects are named and more than noise is left.
+        Whether a part of the error above the noise has neither name nor description.
     unknown : str
         Why no probability can be stated; ``""`` where one is.
     criteria : ProbabilityCriteria
@@ -30,6 +32,7 @@ class NamedProbability:
     """
 
     better_sets: float = math.nan
+    sets_told: int = 1
     above_noise: bool = False
     unknown: str = ""
     criteria: ProbabilityCriteria = field(default=ProbabilityCriteria(), repr=False)
@@ -38,8 +41,8 @@ class NamedProbability:
     def value(self) -> float:
         """The probability, 0 to 1; nan where none can be stated."""
         criteria = self.criteria
-        better = math.log1p(self.better_sets / criteria.unseen)
-        odds = criteria.certain - criteria.per_better * better - criteria.above_noise * self.above_noise
+        odds = criteria.certain - criteria.per_better * math.log1p(self.better_sets / criteria.unseen)
+        odds -= criteria.per_told * math.log(self.sets_told) + criteria.above_noise * self.above_noise
         return 1.0 / (1.0 + math.exp(-odds))
 
     @property
@@ -49,7 +52,7 @@ class NamedProbability:
 
     def as_json(self) -> dict[str, Any]:
         """Keys of the verdict."""
-        evidence = {"better_sets": self.better_sets, "above_noise": self.above_noise}
+        evidence = {"better_sets": self.better_sets, "sets_told": self.sets_told, "above_noise": self.above_noise}
         return {
             "probability": nan_to_null(self.value),
             "probability_from": {**evidence, **({"unknown": self.unknown} if self.unknown else {})},

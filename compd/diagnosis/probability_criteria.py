@@ -13,9 +13,10 @@ _FITTED = "fitted by `python -m tests.scoreboard.calibrate_probability`, docs/de
 class ProbabilityCriteria:
     """From the expected number N of better sets to the probability p that the named set is right::
 
-        log(p / (1 - p)) = certain - per_better log((N + unseen) / unseen) - above_noise a
+        log(p / (1 - p)) = certain - per_better log((N + unseen) / unseen) - per_told log M - above_noise a
 
-    a is 1 where effects are named and more than noise is left, else 0.
+    M is the number of sets that the verdict tells as possible, with its rivals; a is 1 where a part of the error above
+    the noise has neither name nor description, else 0.
     """
 
     certain: float = threshold(
@@ -30,10 +31,16 @@ class ProbabilityCriteria:
         meaning="what each factor e of N + unseen takes off",
         reason=_FITTED,
     )
+    per_told: float = threshold(
+        0.7,
+        unit="logarithm of odds",
+        meaning="what each factor e of the number of sets takes off that rivals make",
+        reason=_FITTED,
+    )
     above_noise: float = threshold(
         1.0,
         unit="logarithm of odds",
-        meaning="what an error above the noise takes off that is left beside named effects",
+        meaning="what an error above the noise takes off that nothing describes",
         reason=_FITTED,
     )
     unseen: float = threshold(

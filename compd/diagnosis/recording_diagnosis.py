@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import prod
 
 import numpy as np
 
@@ -185,7 +186,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     steps = _steps(problem, explanation, named, p_value_by_effect)
     candidates = candidate_results(problem, losses, steps, p_value_by_effect)
     verdict = _verdict(problem, explanation, steps, candidates, _noise_grows(before, after))
-    probability = _probability(explanation, verdict)
+    probability = _probability(explanation, verdict, steps)
     if verdict == "identified" and not probability.confirms:
         verdict = "likely"
     above = verdict in ("partial", "unexplained", "not_testable")
@@ -266,14 +267,19 @@ def _verdict(
     return "unexplained"
 
 
-def _probability(explanation: Explanation, verdict: Verdict) -> NamedProbability:
-    """How probable it is that the named set is right; what is left above the noise counts beside named effects."""
+def _probability(explanation: Explanation, verdict: Verdict, steps: Sequence[DiagnosisStep]) -> NamedProbability:
+    """How probable it is that the named set is right. Where descriptions refuse every effect, no score is compared."""
     problem = explanation.problem
     criteria = problem.criteria.probability
     if verdict == "not_testable":
         return NamedProbability(unknown=NOT_TESTED, criteria=criteria)
-    found = better_sets(explanation.losses, explanation.members)
-    return NamedProbability(found, problem.floor_known and verdict == "partial", criteria=criteria)
+    refused = bool(explanation.described) and not steps
+    return NamedProbability(
+        better_sets=0.0 if refused else better_sets(explanation.losses, explanation.members),
+        sets_told=prod(1 + len(step.rivals) for step in steps),
+        above_noise=problem.floor_known and verdict in ("partial", "unexplained") and not explanation.described,
+        criteria=criteria,
+    )
 
 
 def _steps(

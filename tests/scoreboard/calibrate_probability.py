@@ -26,7 +26,7 @@ from tests.scoreboard.scoring import Result
 
 Floats: TypeAlias = NDArray[np.float64]
 
-NAMES = ("certain", "per_better", "above_noise")
+NAMES = ("certain", "per_better", "per_told", "above_noise")
 # Prior standard deviation of each number but the first: so large an effect is not excluded by few cases.
 RIDGE_STD = 3.0
 FAMILY_GROUPS = 10
@@ -56,15 +56,15 @@ def report(results: Sequence[Result]) -> Iterator[str]:
     yield from lines(left_out(stated, evidence, right))
 
 
-def evidence_of(result: Result) -> tuple[float, float, float]:
+def evidence_of(result: Result) -> tuple[float, float, float, float]:
     """What each number multiplies."""
     said = result["verdict"]["probability_from"]
     better = math.log1p(said["better_sets"] / Criteria().probability.unseen)
-    return 1.0, -better, -float(said["above_noise"])
+    return 1.0, -better, -math.log(said["sets_told"]), -float(said["above_noise"])
 
 
 def fit(evidence: Floats, right: NDArray[np.bool_]) -> Floats:
-    """(3,) numbers of the largest likelihood for evidence (N, 3)."""
+    """(4,) numbers of the largest likelihood for evidence (N, 4)."""
 
     def cost(numbers: Floats) -> tuple[float, Floats]:
         odds = evidence @ numbers

@@ -20,14 +20,16 @@ from tests.support.external_recordings import along, record_external
 ROWS = 240
 PLAY = along("x", "play", "k * moved_1", parameters={"k": {"unit": "um", "plausible": [1, 4], "source": "a test"}})
 WINDUP = along("x", "windup", "k * moved_1 * (1 + position_mm / 4000)")
-NUMBERS = ProbabilityCriteria(certain=2.0, per_better=0.5, above_noise=1.0, unseen=0.1)
+NUMBERS = ProbabilityCriteria(certain=2.0, per_better=0.5, per_told=0.25, above_noise=1.0, unseen=0.1)
 
 
 def test_the_odds_are_linear_in_the_evidence() -> None:
     assert NamedProbability(0.0, criteria=NUMBERS).value == pytest.approx(1 / (1 + math.exp(-2.0)))
     # log((0.9 + 0.1) / 0.1) = log 10
-    odds = 2.0 - 0.5 * math.log(10.0) - 1.0
-    assert NamedProbability(0.9, above_noise=True, criteria=NUMBERS).value == pytest.approx(1 / (1 + math.exp(-odds)))
+    odds = 2.0 - 0.5 * math.log(10.0) - 0.25 * math.log(3.0) - 1.0
+    assert NamedProbability(0.9, 3, above_noise=True, criteria=NUMBERS).value == pytest.approx(
+        1 / (1 + math.exp(-odds))
+    )
 
 
 def test_the_more_sets_may_be_better_the_less_probable_is_the_named_one() -> None:
