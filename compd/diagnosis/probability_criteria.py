@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from compd.threshold import threshold
 
-_FITTED = "fitted by `python -m tests.scoreboard.calibrate_probability`, docs/decisions/0016-probability.md"
+_FITTED = "fitted to simulated cases by `python -m tests.scoreboard.calibrate_probability`; decision 16 has the trial"
 
 
 @dataclass(frozen=True)
@@ -20,25 +20,25 @@ class ProbabilityCriteria:
     """
 
     certain: float = threshold(
-        3.0,
+        4.1,
         unit="logarithm of odds",
         meaning="where no other set that was seen may be better, and only noise is left",
         reason=_FITTED,
     )
     per_better: float = threshold(
-        1.0,
+        0.52,
         unit="logarithm of odds",
         meaning="what each factor e of N + unseen takes off",
         reason=_FITTED,
     )
     per_told: float = threshold(
-        0.7,
+        1.1,
         unit="logarithm of odds",
         meaning="what each factor e of the number of sets takes off that rivals make",
         reason=_FITTED,
     )
     above_noise: float = threshold(
-        1.0,
+        1.5,
         unit="logarithm of odds",
         meaning="what an error above the noise takes off that nothing describes",
         reason=_FITTED,
@@ -65,5 +65,5 @@ class ProbabilityCriteria:
         0.7,
         unit="probability",
         meaning="a set that is less probable is called likely, not identified",
-        reason="a choice: of three such verdicts, one is wrong",
+        reason="a choice: of verdicts with so small a probability three of ten or more are wrong",
     )
