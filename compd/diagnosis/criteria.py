@@ -21,6 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from compd.diagnosis.candidate_criteria import CandidateCriteria, DescriptionCriteria
+from compd.diagnosis.probability_criteria import ProbabilityCriteria
 from compd.diagnosis.search_criteria import FoldCriteria, GrossCriteria, SearchCriteria
 from compd.planning import PlanningCriteria
 from compd.threshold import threshold
@@ -40,7 +41,7 @@ class Criteria:
     candidates : what is tried: effects of the library, and changes in time.
     descriptions : what is tried beside them, without a cause.
     search : how sets of them are looked for.  folds : which rows are left out.  gross : which rows do not count.
-    planning : which measurement is proposed.
+    probability : how sure the named set is.  planning : which measurement is proposed.
 
     A stricter diagnosis, for example::
 
@@ -186,4 +187,5 @@ class Criteria:
     search: SearchCriteria = SearchCriteria()
     folds: FoldCriteria = FoldCriteria()
     gross: GrossCriteria = GrossCriteria()
+    probability: ProbabilityCriteria = ProbabilityCriteria()
     planning: PlanningCriteria = PlanningCriteria()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import prod
 
 import numpy as np
 
@@ -36,8 +37,10 @@ from compd.diagnosis.findings import (
 from compd.diagnosis.implausible_effect import implausible_effect
 from compd.diagnosis.intercepts import beside, with_intercepts
 from compd.diagnosis.left_interval import left_interval_um
+from compd.diagnosis.named_probability import NOT_TESTED, NamedProbability
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.rival_selection import named_members
+from compd.diagnosis.search.better_sets import better_sets
 from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
 from compd.diagnosis.search.gross_rows import gross_rows
 from compd.diagnosis.search.place_significance import place_p_value
@@ -192,6 +195,9 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
     steps = _steps(problem, explanation, named, p_value_by_effect)
     candidates = candidate_results(problem, losses, steps, p_value_by_effect)
     verdict = _verdict(problem, explanation, steps, candidates, _noise_grows(before, after))
+    probability = _probability(explanation, verdict, steps)
+    if verdict == "identified" and not probability.confirms:
+        verdict = "likely"
     above = verdict in ("partial", "unexplained", "not_testable")
     asked = implausible_effect(problem, explanation) if above else None
     depends_on = describe_remainder(problem, explanation) if above else ()
@@ -213,6 +219,7 @@ def _diagnosis(explanation: Explanation, covariance: FloatArray | None) -> Diagn
         heldout_before_um=problem.unit_um * float(np.sqrt(losses.baseline)),
         heldout_after_um=problem.unit_um * float(np.sqrt(losses.loss(explanation.named))),
         left_interval_um=left_interval_um(problem, losses, explanation.named),
+        probability_from=probability,
         criteria=criteria,
     )
     return replace(
@@ -269,6 +276,21 @@ def _verdict(
     if not found and (may_be_noise or all(c.status == "not_testable" for c in candidates)):
         return "not_testable"
     return "unexplained"
+
+
+def _probability(explanation: Explanation, verdict: Verdict, steps: Sequence[DiagnosisStep]) -> NamedProbability:
+    """How probable it is that the named set is right. Where descriptions refuse every effect, no score is compared."""
+    problem = explanation.problem
+    criteria = problem.criteria.probability
+    if verdict == "not_testable":
+        return NamedProbability(unknown=NOT_TESTED, criteria=criteria)
+    refused = bool(explanation.described) and not steps
+    return NamedProbability(
+        better_sets=0.0 if refused else better_sets(explanation.losses, explanation.members),
+        sets_told=prod(1 + len(step.rivals) for step in steps),
+        above_noise=problem.floor_known and verdict in ("partial", "unexplained") and not explanation.described,
+        criteria=criteria,
+    )
 
 
 def _steps(

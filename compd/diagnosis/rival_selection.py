@@ -24,6 +24,9 @@ def with_fewest_numbers(losses: SubsetLosses, members: tuple[int, ...]) -> tuple
     Nine free numbers describe small disturbances besides, and so they explain a little more than the three that caused
     the error. (One-standard-error rule: Breiman, Friedman, Olshen and Stone, Classification and Regression Trees
     (1984), 3.4.3; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed. (2009), 7.10.)
+
+    Rivals are compared beside the constant. A rival that is as good only with it takes the constant along, if both
+    together have fewer numbers than the effect.
     """
     candidates = losses.candidates
     for member in members:
@@ -38,5 +41,21 @@ def with_fewest_numbers(losses: SubsetLosses, members: tuple[int, ...]) -> tuple
         ]
         if simpler:
             simplest = min(simpler, key=lambda rival: (candidates[rival.member].parameter_count, rival.excess))
-            members = tuple(simplest.member if k == member else k for k in members)
+            members = _with_constant_where_needed(losses, members, member, simplest.member)
     return members
+
+
+def _with_constant_where_needed(
+    losses: SubsetLosses, members: tuple[int, ...], member: int, rival: int
+) -> tuple[int, ...]:
+    """The members with a rival in the place of one, and the constant if it is worth its price then."""
+    candidates, constant = losses.candidates, losses.constant
+    others = tuple(rival if k == member else k for k in members)
+    if constant is None or constant in others:
+        return others
+    effects = tuple(k for k in others if candidates[k].kind == "effect")
+    both = (*effects, constant, *(k for k in others if k not in effects))
+    if losses.log_loss(losses.loss(others)) - losses.log_loss(losses.loss(both)) < losses.price(constant):
+        return others
+    numbers = candidates[rival].parameter_count + candidates[constant].parameter_count
+    return both if numbers < candidates[member].parameter_count else members

@@ -18,6 +18,7 @@ from compd.diagnosis.findings import (
     UnknownStates,
     UntestedEffect,
 )
+from compd.diagnosis.named_probability import NamedProbability
 from compd.result_tables import Columns, data_frame, html_table
 from compd.text import nan_to_null
 
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Verdict = Literal["adequate", "identified", "likely", "ambiguous", "partial", "unexplained", "not_testable"]
-# Version of the words and keys of `Diagnosis.as_json`: 2 has the word `partial` and the key `constant`, 3 `likely`.
-VERDICT_VERSION = 3
+# Version of the words and keys of `Diagnosis.as_json`: 2 has the word `partial` and the key `constant`, 3 `likely`, 4
+# `probability`.
+VERDICT_VERSION = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,8 +39,8 @@ class Diagnosis:
     ----------
     verdict : str
         ``"adequate"``: nothing is missing. ``"identified"``: the effects of `steps` are what is missing.
-        ``"likely"``: they explain it, but a thermal one was seen in one warm-up only; another session, a sealed
-        recording or a second cycle of heating and cooling makes it identified.
+        ``"likely"``: they explain it, but a thermal one was seen in one warm-up only, or `probability` is too small;
+        another session, a sealed recording or a second cycle of heating and cooling makes it identified.
         ``"ambiguous"``: they explain it, but the recording cannot tell at least one of them from a rival.
         ``"partial"``: they explain a part; the rest is above the noise, or the noise is not known.
         ``"unexplained"``: no effect of the library gains; `depends_on` says what the error follows.
@@ -72,6 +74,8 @@ class Diagnosis:
     left_interval_um : tuple of float
         Between which errors another recording under the same conditions lies with 90 %, um per coordinate; nan where
         that is not known.
+    probability_from : NamedProbability
+        From which numbers `probability` is, or why none can be stated.
     criteria : Criteria
         The numbers on which it rests, each with unit, meaning and reason.
     summary : str
@@ -93,8 +97,19 @@ class Diagnosis:
     heldout_before_um: float = float("nan")
     heldout_after_um: float = float("nan")
     left_interval_um: tuple[float, float] = (float("nan"), float("nan"))
+    probability_from: NamedProbability = field(default_factory=NamedProbability)
     summary: str = ""
     criteria: Criteria = Criteria()
+
+    @property
+    def probability(self) -> float:
+        """The probability that the effects of `steps` are all that has to be named, 0 to 1.
+
+        A rival is not named; of effects that make a constant, any is right for any other. Without `steps` it is the
+        probability that no effect of the library has to be named. nan where none can be stated: `probability_from`
+        says why.
+        """
+        return self.probability_from.value
 
     def to_dataframe(self) -> pd.DataFrame:
         """One row per effect of the library, as a pandas data frame.
@@ -162,6 +177,7 @@ class Diagnosis:
             "heldout_before_um": self.heldout_before_um,
             "heldout_after_um": self.heldout_after_um,
             "left_interval_um": list(self.left_interval_um),
+            **self.probability_from.as_json(),
             "constant": None if self.constant is None else self.constant.as_json(),
             "steps": [step.as_json() for step in self.steps],
             **({} if self.start is None else {"start": self.start.as_json()}),

@@ -190,9 +190,9 @@ class NormalEquations:
 
     def theta_by_fold(self, index: IntArray, split: int) -> FloatArray:
         """(folds of the split, p) parameters learned from the split's other folds."""
-        folds = self.data.split_of_fold == split
-        gram = self.gram[folds][:, index[:, None], index]
-        score = self.score[folds][:, index]
+        folds = np.flatnonzero(self.data.split_of_fold == split)
+        gram = self.gram[np.ix_(folds, index, index)]
+        score = self.score[np.ix_(folds, index)]
         return solve_ridge(
             gram.sum(axis=0) - gram, score.sum(axis=0) - score, np.broadcast_to(self.ridge[index], score.shape)
         )
@@ -209,9 +209,9 @@ class NormalEquations:
 
     def estimate(self, index: IntArray) -> tuple[FloatArray, FloatArray, float]:
         """Parameters (p,) fitted on all rows, their covariance (p, p) at unit noise, and the mean square left."""
-        folds = self.data.split_of_fold == 0
-        normal = self.gram[folds][:, index[:, None], index].sum(axis=0)
-        score = self.score[folds][:, index].sum(axis=0)
+        folds = np.flatnonzero(self.data.split_of_fold == 0)
+        normal = self.gram[np.ix_(folds, index, index)].sum(axis=0)
+        score = self.score[np.ix_(folds, index)].sum(axis=0)
         covariance = ridge_inverse(normal, self.ridge[index])
         theta = covariance @ score
         left = float(self.data.squares[folds].sum()) - 2 * float(theta @ score) + float(theta @ normal @ theta)
@@ -235,9 +235,9 @@ class NormalEquations:
 
     def bounded_loss(self, index: IntArray, limits: FloatArray) -> float:
         """Mean square left by the parameters within limits (p, 2) that fit all rows best."""
-        folds = self.data.split_of_fold == 0
-        normal = self.gram[folds][:, index[:, None], index].sum(axis=0)
-        score = self.score[folds][:, index].sum(axis=0)
+        folds = np.flatnonzero(self.data.split_of_fold == 0)
+        normal = self.gram[np.ix_(folds, index, index)].sum(axis=0)
+        score = self.score[np.ix_(folds, index)].sum(axis=0)
         root = np.linalg.cholesky(normal + np.diag(self.ridge[index])).T
         theta = lsq_linear(root, np.linalg.solve(root.T, score), (limits[:, 0], limits[:, 1])).x
         left = float(self.data.squares[folds].sum()) - 2 * float(theta @ score) + float(theta @ normal @ theta)

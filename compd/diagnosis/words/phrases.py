@@ -42,6 +42,9 @@ MAX_RIVALS = 3
 # Single gross rows that are named.
 MAX_ROWS = 4
 
+# A probability is said as no less than this, and as no nearer to 1.
+LEAST = 0.01
+
 IMPLAUSIBLE = "IMPLAUSIBLE"
 NOT_DETERMINED = "NOT DETERMINED"
 # An effect that does so many times more than the error was is taken back by others.
@@ -321,6 +324,15 @@ def best_description(diagnosis: Diagnosis) -> EmpiricalFinding | None:
 def is_best_a_change(diagnosis: Diagnosis) -> bool:
     """Whether a change in time describes the rest better than anything that it follows."""
     return any(finding.is_change for finding in diagnosis.depends_on[:1])
+
+
+def probability_clause(diagnosis: Diagnosis) -> list[str]:
+    """How probable it is that the named set is right; empty where that cannot be stated."""
+    probability = diagnosis.probability
+    if math.isnan(probability):
+        return []
+    what = "what is named is all, and all of it acts" if diagnosis.steps else "no effect of the library has to be named"
+    return [f"{min(max(probability, LEAST), 1.0 - LEAST):.2f} is the probability that {what}"]
 
 
 def thermal_in_one_session(diagnosis: Diagnosis) -> list[str]:

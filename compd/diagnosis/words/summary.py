@@ -16,12 +16,15 @@ from compd.diagnosis.words.phrases import (
     question_text,
     rivals_text,
     shown_by,
+    thermal_in_one_session,
     was_any_tried,
 )
 from compd.text import join_words, number_text
 
 # What confirms a thermal cause.
 CONFIRM = "measure on another day, or let it cool down and warm up again"
+# What decides between sets of effects.
+DECIDE = "measure again under other conditions, and seal a part of the rows"
 
 
 def summary(diagnosis: Diagnosis) -> str:
@@ -47,7 +50,9 @@ def _verdict(diagnosis: Diagnosis) -> str:
         case "likely":
             them, be = ("it", "is") if len(diagnosis.steps) == 1 else ("them", "are")
             falls = f"{names} {be} likely what is missing: with {them} the error of {before} falls to {after}, {noise}."
-            return f"{falls} One warm-up proves no cause: {CONFIRM}."
+            if thermal_in_one_session(diagnosis):
+                return f"{falls} One warm-up proves no cause: {CONFIRM}."
+            return f"{falls} Another set may be as good (probability {diagnosis.probability:.2f}): {DECIDE}."
         case "ambiguous":
             pairs = "; ".join(rivals_text(step) for step in diagnosis.steps if step.rivals)
             falls = f"With {names} the error of {before} falls to {after}, {noise}."

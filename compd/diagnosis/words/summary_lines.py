@@ -23,6 +23,7 @@ from compd.diagnosis.words.phrases import (
     named_with_place,
     parameter_texts,
     physics_clause,
+    probability_clause,
     rivals_text,
     shown_by,
     thermal_in_one_session,
@@ -44,7 +45,7 @@ MAX_FAULTS = 2
 # A probability above this is said before the numbers.
 DOUBTFUL = 0.01
 # With so many other texts the one is left out that says nothing.
-CROWDED = 7
+CROWDED = 8
 
 
 def summary_lines(diagnosis: Diagnosis) -> list[str]:
@@ -64,6 +65,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         LabelledText("Start", tuple(_start(diagnosis, fall))),
         LabelledText("Left", tuple(_left(diagnosis, fall))),
         LabelledText("Gross", tuple(gross_texts(diagnosis.gross, diagnosis.after, fall.unit))),
+        LabelledText("Right", tuple(probability_clause(diagnosis))),
         LabelledText("Sure", tuple(_sure(diagnosis))),
         LabelledText("Or else", tuple(_or_else(diagnosis))),
         LabelledText("Besides", tuple(_constant(diagnosis, fall))),
@@ -93,7 +95,8 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
         case "identified":
             text = f"What is missing is {{}}: {fall.text(fall.after)}"
         case "likely":
-            text = f"{{}} {be} missing, seen in one warm-up only: {fall.text(fall.after)}"
+            why = "seen in one warm-up only" if thermal_in_one_session(diagnosis) else "one more recording decides"
+            text = f"{{}} {be} missing, {why}: {fall.text(fall.after)}"
         case "ambiguous":
             ids = [
                 join_words([step.effect.id, *(rival.name for rival in step.rivals)], "or") for step in diagnosis.steps

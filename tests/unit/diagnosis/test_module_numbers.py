@@ -126,6 +126,7 @@ NUMBERS = {
     "diagnosis/search/subset_losses.py": {"MIN_LOSS": ROUNDING},
     "diagnosis/unmodelled.py": {"RANK_CUT": CONDITIONING},
     "diagnosis/left_interval.py": {"MIN_FOLDS": DEFINITION},
+    "diagnosis/search/better_sets.py": {"LEAST": ROUNDING},
     "diagnosis/verdict.py": {"VERDICT_VERSION": WORDS},
     "diagnosis/words/phrases.py": {
         "MAX_VALUES": WORDS,
@@ -136,6 +137,7 @@ NUMBERS = {
         "MIN_PLACES": WORDS,
         "SURE_SIGMAS": WORDS,
         "OTHERS_SHARE": WORDS,
+        "LEAST": WORDS,
     },
     "diagnosis/words/summary_lines.py": {
         "MAX_LINES": WORDS,

@@ -41,3 +41,16 @@ def test_a_lone_constant_is_named_by_an_effect_that_makes_it_and_one_beside_effe
     assert named_members(subset_losses(noise(4) + 3.0, candidates), (0,)) == (1,)
     both = subset_losses(noise(4) + 3.0 + 1.5 * SIMPLE[:, :, 0], candidates)
     assert named_members(both, (2, 0)) == (2, 0)
+
+
+def test_a_rival_that_needs_the_constant_takes_it_along_or_stays_behind() -> None:
+    constant = np.broadcast_to(np.eye(COORDINATES), (ROWS, COORDINATES, COORDINATES))
+    y = noise(4) + 3.0 + 1.5 * SIMPLE[:, :, 0]
+    offset, simple = candidate("constant", constant, np.inf, kind="constant"), candidate("simple", SIMPLE)
+    more = general(constant, columns(6, 5))
+    losses = subset_losses(y, [more, simple, offset])
+    assert losses.loss((1,)) > 5 * losses.loss((0,))
+    assert with_fewest_numbers(losses, (0,)) == (1, 2)
+    few = subset_losses(y, [general(constant), simple, offset])
+    assert few.candidates[0].parameter_count == 1 + COORDINATES
+    assert with_fewest_numbers(few, (0,)) == (0,)

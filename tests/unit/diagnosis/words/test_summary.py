@@ -9,8 +9,11 @@ from typing import Any, get_args
 import pytest
 
 from compd.diagnosis.findings import CandidateResult, GrossRows, UntestedEffect
+from compd.diagnosis.named_probability import NamedProbability
+from compd.diagnosis.probability_criteria import ProbabilityCriteria
 from compd.diagnosis.verdict import Diagnosis, Verdict
 from compd.diagnosis.words.phrases import physics_clause
+from compd.diagnosis.words.summary import summary
 from compd.diagnosis.words.summary_lines import MAX_LINES, WIDTH, summary_lines
 from compd.model.library import load_library
 from tests.support.diagnoses import Noise, description, diagnosis, external_recording, formula, step
@@ -22,6 +25,7 @@ from tests.support.diagnosis_situations import (
     SITUATIONS,
     changed,
     far_above_the_noise,
+    nothing_missing,
     one_effect,
     rivals,
     two_effects,
@@ -33,6 +37,32 @@ def test_one_session_proves_no_thermal_cause() -> None:
     assert "link_expansion seen in one session only: measure on another day" in lines
     assert "Next: measure on another day first; add it:" in lines
     assert "one session" not in " ".join(summary_lines(two_effects()))
+
+
+def test_a_stated_probability_has_a_line_and_another_one_without_effects() -> None:
+    named = replace(one_effect(), probability_from=NamedProbability(0.0))
+    (line,) = [line for line in summary_lines(named) if line.startswith("Right")]
+    assert f"{named.probability:.2f} is the probability that what is named is all" in line
+    nothing = replace(nothing_missing(), probability_from=NamedProbability(0.0))
+    assert any("that no effect of the library has to be" in line for line in summary_lines(nothing))
+    assert not [line for line in summary_lines(one_effect()) if line.startswith("Right")]
+
+
+@pytest.mark.parametrize(("odds", "said"), [(-20.0, "0.01"), (20.0, "0.99")])
+def test_no_probability_is_said_to_be_certain(odds: float, said: str) -> None:
+    criteria = ProbabilityCriteria(certain=odds)
+    made = replace(one_effect(), probability_from=NamedProbability(0.0, criteria=criteria))
+    assert any(line.startswith(f"Right:    {said} is") for line in summary_lines(made))
+
+
+def test_what_is_likely_says_why() -> None:
+    doubtful = NamedProbability(1.0, criteria=ProbabilityCriteria(certain=0.5, per_better=0.0))
+    made = replace(one_effect(), verdict="likely", probability_from=doubtful)
+    assert summary_lines(made)[0].startswith("likely: link_expansion is missing, one more recording decides")
+    assert "probability 0.62" in summary(made)
+    once = replace(one_effect(sessions=1), verdict="likely")
+    assert "seen in one warm-up only" in summary_lines(once)[0]
+    assert "One warm-up proves no cause" in summary(once)
 
 
 @pytest.mark.parametrize("situation", SITUATIONS, ids=lambda situation: situation.__name__)
