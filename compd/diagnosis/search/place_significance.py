@@ -56,7 +56,8 @@ def place_p_value(
         gained = float(np.sum((own.T @ y_at) ** 2))
         left = max(float(y_at @ y_at) - gained, 1e-300)
         chances.append(float(fdtrc(own.shape[1], dof, gained / own.shape[1] / (left / dof))))
-    return float(-np.expm1(tried * np.log1p(-min(*chances, 1 - 1e-15))))
+    least = min(chances)
+    return float(-np.expm1(tried * np.log1p(-least))) if least < 1.0 else 1.0
 
 
 def _between(columns: FloatArray, place: IntArray) -> float:

@@ -7,7 +7,7 @@ import math
 
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.advice import advice
-from compd.diagnosis.words.error_fall import ErrorFall, error_fall
+from compd.diagnosis.words.error_fall import CANNOT_KNOW, ErrorFall, error_fall
 from compd.diagnosis.words.phrases import (
     IMPLAUSIBLE,
     NOT_DETERMINED,
@@ -44,6 +44,8 @@ NO_RIVAL = "no other effect that was tried does as well"
 MAX_FAULTS = 2
 # A probability above this is said before the numbers.
 DOUBTFUL = 0.01
+# That a declaration is contradicted takes so many, with both numbers.
+LEFT_LINES = 3
 # With so many other texts the one is left out that says nothing.
 CROWDED = 8
 
@@ -63,7 +65,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
         LabelledText("Follows", tuple(_follows(diagnosis, fall))),
         LabelledText("Start", tuple(_start(diagnosis, fall))),
-        LabelledText("Left", tuple(_left(diagnosis, fall))),
+        LabelledText("Left", tuple(_left(diagnosis, fall)), least=1 if fall.unknown == CANNOT_KNOW else LEFT_LINES),
         LabelledText("Gross", tuple(gross_texts(diagnosis.gross, diagnosis.after, fall.unit))),
         LabelledText("Right", tuple(probability_clause(diagnosis))),
         LabelledText("Sure", tuple(_sure(diagnosis))),
@@ -74,7 +76,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     others = [text for text in others if text.clauses]
     if len(others) >= CROWDED:
         others = [text for text in others if text.clauses != (NO_RIVAL,)]
-    room = MAX_LINES - 1 - len(others)
+    room = MAX_LINES - 1 - sum(text.least for text in others)
     label = "Shares" if diagnosis.verdict in ("partial", "unexplained") else "Found"
     texts = [LabelledText(label, found, names, least=min(len(found), MAX_NAMED, room))] if found else []
     return [_heading(diagnosis, fall), *fit_lines([*texts, *others], MAX_LINES - 1, WIDTH)]
