@@ -23,10 +23,10 @@ from compd.model.kernels import require
 from compd.model.kinematics import Movement
 from compd.rotation import rotation_vector, to_inner
 
-# What a drawing states: where joints, hinges and the tool are, and how long rods are.
-_OF_A_DRAWING: frozenset[Port] = frozenset({"link", "base_joint", "platform_joint", "revolute_axis", "tool"})
+# What a drawing states: where joints, hinges and the tool are, how long rods are, and where machine zero is.
+_OF_A_DRAWING: frozenset[Port] = frozenset({"scale", "link", "base_joint", "platform_joint", "revolute_axis", "tool"})
 # What an effect of a drawing's numbers may need, all of it given by the kinematics at rest.
-_AT_REST = frozenset({"kinematics", "revolute_axes"})
+_AT_REST = frozenset({"kinematics", "scale", "revolute_axes"})
 # Digits of a written number: 1 nm, and 1 nrad, which is 1 nm at 1 m.
 _DECIMALS_MM, _DECIMALS_RAD = 6, 9
 
