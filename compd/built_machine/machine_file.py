@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.built_machine.built_geometry import BuiltGeometry, built_geometry
+from compd.built_machine.drawn_numbers import BuiltGeometry, built_geometry
 from compd.configuration import Configuration, load
 from compd.documents import Location, Value, read_text, with_values
 from compd.errors import ConfigurationError, Problem

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from compd.built_machine import BuiltFiles, Provenance, built_geometry, write_built_machine
 from compd.configuration import Configuration, load, shipped_configuration
@@ -14,16 +15,15 @@ from compd.errors import ConfigurationError
 from compd.machine_builder import build_model
 from compd.machine_check import load_whole
 from compd.machine_kinds import KINDS, machine_text
-from compd.model import MachineModel, effect_deltas, observe, predict, sum_deltas
+from compd.model import MachineModel, effect_deltas, predict, sum_deltas
 from compd.model.effects import FittedEffect
-from compd.model.kinematics import Movement
-from compd.model.library import load_library
 from compd.model_file import read_model_file
+from tests.unit.built_machine.machines import random_effects, rows_at
+
+Floats = NDArray[np.float64]
 
 GEOMETRIC = ("link_zero", "base_joint_position", "platform_joint_position", "revolute_axis_tilt", "tool_offset")
 PROVENANCE = Provenance("compd calibrate", "2026-11-28", (("poses.csv", "ab" * 32),))
-# Largest of each unit: what a machine of printed parts may be off by.
-LARGEST = {"um": 300.0, "urad": 500.0, "ppm": 800.0}
 SHIPPED = ("hexapod", "tripod-cmm")
 
 
@@ -36,50 +36,18 @@ def drawing(tmp_path: Path, kind: str) -> Configuration:
     return load(path)
 
 
-def random_effects(configuration: Configuration, ids: tuple[str, ...], seed: int) -> tuple[FittedEffect, ...]:
-    """The effects of the library that this machine can have, with numbers drawn at random."""
-    rng = np.random.default_rng(seed)
-    links = configuration.geometry.links
-    effects = [load_library()[id_] for id_ in ids]
-    if not configuration.geometry.mechanism.hinges:
-        effects = [effect for effect in effects if effect.id != "revolute_axis_tilt"]
-    return tuple(
-        FittedEffect(
-            effect,
-            np.array([rng.uniform(-1, 1) * LARGEST[column.parameter.unit] for column in effect.columns(links)])[
-                : _count(configuration, effect.id)
-            ],
-            {},
-        )
-        for effect in effects
-    )
-
-
-def _count(configuration: Configuration, effect: str) -> int | None:
-    return len(configuration.geometry.mechanism.hinges) if effect == "revolute_axis_tilt" else None
-
-
 def model_of(configuration: Configuration) -> MachineModel:
     return build_model(configuration.geometry, configuration.wiring)
 
 
-def tips(configuration: Configuration, effects: tuple[FittedEffect, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Tip and attitude at 40 random readings of the scales, with effects."""
+def effects_of(configuration: Configuration, ids: tuple[str, ...], seed: int) -> tuple[FittedEffect, ...]:
+    return random_effects(model_of(configuration), ids, seed)
+
+
+def tips_with(configuration: Configuration, effects: tuple[FittedEffect, ...]) -> tuple[Floats, Floats]:
+    """Tips and attitudes at 40 random readings of the scales, with effects."""
     model = model_of(configuration)
-    assert model.constants is not None
-    scale_mm = np.random.default_rng(5).uniform(-25, 25, (40, model.scales))
-    joint_mm = np.zeros((40, model.joint_weights.shape[1]))
-    rows = observe(
-        model,
-        model.constants,
-        scale_mm=scale_mm,
-        joint_mm=joint_mm,
-        frame_mm=np.zeros((40, 9)),
-        quantities={},
-        time_s=np.arange(40.0),
-        session_start=np.zeros(40, dtype=bool),
-        movement=Movement.unknown(scale_mm, joint_mm),
-    )
+    rows = rows_at(model, np.random.default_rng(5).uniform(-25, 25, (40, model.scales)))
     predicted = predict(model, rows, sum_deltas([effect_deltas(effect, rows)[0] for effect in effects]))
     assert not predicted.reason.any()
     return predicted.tip_mm, predicted.rotation_M_P
@@ -94,13 +62,13 @@ def built(configuration: Configuration, effects: tuple[FittedEffect, ...]) -> Bu
 @pytest.mark.parametrize("kind", [*KINDS, *SHIPPED])
 def test_it_moves_as_the_drawing_with_the_effects(tmp_path: Path, kind: str) -> None:
     configuration = drawing(tmp_path, kind)
-    effects = random_effects(configuration, GEOMETRIC, seed=len(kind))
+    effects = effects_of(configuration, GEOMETRIC, seed=len(kind))
     files = built(configuration, effects)
     assert files.model is None
     as_built = load_whole(files.machine)
-    tip_mm, rotation = tips(configuration, effects)
-    drawn_mm, _ = tips(configuration, ())
-    built_mm, built_rotation = tips(as_built, ())
+    tip_mm, rotation = tips_with(configuration, effects)
+    drawn_mm, _ = tips_with(configuration, ())
+    built_mm, built_rotation = tips_with(as_built, ())
     assert np.abs(tip_mm - drawn_mm).max() > 0.2
     # numbers are written to 1 nm and 1 nrad; the tip sees six lengths and joints at once
     assert np.abs(built_mm - tip_mm).max() < 3e-5
@@ -110,7 +78,7 @@ def test_it_moves_as_the_drawing_with_the_effects(tmp_path: Path, kind: str) -> 
 @pytest.mark.parametrize("kind", [*KINDS, *SHIPPED])
 def test_the_file_has_exactly_the_numbers(tmp_path: Path, kind: str) -> None:
     configuration = drawing(tmp_path, kind)
-    effects = random_effects(configuration, GEOMETRIC, seed=3)
+    effects = effects_of(configuration, GEOMETRIC, seed=3)
     files = built(configuration, effects)
     document = read_document(files.machine)
     numbers = built_geometry(configuration, effects).numbers
@@ -121,7 +89,7 @@ def test_the_file_has_exactly_the_numbers(tmp_path: Path, kind: str) -> None:
 
 def test_gains_go_into_a_model_file_that_the_machine_names(tmp_path: Path) -> None:
     configuration = drawing(tmp_path, "6-ups")
-    effects = random_effects(configuration, ("base_joint_position", "scale_gain"), seed=1)
+    effects = effects_of(configuration, ("base_joint_position", "scale_gain"), seed=1)
     files = built(configuration, effects)
     as_built = load_whole(files.machine)
     assert files.model is not None
@@ -129,14 +97,14 @@ def test_gains_go_into_a_model_file_that_the_machine_names(tmp_path: Path) -> No
     model = read_model_file(files.model, as_built.machine, as_built.geometry.links, as_built.geometry_hash)
     assert [one.effect.id for one in model.fitted] == ["scale_gain"]
     assert np.array_equal(model.fitted[0].theta, effects[1].theta)
-    tip_mm, _ = tips(configuration, effects)
-    assert np.abs(tips(as_built, model.fitted)[0] - tip_mm).max() < 3e-5
+    tip_mm, _ = tips_with(configuration, effects)
+    assert np.abs(tips_with(as_built, model.fitted)[0] - tip_mm).max() < 3e-5
 
 
 def test_comments_stay_and_the_drawings_numbers_stand_beside(tmp_path: Path) -> None:
     configuration = drawing(tmp_path, "hexapod")
     before = configuration.path.read_text(encoding="utf-8").splitlines()
-    effects = random_effects(configuration, ("platform_joint_position",), seed=2)
+    effects = effects_of(configuration, ("platform_joint_position",), seed=2)
     after = built(configuration, effects).machine.read_text(encoding="utf-8").splitlines()
     assert any(line.startswith("# Recording: poses.csv, sha256 abab") for line in after)
     assert "    joints_P_mm:                       # universal joints: no revolute axes" in after
@@ -150,10 +118,10 @@ def test_comments_stay_and_the_drawings_numbers_stand_beside(tmp_path: Path) -> 
 
 def test_a_second_calibration_keeps_the_drawings_numbers(tmp_path: Path) -> None:
     configuration = drawing(tmp_path, "rotary-delta")
-    first = built(configuration, random_effects(configuration, ("link_zero",), seed=2)).machine
+    first = built(configuration, effects_of(configuration, ("link_zero",), seed=2)).machine
     again = first.with_name("again.yaml")
     as_built = load(first)
-    effects = random_effects(as_built, ("link_zero",), seed=4)
+    effects = effects_of(as_built, ("link_zero",), seed=4)
     write_built_machine(as_built, effects, np.eye(6), PROVENANCE, again)
     lines = [line for line in again.read_text(encoding="utf-8").splitlines() if "length_mm:" in line]
     drawn = [line for line in configuration.path.read_text(encoding="utf-8").splitlines() if "length_mm:" in line]
@@ -164,6 +132,6 @@ def test_a_second_calibration_keeps_the_drawings_numbers(tmp_path: Path) -> None
 
 def test_the_drawing_is_never_replaced(tmp_path: Path) -> None:
     configuration = drawing(tmp_path, "6-ups")
-    effects = random_effects(configuration, ("link_zero",), seed=2)
+    effects = effects_of(configuration, ("link_zero",), seed=2)
     with pytest.raises(ConfigurationError, match="is the file of the drawing"):
         write_built_machine(configuration, effects, np.eye(6), PROVENANCE, configuration.path)
