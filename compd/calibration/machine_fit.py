@@ -8,16 +8,16 @@ of angles is taken from what is left, rows with an error that no noise explains 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, rms
 from compd.calibration.parameters import Parameters
-from compd.calibration.poses import MeasuredPoses, PosesNow
-from compd.calibration.prior_fit import Normal, PriorFit, Whitened, fit_with_prior, normal_equations, registration_of
-from compd.statistics import MIN_SIGMA, huber_weights, trimmed_scale
+from compd.calibration.poses import MeasuredPoses, PosesNow, links_of_pose
+from compd.calibration.prior_fit import Normal, PriorFit, Whitened, fit_with_prior, normal_equations
+from compd.statistics import MIN_SIGMA, huber_weights, robust_regression, trimmed_scale
 from compd.units import UM_PER_MM
 
 # The forward model is nearly linear: three rounds settle numbers and outliers, the others are for large errors.
@@ -26,6 +26,10 @@ _ROUNDS = 12
 _SETTLED = 1e-4
 # Confidence at which a scatter contradicts the noise that is declared.
 _CONTRADICTS = 0.99
+# Share of the measured values that count as degrees of freedom where a fit has nearly as many numbers.
+_FEWEST_SHARE = 0.1
+# Rounds in which the weights of lengths and angles settle.
+_WEIGHT_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,17 +80,12 @@ def fit_machine(
     result = PriorFit(np.zeros(count), np.ones(0), np.zeros((count, count)))
     out = [np.zeros(len(one.use), dtype=bool) for one in recordings] if outlier is None else list(outlier)
     blocks = sorted(set(parameters.block_of[free].tolist()))
-    used = float(free.sum())
+    numbers = float(free.sum()) / len(recordings)
     for _ in range(_ROUNDS):
-        theta = result.x * parameters.prior_std
-        effects = parameters.split(theta, np.zeros((count, count)), blocks)
+        effects = parameters.split(result.x * parameters.prior_std, np.zeros((count, count)), blocks)
         now = [one.now(effects) for one in recordings]
         rows = [one.use & ~left for one, left in zip(now, out, strict=True)]
-        # what the registration columns take is no error
-        first = [
-            _whitened(one, use, np.ones(one.residual_mm.shape[1]), result.x) for one, use in zip(now, rows, strict=True)
-        ]
-        sigmas = [_sigma_mm(one, use, _left(part, result.x, one), used / len(now)) for one, use, part in zip(now, rows, first, strict=True)]
+        sigmas = [_sigma_mm(one, use, numbers) for one, use in zip(now, rows, strict=True)]
         linear = [_whitened(one, use, sigma, result.x) for one, use, sigma in zip(now, rows, sigmas, strict=True)]
         new = fit_with_prior(normal_equations(linear), parameters.block_of, free, considered)
         change = float(np.abs(new.x - result.x).max(initial=0.0))
@@ -94,8 +93,8 @@ def fit_machine(
         found = out
         if outlier is None:
             found = [
-                one.poses.aligned.outliers(_left(part, result.x, one) / sigma, one.use)
-                for one, part, sigma in zip(now, linear, sigmas, strict=True)
+                one.poses.aligned.outliers(registered_mm(one, use, sigma)[0] / sigma, one.use)
+                for one, use, sigma in zip(now, rows, sigmas, strict=True)
             ]
         same = all((a == b).all() for a, b in zip(found, out, strict=True))
         out = found
@@ -104,52 +103,103 @@ def fit_machine(
     return MachineFit(parameters, tuple(now), tuple(linear), result, tuple(out), tuple(sigmas), free)
 
 
+def registered_mm(now: PosesNow, use: BoolArray, sigma_mm: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+    """(N, w) and (N, m) mm, in weighed and in measured coordinates, what is left beside the registration of rows `use`.
+
+    sigma_mm : (w,); None for lengths and angles by what is left of each.
+    """
+    residual_mm, R_mm, _ = now.weighed
+    r = np.zeros(R_mm.shape[2])
+    sigma = np.ones(residual_mm.shape[1]) if sigma_mm is None else sigma_mm
+    # urad and um have no size in common: each counts in the scatter that the registration leaves
+    for _ in range(1 if sigma_mm is not None or not R_mm.shape[2] else _WEIGHT_ROUNDS):
+        if sigma_mm is None:
+            sigma = _scatter_mm(now, (residual_mm - R_mm @ r)[use])
+        if R_mm.shape[2]:
+            r = robust_regression(
+                R_mm[use] / sigma[:, None], residual_mm[use] / sigma, huber=now.aligned.criteria.huber_sigmas
+            )
+    return residual_mm - R_mm @ r, now.residual_mm - now.registration_mm @ r
+
+
 def _whitened(now: PosesNow, use: BoolArray, sigma_mm: FloatArray, x: FloatArray) -> Whitened:
     """The linear problem about the numbers x (P,), whose part z has."""
-    place = np.flatnonzero(use)
-    J = now.poses.columns_mm[use] / sigma_mm[:, None]
-    R = now.registration_mm[use] / sigma_mm[:, None]
-    z = now.residual_mm[use] / sigma_mm
-    m = len(sigma_mm)
-    J, R, z = J.reshape(-1, J.shape[2]), R.reshape(len(place) * m, -1), z.ravel()
-    size = z - R @ np.linalg.lstsq(R, z, rcond=None)[0] if R.shape[1] else z
-    huber = now.aligned.criteria.huber_sigmas
-    root = np.sqrt(np.repeat(huber_weights(size.reshape(-1, m), huber=huber), m))
-    return Whitened((z + J @ x) * root, J * root[:, None], R * root[:, None], np.repeat(place, m))
+    place, w = np.flatnonzero(use), len(sigma_mm)
+    residual_mm, registration_mm, columns_mm = now.weighed
+    left = registered_mm(now, use, sigma_mm)[0][use] / sigma_mm
+    root = np.sqrt(huber_weights(left, huber=now.aligned.criteria.huber_sigmas))[:, None]
+    z = residual_mm[use] / sigma_mm * root
+    J = columns_mm[use] / sigma_mm[:, None] * root[:, :, None]
+    R = registration_mm[use] / sigma_mm[:, None] * root[:, :, None]
+    J = J.reshape(len(place) * w, -1)
+    return Whitened(z.ravel() + J @ x, J, R.reshape(len(place) * w, -1), np.repeat(place, w))
 
 
-def _left(part: Whitened, x: FloatArray, now: PosesNow) -> FloatArray:
-    """(N, m) mm of all rows, also those left out, with numbers x and the registration that goes with them; linear in
-    what x changes."""
-    registration = registration_of(part, x)
-    return np.asarray(now.residual_mm - now.registration_mm @ registration)
+def _sections(now: PosesNow, width: int) -> list[slice]:
+    """The weighed coordinates that have one scatter: lengths, then angles."""
+    if now.poses.to_links is None and now.aligned.with_attitude:
+        return [slice(width - 3), slice(width - 3, width)]
+    return [slice(width)]
 
 
-def _sigma_mm(now: PosesNow, use: BoolArray, left_mm: FloatArray, numbers: float) -> FloatArray:
-    """(m,) standard deviation of each measured coordinate, alike for all lengths and for all angles.
+def _scatter_mm(now: PosesNow, left_mm: FloatArray) -> FloatArray:
+    """(w,) scatter of what is left (R, w), alike for all coordinates of a section."""
+    sigma = np.empty(left_mm.shape[1])
+    for part in _sections(now, len(sigma)):
+        sigma[part] = max(rms(trimmed_scale(left_mm[:, part])), MIN_SIGMA)
+    return sigma
+
+
+def _sigma_mm(now: PosesNow, use: BoolArray, numbers: float) -> FloatArray:
+    """(w,) standard deviation of each weighed coordinate.
 
     The declared one, unless what is left contradicts it; else what is left, with the degrees of freedom that the fit
     has taken.
     """
-    aligned = now.aligned
-    values = left_mm[use]
-    rows, m = values.shape
-    dof = rows * m - numbers - now.registration_mm.shape[2]
-    share = np.sqrt(rows * m / max(dof, 0.1 * rows * m))
-    declared_mm = np.array(aligned.recording.reference_sigma_mm, dtype=np.float64)[: m - 3 * aligned.with_attitude]
-    if aligned.of_links or aligned.of_distance:
-        declared_mm = np.broadcast_to(declared_mm.mean(), m)
-    reference = aligned.recording.reference
-    angle_mm = np.nan if reference is None else reference.sigma_urad / UM_PER_MM
-    sigma = np.empty(m)
-    lengths = aligned.lengths
-    sections = [(lengths, declared_mm)]
-    if aligned.with_attitude:
-        sections.append((slice(m - 3, m), np.full(3, angle_mm)))
-    for part, stated in sections:
-        seen = max(rms(trimmed_scale(values[:, part])) * share, MIN_SIGMA)
-        own = values[:, part].size
-        known = np.isfinite(stated).all() and (stated > 0).all()
-        limit = np.sqrt(float(fdtri(max(own * dof / (rows * m), 1.0), 1e9, _CONTRADICTS)))
-        sigma[part] = stated if known and seen <= limit * rms(stated) else seen
+    left_mm = registered_mm(now, use)[0][use]
+    values = left_mm.size
+    dof = max(values - numbers - now.registration_mm.shape[2], _FEWEST_SHARE * values)
+    sigma = _scatter_mm(now, left_mm) * np.sqrt(values / dof)
+    declared_mm = _declared_mm(now, len(sigma))
+    for part in _sections(now, len(sigma)):
+        stated = declared_mm[part]
+        own = left_mm[:, part].size * dof / values
+        if np.isfinite(stated).all() and rms(sigma[part]) <= np.sqrt(float(fdtri(own, 1e9, _CONTRADICTS))) * rms(stated):
+            sigma[part] = stated
     return sigma
+
+
+def _declared_mm(now: PosesNow, width: int) -> FloatArray:
+    """(w,) declared standard uncertainty of the reference; nan where nobody declared it, or links are weighed."""
+    aligned, reference = now.aligned, now.aligned.recording.reference
+    if now.poses.to_links is not None or reference is None:
+        return np.full(width, np.nan)
+    declared = np.array(aligned.recording.reference_sigma_mm, dtype=np.float64)
+    if aligned.with_attitude:
+        declared = np.append(declared, np.full(3, reference.sigma_urad / UM_PER_MM))
+    declared = np.broadcast_to(declared, width) if declared.size == 1 else declared
+    return np.where(declared > 0, declared, np.nan) if len(declared) == width else np.full(width, np.nan)
+
+
+def in_likelier_coordinates(fit: MachineFit) -> list[MeasuredPoses]:
+    """Each recording of poses weighed as measured, or as errors of links, whichever makes what is left likelier.
+
+    Where the instrument is the noisiest part its coordinates have one scatter each; where the machine is, its links
+    have. The likelihoods are those of normal errors of one scatter in either coordinates.
+    """
+    chosen = []
+    for now, outlier in zip(fit.now, fit.outlier, strict=True):
+        poses, use = now.poses, now.use & ~outlier
+        to_links = links_of_pose(poses.aligned)
+        if to_links is None or to_links.shape[1] != to_links.shape[2] or np.isfinite(_declared_mm(now, 6)).any():
+            chosen.append(poses)
+            continue
+        other = replace(now, poses=replace(poses, to_links=to_links))
+        rows = int(use.sum())
+        sigma = _scatter_mm(now, registered_mm(now, use)[0][use])
+        links = _scatter_mm(other, registered_mm(other, use)[0][use])
+        # density of the pose = density of the links times the determinant
+        as_measured = -rows * np.log(sigma).sum()
+        as_links = -rows * np.log(links).sum() + np.linalg.slogdet(to_links[use])[1].sum()
+        chosen.append(other.poses if as_links > as_measured else poses)
+    return chosen

@@ -12,7 +12,7 @@ from compd.calibration.jacobian import measured_columns
 from compd.calibration.parameters import Parameters
 from compd.comparison import AlignedRecording, aligned_with
 from compd.display_unit import MM_PER_RAD
-from compd.model import Sensitivity, effect_deltas, link_residuals, predict, sum_deltas
+from compd.model import effect_deltas, predict, sum_deltas
 from compd.model.effects import FittedEffect
 
 
@@ -21,11 +21,14 @@ class MeasuredPoses:
     """A recording of N rows with m measured coordinates, and how they change with the P numbers of a drawing.
 
     columns_mm : (N, m, P) per tolerance.  use : (N,) rows with a pose and every value.
+    to_links : (N, n, m) from the measured coordinates to errors of links, in which the rows are then weighed; None
+        where they are weighed as measured.
     """
 
     aligned: AlignedRecording
     columns_mm: FloatArray
     use: BoolArray
+    to_links: FloatArray | None = None
 
     @classmethod
     def of(cls, aligned: AlignedRecording, parameters: Parameters) -> MeasuredPoses:
@@ -60,19 +63,26 @@ class PosesNow:
     use: BoolArray
 
     @cached_property
-    def link_sensitivity(self) -> Sensitivity:
-        """Of the drawing's pose by the lengths of links."""
-        return self.poses.aligned.sensitivity(["link"])["link"]
+    def weighed(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Residual (N, w), registration (N, w, Q) and columns (N, w, P) in the coordinates that are weighed."""
+        T, residual_mm = self.poses.to_links, self.residual_mm
+        if T is None:
+            return residual_mm, self.registration_mm, self.poses.columns_mm
+        return (T @ residual_mm[:, :, None])[:, :, 0], T @ self.registration_mm, T @ self.poses.columns_mm
 
-    def links_mm(self, residual_mm: FloatArray) -> FloatArray:
-        """(N, n) errors of links that would make a residual (N, m); nan where the tip was not measured whole."""
-        aligned, link = self.poses.aligned, self.link_sensitivity
-        if aligned.of_links or not aligned.shows_tip:
-            return np.full((len(residual_mm), link.tip.shape[2]), np.nan)
-        if not aligned.with_attitude:
-            return link_residuals(link, residual_mm[:, :3])
+
+def links_of_pose(aligned: AlignedRecording) -> FloatArray | None:
+    """(N, n, m) errors of links by errors of the measured coordinates, which they explain at the pose as drawn.
+
+    Of a tip alone the smallest such errors; None where the tip was not measured whole.
+    """
+    if aligned.of_links or not aligned.shows_tip or aligned.model is None:
+        return None
+    link = aligned.sensitivity(["link"])["link"]
+    both = link.tip
+    if aligned.with_attitude:
         both = np.concatenate([link.tip, link.rotation * MM_PER_RAD], axis=1)
-        good = np.isfinite(both).all(axis=(1, 2))
-        errors_mm = np.full((len(good), both.shape[2]), np.nan)
-        errors_mm[good] = (np.linalg.pinv(both[good]) @ residual_mm[good, :, None])[:, :, 0]
-        return errors_mm
+    good = np.isfinite(both).all(axis=(1, 2))
+    by_pose = np.full((len(both), both.shape[2], both.shape[1]), np.nan)
+    by_pose[good] = np.linalg.pinv(both[good])
+    return by_pose
