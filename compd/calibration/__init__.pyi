@@ -1,0 +1,12 @@
+from .calibration import CalibratedNumber as CalibratedNumber
+from .calibration import Calibration as Calibration
+from .calibration import GrossPose as GrossPose
+from .calibration import HeldCombination as HeldCombination
+from .calibration import PoseErrors as PoseErrors
+from .calibration import TriedBlock as TriedBlock
+from .jacobian import measured_columns as measured_columns
+from .jacobian import pose_columns as pose_columns
+from .jacobian import scaled_jacobian as scaled_jacobian
+from .jacobian import without as without
+from .parameters import Parameters as Parameters
+from .parameters import calibration_parameters as calibration_parameters

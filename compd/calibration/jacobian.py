@@ -1,0 +1,65 @@
+"""How measured poses change with the numbers of the drawing: scaled columns, the registration projected out.
+
+Columns are per tolerance and rows per standard deviation of the noise, so that a singular value s says: a tolerance of
+this combination of numbers moves the measurements by s standard deviations. Below 1 the poses tell less of the
+combination than the drawing does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from compd.arrays import FloatArray
+from compd.calibration.parameters import Parameters
+from compd.comparison import AlignedRecording
+from compd.model import MachineModel, sensitivities, split_by_port
+from compd.model.effects import Observations, Port, evaluate_basis
+from compd.statistics import column_norms
+
+# Singular value, of columns of length 1, below which a combination of registration numbers moves nothing.
+_IDLE = 1e-9
+
+
+def measured_columns(aligned: AlignedRecording, parameters: Parameters) -> FloatArray:
+    """(N, m, P) derivatives of a recording's measured coordinates, mm (a urad of an attitude as a um) per tolerance."""
+    columns = [aligned.columns(block.effect, {})[:, :, block.used] for block in parameters.blocks]
+    return np.concatenate(columns, axis=2) * parameters.prior_std
+
+
+def pose_columns(model: MachineModel, rows: Observations, parameters: Parameters) -> FloatArray:
+    """(N, 6, P) derivatives of the tip, mm, and of the attitude, rad about {M}'s axes, per tolerance."""
+    ports: list[Port] = sorted({port for block in parameters.blocks for port in block.effect.ports})
+    by_port = {port: np.concatenate(one[:2], axis=1) for port, one in sensitivities(model, rows, ports).items()}
+    columns = []
+    for block in parameters.blocks:
+        basis, _ = evaluate_basis(block.effect, rows, {}, None)
+        added = split_by_port(block.effect, rows, basis)
+        moved = [by_port[port] @ values for port, values in added.items()]
+        columns.append(np.asarray(sum(moved[1:], start=moved[0]))[:, :, block.used])
+    return np.concatenate(columns, axis=2) * parameters.prior_std
+
+
+def scaled_jacobian(
+    columns: Sequence[FloatArray], registrations: Sequence[FloatArray], sigmas: Sequence[FloatArray]
+) -> FloatArray:
+    """(sum of N m, P) of several recordings, each with its registration projected out.
+
+    columns : (N, m, P) each, per tolerance.  registrations : (N, m, Q) each, Q may be 0.  sigmas : (m,) each, in the
+    unit of the columns.
+    """
+    parts = []
+    for J, R, sigma in zip(columns, registrations, sigmas, strict=True):
+        A = (J / sigma[:, None]).reshape(-1, J.shape[2])
+        parts.append(without(A, (R / sigma[:, None]).reshape(len(A), -1)))
+    return np.concatenate(parts)
+
+
+def without(A: FloatArray, R: FloatArray) -> FloatArray:
+    """A (n, P) less what the columns of R (n, Q) can make of it."""
+    if not R.shape[1]:
+        return A
+    U, sizes, _ = np.linalg.svd(R / column_norms(R), full_matrices=False)
+    U = U[:, sizes > _IDLE * sizes[0]]
+    return np.asarray(A - U @ (U.T @ A))
