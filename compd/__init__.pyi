@@ -1,3 +1,4 @@
+from .api.calibration import calibrate as calibrate
 from .api.diagnosis import compare as compare
 from .api.diagnosis import diagnose as diagnose
 from .api.long_recordings import compare_stream as compare_stream

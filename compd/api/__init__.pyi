@@ -1,3 +1,4 @@
+from .calibration import calibrate as calibrate
 from .diagnosis import compare as compare
 from .diagnosis import diagnose as diagnose
 from .long_recordings import LongRecording as LongRecording

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from compd.calibration.identifiability import HELD_SHARE, held_combinations, len
 from compd.calibration.machine_fit import MachineFit, fit_machine, in_likelier_coordinates, registered_mm
 from compd.calibration.parameters import Parameters, calibration_parameters
 from compd.calibration.pose_errors import errors_alone, errors_of_folds
-from compd.calibration.poses import MeasuredPoses
+from compd.calibration.poses import MeasuredPoses, links_of_pose
 from compd.calibration.selection import Selection, select_blocks
 from compd.calibration.untested import untested_blocks
 from compd.comparison import AlignedRecording, compare
@@ -79,7 +80,7 @@ def calibrate(
         sealed=tuple(
             errors_alone(
                 f"sealed {one.recording.path.name}",
-                MeasuredPoses.of(one, parameters),
+                _weighed_alike(MeasuredPoses.of(one, parameters), poses),
                 fitted,
                 np.zeros(one.recording.rows, dtype=bool),
             )
@@ -91,8 +92,17 @@ def calibrate(
         noise_um=noise_um,
         noise_urad=noise_urad,
         left_over=(left / noise_um) ** 2 if noise_um > 0 else float("nan"),
+        sigma_mm=fit.sigma_mm[0],
+        in_links=poses[0].to_links is not None,
         prior_scale={block.effect.id: float(whole.result.scale[b]) for b, block in enumerate(parameters.blocks)},
     )
+
+
+def _weighed_alike(sealed: MeasuredPoses, learned: Sequence[MeasuredPoses]) -> MeasuredPoses:
+    """Registered by errors of links where these are what the recordings learned from have."""
+    to_links = links_of_pose(sealed.aligned)
+    in_links = any(one.to_links is not None for one in learned)
+    return replace(sealed, to_links=to_links) if in_links and to_links is not None else sealed
 
 
 def _one_machine(recordings: Sequence[AlignedRecording]) -> MachineModel:

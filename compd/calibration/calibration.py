@@ -150,6 +150,12 @@ class Calibration:
         Of the measurement, per coordinate; nan where nothing says it.
     left_over : float
         Variance of held-out errors over that of the noise; 1 where only noise is left.
+    sigma_mm : (w,) array
+        Standard deviation of what is left of the first recording, of each coordinate that was weighed: a urad of an
+        attitude as a um.
+    in_links : bool
+        Whether poses were weighed as errors of links, which then have one scatter: the machine errs more than the
+        instrument.
     prior_scale : dict
         Block, and by which factor the tolerance was scaled to fit what the poses tell of it.
     """
@@ -170,6 +176,8 @@ class Calibration:
     noise_um: float
     noise_urad: float
     left_over: float
+    sigma_mm: FloatArray
+    in_links: bool
     prior_scale: dict[str, float]
 
     @property
@@ -209,6 +217,8 @@ class Calibration:
                 ],
                 "gross": [pose._asdict() for pose in self.gross],
                 "warnings": list(self.warnings),
+                "sigma_mm": self.sigma_mm.tolist(),
+                "in_links": self.in_links,
                 "noise_um": self.noise_um,
                 "noise_urad": self.noise_urad,
                 "left_over": self.left_over,

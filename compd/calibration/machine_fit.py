@@ -122,6 +122,12 @@ def registered_mm(now: PosesNow, use: BoolArray, sigma_mm: FloatArray | None = N
     return residual_mm - R_mm @ r, now.residual_mm - now.registration_mm @ r
 
 
+def whitened_poses(now: PosesNow, use: BoolArray, sigma_mm: FloatArray) -> Whitened:
+    """What is left of rows `use` (N,) in standard deviations sigma_mm (w,), beside columns of numbers and
+    registration."""
+    return _whitened(now, use, sigma_mm, np.zeros(now.poses.columns_mm.shape[2]))
+
+
 def _whitened(now: PosesNow, use: BoolArray, sigma_mm: FloatArray, x: FloatArray) -> Whitened:
     """The linear problem about the numbers x (P,), whose part z has."""
     place, w = np.flatnonzero(use), len(sigma_mm)
