@@ -1,4 +1,5 @@
 from .calibration import calibrate as calibrate
+from .calibration import plan_calibration as plan_calibration
 from .diagnosis import compare as compare
 from .diagnosis import diagnose as diagnose
 from .long_recordings import LongRecording as LongRecording

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from compd.api.arguments import Recorded, opened_recording
-from compd.calibration import Calibration
+from compd.api.measurements import Range
+from compd.calibration import Calibration, CalibrationPlan, Noise, PoseStudy, reachable_box
 from compd.calibration import calibrate as calibrate_aligned
 from compd.comparison import AlignedRecording
+from compd.configuration import Machine, load_machine
+from compd.errors import CompdError, Problem
+from compd.machine_builder import build_model
 
 
 def calibrate(
@@ -53,6 +59,84 @@ def calibrate(
     5.1
     """
     return calibrate_aligned(_opened(recordings), _opened(sealed), progress)
+
+
+def plan_calibration(
+    machine: Machine,
+    poses: int,
+    noise_um: float,
+    *,
+    noise_urad: float | None = None,
+    workspace_M_mm: tuple[Range, Range, Range] | None = None,
+    measured: Sequence[AlignedRecording] = (),
+) -> CalibrationPlan:
+    """Plan the poses that tell most of how a machine is built: reachable, and away from its singularities.
+
+    Parameters
+    ----------
+    machine : str, Path or Configuration
+        The machine as `load_machine` takes it, with its drawing and, under ``geometry: tolerance_mm``, how well it is
+        made.
+    poses : int
+        How many may be measured.
+    noise_um : float
+        Standard deviation of the instrument, um of each coordinate of the tip.
+    noise_urad : float, optional
+        Of its attitudes, urad, for an instrument that measures whole poses; left out, it measures positions.
+    workspace_M_mm : three pairs of float, optional
+        Lowest and highest x, y and z of the tip in {M}, mm; left out, six tenths of what the machine reaches.
+    measured : sequence of AlignedRecording
+        Recordings of poses that were measured before, in the same frame of the same instrument.
+
+    Returns
+    -------
+    CalibrationPlan
+        The poses, the indices of observability, and the standard error of the tip after the calibration.
+
+    Raises
+    ------
+    CompdError
+        For `machine: external`, a tool on the plate, or limits in which no pose is reached.
+    ConfigurationError
+        As `load_machine` does.
+
+    Notes
+    -----
+    D-optimality by exchange: T. J. Mitchell, Technometrics 16 (1974) 203.
+
+    Examples
+    --------
+    >>> import compd
+    >>> plan = compd.plan_calibration("hexapod", 20, noise_um=5.0)
+    >>> plan.write("poses.csv")
+    """
+    configuration = load_machine(machine)
+    if configuration.external is not None:
+        raise CompdError(
+            Problem(
+                where=configuration.where("machine"),
+                what="has no drawing of which poses could tell anything",
+                value=configuration.machine,
+                allowed="a machine with `geometry:`",
+            )
+        )
+    model = build_model(configuration.geometry, configuration.wiring)
+    stroke_mm = configuration.geometry.link_length_mm
+    box = reachable_box(model, stroke_mm)
+    if workspace_M_mm is not None:
+        low, high = np.array(workspace_M_mm, dtype=np.float64).T
+        box = box._replace(low=np.concatenate([low, box.low[3:]]), high=np.concatenate([high, box.high[3:]]))
+    noise = Noise(noise_um) if noise_urad is None else Noise(noise_um, noise_urad)
+    before = [one.rows.select(np.flatnonzero(one.usable.mask)) for one in measured]
+    study = PoseStudy(
+        model,
+        "position" if noise_urad is None else "pose",
+        noise,
+        stroke_mm,
+        box,
+        before=before[0].extended_by(*before[1:]) if before else None,
+    )
+    return study.plan(poses)
 
 
 def _opened(recordings: Recorded | Sequence[Recorded]) -> list[AlignedRecording]:

@@ -5,6 +5,9 @@ from .calibration import GrossPose as GrossPose
 from .calibration import HeldCombination as HeldCombination
 from .calibration import PoseErrors as PoseErrors
 from .calibration import TriedBlock as TriedBlock
+from .calibration_plan import CalibrationPlan as CalibrationPlan
+from .calibration_plan import Noise as Noise
+from .calibration_plan import PoseStudy as PoseStudy
 from .check import CalibrationCheck as CalibrationCheck
 from .check import NumberChange as NumberChange
 from .check import check_calibration as check_calibration
@@ -14,3 +17,7 @@ from .jacobian import scaled_jacobian as scaled_jacobian
 from .jacobian import without as without
 from .parameters import Parameters as Parameters
 from .parameters import calibration_parameters as calibration_parameters
+from .pose_candidates import Box as Box
+from .pose_candidates import PoseCandidates as PoseCandidates
+from .pose_candidates import reachable as reachable
+from .pose_candidates import reachable_box as reachable_box

@@ -36,6 +36,6 @@ def test_another_machine_is_refused_with_the_table_as_the_way_on(tmp_path: Path)
     run("machine", "new", "--kind", "6-ups", "--out", machine)
     done = run("machine", "export", machine, "--as", "klipper")
     assert isinstance(done.exception, CompdError)
-    with pytest.raises(CompdError, match="is no linear delta with upright rails(.|\n)*--as csv"):
+    with pytest.raises(CompdError, match=r"is no linear delta with upright rails(.|\n)*--as csv"):
         raise done.exception
     assert run("machine", "export", machine).exit_code == 0
