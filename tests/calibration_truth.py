@@ -1,4 +1,4 @@
-"""Calibrations of simulated machines whose every number is off by its tolerance, for `python -m tests.calibration_truth`.
+"""`python -m tests.calibration_truth`: calibrations of simulated machines whose every number is off by its tolerance.
 
 The machines are those of `compd.machine_kinds`. Truth is `compd.simulation`, which shares no code with the model: the
 numbers of a machine's YAML are changed, and readings and poses computed from them. Told are, pooled over machines:
@@ -22,15 +22,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import compd
-from compd.arrays import BoolArray, FloatArray, rms
-from compd.calibration import Calibration
-from compd.calibration.calibrate import calibrate
+from compd.arrays import FloatArray, rms
+from compd.calibration import calibrate
 from compd.calibration.machine_fit import fit_machine, registered_mm
 from compd.calibration.parameters import Parameters, calibration_parameters
 from compd.calibration.poses import MeasuredPoses
 from compd.configuration import load
 from compd.machine_kinds import KINDS, machine_text
-from compd.model.effects import FittedEffect
 from compd.simulation import Mechanism
 
 TOLERANCE_MM = 0.05
@@ -92,7 +90,11 @@ def built(path: Path, rng: np.random.Generator) -> World:
     drawn, real = (Mechanism(load(one).geometry) for one in (path, other))
     # where the actuators stand at machine zero is a number of its own, whatever the tip does there
     zero_mm = TOLERANCE_MM * rng.standard_normal(drawn.scales)
-    moved_mm = np.where(drawn.extended[drawn.link_of_scale], _first(drawn, drawn.lengths0_mm) - _first(real, real.lengths0_mm), _zeros(drawn) - _zeros(real))
+    moved_mm = np.where(
+        drawn.extended[drawn.link_of_scale],
+        _first(drawn, drawn.lengths0_mm) - _first(real, real.lengths0_mm),
+        _zeros(drawn) - _zeros(real),
+    )
     gain = TOLERANCE_MM / (2 * REACH_MM) * rng.standard_normal(drawn.scales)
     return World(drawn, real, gain, zero_mm, moved_mm)
 
@@ -104,7 +106,7 @@ def _first(mechanism: Mechanism, of_link: FloatArray) -> FloatArray:
 
 def _zeros(mechanism: Mechanism) -> FloatArray:
     """(m,) where the actuators stand with the tip at machine zero."""
-    return mechanism._zero_mm  # noqa: SLF001
+    return mechanism._zero_mm
 
 
 def poses(world: World, rng: np.random.Generator, count: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
@@ -124,7 +126,9 @@ def poses(world: World, rng: np.random.Generator, count: int) -> Iterator[tuple[
         yield reading, np.append(1.0, drawn.tip0_P) @ posture, posture[1:].T
 
 
-def record(path: Path, world: World, rng: np.random.Generator, count: int, noisy: bool, machine: str, pose: bool) -> Path:
+def record(
+    path: Path, world: World, rng: np.random.Generator, count: int, noisy: bool, machine: str, pose: bool
+) -> Path:
     """A recording in an instrument's frame, with a target of its own place and turn where it shows attitudes."""
     frame, body = Rotation.from_rotvec(rng.uniform(-1, 1, 3)), Rotation.from_rotvec(rng.uniform(-1, 1, 3))
     at, place_P = rng.uniform(-500, 500, 3), rng.uniform(-30, 30, 3) if pose else np.zeros(3)
@@ -139,7 +143,11 @@ def record(path: Path, world: World, rng: np.random.Generator, count: int, noisy
     names = [f"scale_{i + 1}_mm" for i in range(world.drawn.scales)] + [f"reference_{axis}_mm" for axis in "xyz"]
     names += [f"reference_q{part}" for part in "xyzw"] if pose else []
     path.write_text("\n".join([",".join(names), *lines]) + "\n", encoding="utf-8")
-    reference = {"quantity": "tool_pose" if pose else "tool_position", "frame": "instrument", "sigma_um": 1e3 * NOISE_MM}
+    reference = {
+        "quantity": "tool_pose" if pose else "tool_position",
+        "frame": "instrument",
+        "sigma_um": 1e3 * NOISE_MM,
+    }
     reference |= {"sigma_urad": 1e6 * NOISE_RAD} if pose else {}
     path.with_suffix(".yaml").write_text(yaml.safe_dump({"machine": machine, "reference": reference}), encoding="utf-8")
     return path
@@ -153,7 +161,7 @@ def truth(world: World, parameters: Parameters, model: Any) -> FloatArray:
     own["link_zero"] = np.where(
         extended,
         world.zero_mm[drawn.scale_of_link],
-        real._rods_mm - drawn._rods_mm,  # noqa: SLF001
+        real._rods_mm - drawn._rods_mm,
     )
     own["actuator_zero"] = world.zero_mm
     own["scale_gain"] = 1e6 * world.gain
@@ -161,13 +169,13 @@ def truth(world: World, parameters: Parameters, model: Any) -> FloatArray:
     own["base_joint_position"] = (real.still_joints_M - drawn.still_joints_M).ravel()
     own["platform_joint_position"] = (real.joints_P - drawn.joints_P).ravel()
     own["tool_offset"] = np.zeros(3)
-    ways = list(zip(drawn._ways, real._ways, strict=True))  # noqa: SLF001
-    u = np.array([a._cosine_B for a, _ in ways])  # noqa: SLF001
-    v = np.array([a._sine_B for a, _ in ways])  # noqa: SLF001
-    du = np.array([b._cosine_B - a._cosine_B for a, b in ways])  # noqa: SLF001
-    dv = np.array([b._sine_B - a._sine_B for a, b in ways])  # noqa: SLF001
-    radius = np.array([a._radius_mm for a, _ in ways])  # noqa: SLF001
-    own["crank_radius"] = np.array([b._radius_mm - a._radius_mm for a, b in ways])  # noqa: SLF001
+    ways = list(zip(drawn._ways, real._ways, strict=True))
+    u = np.array([a._cosine_B for a, _ in ways])
+    v = np.array([a._sine_B for a, _ in ways])
+    du = np.array([b._cosine_B - a._cosine_B for a, b in ways])
+    dv = np.array([b._sine_B - a._sine_B for a, b in ways])
+    radius = np.array([a._radius_mm for a, _ in ways])
+    own["crank_radius"] = np.array([b._radius_mm - a._radius_mm for a, b in ways])
     if (radius > 0).any():
         n = np.cross(u, v)
         own["actuator_direction"] = 1e6 * np.concatenate([(dv * n).sum(1), -(du * n).sum(1)])
@@ -209,9 +217,7 @@ def main() -> None:
                 learned = compd.open_recording(record(directory / "a.csv", world, rng, count, True, kind, pose), path)
                 other = compd.open_recording(record(directory / "b.csv", world, rng, 100, False, kind, pose), path)
                 result = calibrate([learned], [other])
-                parameters = calibration_parameters(
-                    learned.model, learned.rows, (), ["tool_offset"] if pose else []
-                )
+                parameters = calibration_parameters(learned.model, learned.rows, (), ["tool_offset"] if pose else [])
                 own = truth(world, parameters, learned.model)
                 for number, off in zip(result.numbers, own, strict=True):
                     if number.claimed:
@@ -229,8 +235,9 @@ def main() -> None:
         inside_all += inside
         print(
             f"{kind:13} 95 % hold {100 * np.mean(inside):5.1f} % of {len(inside)} claimed, "
-            f"{100 * np.mean(inside_needed):5.1f} % of {len(inside_needed)} needed; drawn {np.median(drawn_ratio):6.1f} um, "
-            f"calibrated {np.median(lengths):5.2f} um, over the truth's structure {np.median(ratios):.2f} (largest {np.max(ratios):.2f})"
+            f"{100 * np.mean(inside_needed):5.1f} % of {len(inside_needed)} needed; drawn "
+            f"{np.median(drawn_ratio):6.1f} um, calibrated {np.median(lengths):5.2f} um, over the truth's structure "
+            f"{np.median(ratios):.2f} (largest {np.max(ratios):.2f})"
             + (f"; scipy {np.median(plain):.2f}, with prior {np.median(with_prior):.2f}" if plain else ""),
             flush=True,
         )

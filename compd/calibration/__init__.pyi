@@ -1,10 +1,10 @@
-from .calibrate import calibrate as calibrate
 from .calibration import CalibratedNumber as CalibratedNumber
 from .calibration import Calibration as Calibration
 from .calibration import GrossPose as GrossPose
 from .calibration import HeldCombination as HeldCombination
 from .calibration import PoseErrors as PoseErrors
 from .calibration import TriedBlock as TriedBlock
+from .calibration_job import calibrate as calibrate
 from .check import CalibrationCheck as CalibrationCheck
 from .check import NumberChange as NumberChange
 from .check import check_calibration as check_calibration
