@@ -20,8 +20,8 @@ class CalibratedNumber(NamedTuple):
     """One number of the machine.
 
     name : as in model files, "base_joint_position.d_3x".  block : the effect's id.  element : "rod 3 base x".
-    unit : "mm", "ppm", "urad", or what the effect has.  drawing, value, std : in `unit`; drawing is 0 for what a drawing
-    states as perfect, a zero, a gain or a direction's error.  std : posterior, with the tolerance as prior.
+    unit : "mm", "ppm", "urad", or what the effect has.  drawing, value, std : in `unit`; drawing is 0 for what a
+    drawing states as perfect, a zero, a gain or a direction's error.  std : posterior, with the tolerance as prior.
     prior_std : before any pose was measured, of the tolerance.
     correlation, with_whom : the largest with another number of the fit, and that one's element; 0 and "" without one.
     needed : whether held-out poses are predicted better with its block; the number is the drawing's where it is not.
@@ -199,32 +199,34 @@ class Calibration:
 
     def as_json(self) -> dict[str, Any]:
         """What `compd calibrate --json` prints, as plain data; nan is None."""
-        return nan_to_null(
-            {
-                "machine": self.machine,
-                "recordings": list(self.recordings),
-                "verdict": self.verdict,
-                "numbers": [{**number._asdict(), "claimed": number.claimed} for number in self.numbers],
-                "covariance": self.covariance.tolist(),
-                "blocks": [block._asdict() for block in self.blocks],
-                **{
-                    part: [_errors_json(errors) for errors in getattr(self, part)]
-                    for part in ("learned", "held_out", "sealed")
-                },
-                "held": [
-                    {"words": one.words, "remedy": one.remedy, "share": one.share, "weights": one.weights.tolist()}
-                    for one in self.held
-                ],
-                "gross": [pose._asdict() for pose in self.gross],
-                "warnings": list(self.warnings),
-                "sigma_mm": self.sigma_mm.tolist(),
-                "in_links": self.in_links,
-                "noise_um": self.noise_um,
-                "noise_urad": self.noise_urad,
-                "left_over": self.left_over,
-                "diagnose_next": self.diagnose_next,
-                "prior_scale": self.prior_scale,
-            }
+        return dict(
+            nan_to_null(
+                {
+                    "machine": self.machine,
+                    "recordings": list(self.recordings),
+                    "verdict": self.verdict,
+                    "numbers": [{**number._asdict(), "claimed": number.claimed} for number in self.numbers],
+                    "covariance": self.covariance.tolist(),
+                    "blocks": [block._asdict() for block in self.blocks],
+                    **{
+                        part: [_errors_json(errors) for errors in getattr(self, part)]
+                        for part in ("learned", "held_out", "sealed")
+                    },
+                    "held": [
+                        {"words": one.words, "remedy": one.remedy, "share": one.share, "weights": one.weights.tolist()}
+                        for one in self.held
+                    ],
+                    "gross": [pose._asdict() for pose in self.gross],
+                    "warnings": list(self.warnings),
+                    "sigma_mm": self.sigma_mm.tolist(),
+                    "in_links": self.in_links,
+                    "noise_um": self.noise_um,
+                    "noise_urad": self.noise_urad,
+                    "left_over": self.left_over,
+                    "diagnose_next": self.diagnose_next,
+                    "prior_scale": self.prior_scale,
+                }
+            )
         )
 
     def __repr__(self) -> str:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import chdtri, ndtri
 
+from compd.arrays import BoolArray, FloatArray
 from compd.calibration.calibration import Calibration, PoseErrors
 from compd.calibration.jacobian import without
 from compd.calibration.machine_fit import whitened_poses
@@ -66,8 +67,8 @@ class CalibrationCheck(NamedTuple):
             return f"{error}; the calibration holds."
         if not self.changes:
             return (
-                f"{error}, {self.misfit**0.5:.2g} times what noise and the calibration's uncertainty make; no number of "
-                "the machine explains it: `compd diagnose` looks for its cause."
+                f"{error}, {self.misfit**0.5:.2g} times what noise and the calibration's uncertainty make; no number "
+                "of the machine explains it: `compd diagnose` looks for its cause."
             )
         return f"{error}; the calibration does not hold: {len(self.changes)} of its numbers changed."
 
@@ -101,7 +102,7 @@ def check_calibration(
         poses = replace(poses, to_links=to_links)
     now = poses.now(calibration.fitted)
     sigma_mm = calibration.sigma_mm
-    outlier = np.zeros(len(now.use), dtype=bool)
+    outlier: BoolArray = np.zeros(len(now.use), dtype=bool)
     part = whitened_poses(now, now.use, sigma_mm)
     both = without(np.column_stack([part.J, part.z]), part.R)
     use = np.flatnonzero([name.split(".")[0] in kept for name in parameters.names])
@@ -112,7 +113,8 @@ def check_calibration(
     inverse = np.linalg.inv(np.eye(len(d)) + J @ C @ J.T)
     limit = float(ndtri(1 - (1 - _CONFIDENCE) / 2 / len(use)))
     taken: list[int] = []
-    y, covariance = np.zeros(0), np.zeros((0, 0))
+    y: FloatArray = np.zeros(0)
+    covariance: FloatArray = np.zeros((0, 0))
     for _ in range(_MOST):
         left = d - J[:, taken] @ y
         weighted = inverse @ J

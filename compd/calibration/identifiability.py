@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.calibration.calibration import HeldCombination
 from compd.calibration.parameters import Parameters
 from compd.calibration.prior_fit import Normal
@@ -26,7 +26,9 @@ _MEMBERS, _MEMBER_SHARE = 4, 0.5
 _TOLD = 1.0
 
 _FRAME_REMEDY = "measure in the machine's own frame, or take the instrument's frame for the machine's: nothing is lost"
-_PLATFORM_REMEDY = "say where the target is on the platform (--hold target.place), or take it for the tip: nothing is lost"
+_PLATFORM_REMEDY = (
+    "say where the target is on the platform (--hold target.place), or take it for the tip: nothing is lost"
+)
 _MORE_POSES = "poses farther apart and more tilted, in the parts of the workspace that these leave out"
 
 
@@ -36,7 +38,9 @@ class _Motion(NamedTuple):
     vector: FloatArray
 
 
-def held_combinations(model: MachineModel, parameters: Parameters, C: FloatArray, prior: FloatArray, free: BoolArray) -> tuple[HeldCombination, ...]:
+def held_combinations(
+    model: MachineModel, parameters: Parameters, C: FloatArray, prior: FloatArray, free: BoolArray
+) -> tuple[HeldCombination, ...]:
     """C : (P, P) after the poses, prior : (P,) standard deviations before, both in tolerances. free : (P,) numbers of
     needed blocks."""
     place = np.flatnonzero(free)
@@ -80,19 +84,19 @@ def length_scale_is_told(model: MachineModel, parameters: Parameters, normal: No
 
 
 def _motions(model: MachineModel, parameters: Parameters) -> list[_Motion]:
-    """Motions of all base joints together, of all platform joints, and a growth of everything; in the effects' units."""
+    """Motions of all base joints, of all platform joints, and a growth of everything; in the effects' units."""
     base_mm, platform_mm = model.base_joints_at_0_M_mm, model.platform_joints_P_mm
     motions = []
     for block, joints_mm, words, remedy in (
         ("base_joint_position", base_mm, "all base joints together", _FRAME_REMEDY),
         ("platform_joint_position", platform_mm, "all platform joints together", _PLATFORM_REMEDY),
     ):
-        middle_mm = joints_mm.mean(axis=0)
-        for axis in range(3):
-            motions.append(_Motion(f"{words}, along {'xyz'[axis]}", remedy, _at(parameters, block, np.tile(np.eye(3)[axis], (len(joints_mm), 1)))))
-        for axis in range(3):
-            turned = np.cross(np.eye(3)[axis], joints_mm - middle_mm)
-            motions.append(_Motion(f"{words}, turned about {'xyz'[axis]}", remedy, _at(parameters, block, turned)))
+        lever_mm = joints_mm - joints_mm.mean(axis=0)
+        for axis, e in zip("xyz", np.eye(3), strict=True):
+            shifted = np.tile(e, (len(joints_mm), 1))
+            motions.append(_Motion(f"{words}, along {axis}", remedy, _at(parameters, block, shifted)))
+            turned = np.cross(e, lever_mm)
+            motions.append(_Motion(f"{words}, turned about {axis}", remedy, _at(parameters, block, turned)))
     motions.append(
         _Motion(
             "all places and lengths larger by one share",
@@ -133,7 +137,7 @@ def _members(weights: FloatArray, parameters: Parameters) -> str:
     return " ".join(said).removeprefix("+ ") + (f" and {more} others" if more > 0 else "")
 
 
-def _whole(direction: FloatArray, place: FloatArray, count: int) -> FloatArray:
+def _whole(direction: FloatArray, place: IntArray, count: int) -> FloatArray:
     weights = np.zeros(count)
     weights[place] = direction
     return weights

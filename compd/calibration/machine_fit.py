@@ -170,7 +170,9 @@ def _sigma_mm(now: PosesNow, use: BoolArray, numbers: float) -> FloatArray:
     for part in _sections(now, len(sigma)):
         stated = declared_mm[part]
         own = left_mm[:, part].size * dof / values
-        if np.isfinite(stated).all() and rms(sigma[part]) <= np.sqrt(float(fdtri(own, 1e9, _CONTRADICTS))) * rms(stated):
+        if np.isfinite(stated).all() and rms(sigma[part]) <= np.sqrt(float(fdtri(own, 1e9, _CONTRADICTS))) * rms(
+            stated
+        ):
             sigma[part] = stated
     return sigma
 

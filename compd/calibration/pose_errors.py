@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray, rms
+from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.calibration.calibration import PoseErrors
 from compd.calibration.held_out import Fold
 from compd.calibration.machine_fit import MachineFit, fit_machine, registered_mm
@@ -47,7 +47,11 @@ def _left_of_fold(now: PosesNow, learned: BoolArray, test: BoolArray) -> FloatAr
 
 def _errors(what: str, parts: Sequence[tuple[PosesNow, BoolArray, FloatArray, FloatArray]]) -> PoseErrors:
     """parts : of each recording its rows (N,) that count, and (N, m) before and after, mm."""
-    rows, places, before, after, links = [], [], [], [], ([], [])
+    rows: list[IntArray] = []
+    places: list[FloatArray] = []
+    before: list[FloatArray] = []
+    after: list[FloatArray] = []
+    links: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     lengths: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     angles: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     for now, use, *both in parts:

@@ -79,7 +79,9 @@ def normal_equations(parts: Sequence[Whitened]) -> Normal:
     return Normal(A, b)
 
 
-def fit_with_prior(normal: Normal, block_of: IntArray, free: BoolArray, considered: FloatArray | None = None) -> PriorFit:
+def fit_with_prior(
+    normal: Normal, block_of: IntArray, free: BoolArray, considered: FloatArray | None = None
+) -> PriorFit:
     """The numbers `free` (P,) of blocks `block_of` (P,), the others at the drawing.
 
     considered : (B,) scale of the tolerances of blocks that are not free, whose errors the covariance holds; 0 where

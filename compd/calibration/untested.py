@@ -24,9 +24,13 @@ MOST_TIMES = 3.0
 def untested_blocks(model: MachineModel, fit: MachineFit) -> dict[int, str]:
     """Why each block that cannot be tested cannot; {} where the poses spread in all directions."""
     used_mm = np.concatenate([now.aligned.rows.tip_M_mm[now.use] for now in fit.now])
-    middle_mm, directions, spread_mm = principal_directions(used_mm)
+    _, directions, spread_mm = principal_directions(used_mm)
     fixed = model.actuators.fixed[:3] == 1
-    thin = [k for k in range(3) if spread_mm[k] < THIN_SHARE * spread_mm[0] and np.abs(directions[k][fixed]).max(initial=0.0) > 0.5]
+    thin = [
+        k
+        for k in range(3)
+        if spread_mm[k] < THIN_SHARE * spread_mm[0] and np.abs(directions[k][fixed]).max(initial=0.0) > 0.5
+    ]
     found: dict[int, str] = {}
     for k in thin:
         away = directions[k] * spread_mm[0]
@@ -39,7 +43,9 @@ def untested_blocks(model: MachineModel, fit: MachineFit) -> dict[int, str]:
             own = np.flatnonzero(fit.parameters.block_of == b)
             x = fit.result.x[own]
             # a rigid motion that the registration takes from the poses here is taken elsewhere, too
-            moved, elsewhere = _without_motion(here[:, :, own] @ x, far[:, :, own] @ x, used_mm, np.concatenate([used_mm - away, used_mm + away]))
+            moved, elsewhere = _without_motion(
+                here[:, :, own] @ x, far[:, :, own] @ x, used_mm, np.concatenate([used_mm - away, used_mm + away])
+            )
             if rms(elsewhere) > MOST_TIMES * rms(moved):
                 found[b] = (
                     f"these poses are thin along ({', '.join(f'{v:.2f}' for v in directions[k])}), "

@@ -2,10 +2,10 @@
 
     python -m tests.benchmarks.bench_pose_plans
 
-Prints the table of docs/how-to/plan-poses-of-a-calibration.md. An instrument of 5 um, and of 5 urad for whole poses; the
+Prints the table of docs/how-to/calibrate-a-machine.md. An instrument of 5 um, and of 5 urad for whole poses; the
 machines of `compd machine new`, machined to 0.05 mm. The random poses are drawn 20 times from those that the exchange
-chooses from; the median is printed. The grid has as many levels as give 20 poses that are reached, of which 20 are taken
-evenly.
+chooses from; the median is printed. The grid has as many levels as give 20 poses that are reached, of which 20 are
+taken evenly.
 """
 
 from __future__ import annotations
@@ -67,9 +67,10 @@ def main() -> None:
             for kind in KINDS:
                 study = PoseStudy(machine(Path(directory), kind), measured, NOISE)
                 plan, grid = study.plan(POSES), on_a_grid(study)
+                O1 = plan.observability.O1, study.observability(grid).O1
                 print(
                     f"| {kind} | {measured} | {plan.tip_prior_um:.1f} | {plan.tip_std_um:.2f} | {random_um(study):.2f} "
-                    f"| {study.tip_std_um(grid):.2f} | {plan.observability.O1:.2f} | {study.observability(grid).O1:.2f} |"
+                    f"| {study.tip_std_um(grid):.2f} | {O1[0]:.2f} | {O1[1]:.2f} |"
                 )
 
 

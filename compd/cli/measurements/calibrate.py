@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from compd.calibration import Calibration
+    from compd.comparison import AlignedRecording
 
 
 def calibrate(
@@ -49,7 +50,7 @@ def calibrate(
     from compd.cli.progress import steps_shown
     from compd.comparison import open_recording
 
-    def opened(path: Path, stated: list[str] | None = None):  # noqa: ANN202
+    def opened(path: Path, stated: list[str] | None = None) -> AlignedRecording:
         return open_recording(path, machine, ranges=stated or (), hold=hold or ())
 
     learned = [opened(path, ranges) for path in recordings]
@@ -96,8 +97,8 @@ def _print(console: Console, calibration: Calibration) -> None:
     if calibration.held:
         console.print("These poses do not tell, and the drawing holds:")
     remedies: dict[str, list[str]] = {}
-    for one in calibration.held:
-        remedies.setdefault(one.remedy, []).append(one.words)
+    for held in calibration.held:
+        remedies.setdefault(held.remedy, []).append(held.words)
     for remedy, words in remedies.items():
         console.print(f"  {'; '.join(words)}. To tell it: {remedy}.")
     for pose in calibration.gross:

@@ -66,9 +66,10 @@ DRAWN = (
         id="crank_radius",
         ports=("base_joint",),
         physics="A crank is longer or shorter than the drawing says.",
-        equation="delta_i = d_s (cos(q/r) u + sin(q/r) v)",
+        equation="delta_i = d_s (cos f u + sin f v - f (cos f v - sin f u)), f = q/r",
         symbols={
-            "d_s": "error of the radius of the crank s of link i, um; the angle q/r is as read",
+            "d_s": "error of the radius of the crank s of link i, um; what its scale shows stays mm of arc",
+            "q, r": "where the actuator stands, mm of arc, and the drawn radius, mm",
             "u, v": "cosine and sine axis of the circle",
         },
         source=_SOURCE,
@@ -89,9 +90,7 @@ DRAWN = (
         },
         source=_SOURCE,
         needs=("revolute_axes",),
-        parameters=(
-            Parameter("v", "urad", -500, 500, "20 um over 40 mm of a hinge", "link", tolerance="tilt"),
-        ),
+        parameters=(Parameter("v", "urad", -500, 500, "20 um over 40 mm of a hinge", "link", tolerance="tilt"),),
         mistaken_for=("revolute_axis_tilt", "base_joint_position"),
         separated_by="the edges of the workspace",
         basis=KernelBasis(drawing.hinge_inclination),

@@ -81,13 +81,16 @@ def crank_radius(
     memory: FloatArray,
     basis: FloatArray,
 ) -> None:
+    """A scale shows mm of arc, so that with a larger radius the same reading is a smaller angle."""
     for i in range(row.links):
         s = machine.scale_of_link[i]
         if machine.kinds[s] == TURNS:
             angle = (machine.zero_actuator_mm[s] + row.scale_mm[s]) / machine.radius_mm[s]
+            cosine, sine = math.cos(angle), math.sin(angle)
             for j in range(3):
-                outwards = math.cos(angle) * machine.cosine_M[s, j] + math.sin(angle) * machine.sine_M[s, j]
-                basis[3 * i + j, s] = UM * outwards
+                outwards = cosine * machine.cosine_M[s, j] + sine * machine.sine_M[s, j]
+                onwards = cosine * machine.sine_M[s, j] - sine * machine.cosine_M[s, j]
+                basis[3 * i + j, s] = UM * (outwards - angle * onwards)
 
 
 @helper

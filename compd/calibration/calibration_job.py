@@ -54,7 +54,9 @@ def calibrate(
     fit = fit_machine(poses, parameters, free, considered=whole.result.scale)
     drawn = fit_machine(poses, parameters, np.zeros_like(free))
     fitted = parameters.split(fit.theta, fit.covariance, selection.needed)
-    order = np.concatenate([np.zeros(0, dtype=int), *(np.flatnonzero(parameters.block_of == b) for b in selection.needed)])
+    order = np.concatenate(
+        [np.zeros(0, dtype=int), *(np.flatnonzero(parameters.block_of == b) for b in selection.needed)]
+    )
     said("errors of held-out poses")
     held_out = tuple(
         errors_of_folds(what, fit, drawn, chosen)
