@@ -4,13 +4,10 @@ from .calibration import GrossPose as GrossPose
 from .calibration import HeldCombination as HeldCombination
 from .calibration import PoseErrors as PoseErrors
 from .calibration import TriedBlock as TriedBlock
-<<<<<<< HEAD
+from .calibration_job import calibrate as calibrate
 from .calibration_plan import CalibrationPlan as CalibrationPlan
 from .calibration_plan import Noise as Noise
 from .calibration_plan import PoseStudy as PoseStudy
-=======
-from .calibration_job import calibrate as calibrate
->>>>>>> hc
 from .check import CalibrationCheck as CalibrationCheck
 from .check import NumberChange as NumberChange
 from .check import check_calibration as check_calibration
