@@ -112,8 +112,8 @@ def amplification(mechanism: Mechanism, origin_M_mm: FloatArray, rotation_M_P: F
 def amplifications(mechanism: Mechanism, origin_M_mm: FloatArray, rotation_M_P: FloatArray) -> FloatArray:
     """(...) the amplification at poses (..., 3), (..., 3, 3); inf at a singularity and where a pose is not finite."""
     J = _scaled_rows(mechanism, origin_M_mm, rotation_M_P)
-    known = np.isfinite(J).all(axis=(-2, -1))
-    sizes = np.linalg.svd(np.where(known[..., None, None], J, 0.0), compute_uv=False)
+    known = np.asarray(np.isfinite(J).all(axis=(-2, -1)))
+    sizes: FloatArray = np.linalg.svd(np.where(known[..., None, None], J, 0.0), compute_uv=False)
     with np.errstate(divide="ignore"):
         return np.asarray(np.sqrt((1.0 / sizes**2).sum(axis=-1)))
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 
 from compd.api.arguments import Recorded, opened_recording
 from compd.api.measurements import Range
+from compd.built_machine import BuiltFiles, Provenance
+from compd.built_machine import write_built_machine as write_built_files
 from compd.calibration import Calibration, CalibrationPlan, Noise, PoseStudy, reachable_box
 from compd.calibration import calibrate as calibrate_aligned
 from compd.comparison import AlignedRecording
@@ -59,6 +63,49 @@ def calibrate(
     5.1
     """
     return calibrate_aligned(_opened(recordings), _opened(sealed), progress)
+
+
+def write_built_machine(
+    calibration: Calibration,
+    recordings: AlignedRecording | Sequence[AlignedRecording],
+    out: str | Path,
+    machine: Machine | None = None,
+) -> BuiltFiles:
+    """Write the machine as built: the configuration of the drawing with the numbers that a calibration has found.
+
+    Comments stay, each number that changes has the drawing's beside it, and the head says what it was learned from.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        What `calibrate` returned.
+    recordings : AlignedRecording or sequence of these
+        What it was learned from.
+    out : str or Path
+        The configuration to write, NAME.yaml. What no drawing states, such as gains of scales, goes into the model file
+        NAME-model.yaml, which the configuration names.
+    machine : str, Path or Configuration, optional
+        The drawing, as `load_machine` takes it; left out, the one of the recordings.
+
+    Returns
+    -------
+    BuiltFiles
+        The files, and the numbers that differ from the drawing's.
+
+    Raises
+    ------
+    ConfigurationError
+        Where `out` is the drawing's own file, or that file states its numbers so that they cannot be replaced.
+    """
+    learned = [recordings] if isinstance(recordings, AlignedRecording) else list(recordings)
+    drawing = load_machine(learned[0].recording.machine if machine is None else machine)
+    provenance = Provenance(
+        "compd calibrate",
+        datetime.now(UTC).isoformat(timespec="seconds"),
+        tuple((one.recording.path.name, one.recording.sha256) for one in learned),
+    )
+    covariance = calibration.fitted_covariance
+    return write_built_files(drawing, calibration.fitted, covariance, provenance, Path(out))
 
 
 def plan_calibration(

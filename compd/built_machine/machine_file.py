@@ -21,6 +21,11 @@ from compd.release import __version__
 
 # How the comment beside a changed number begins.
 REMARK = "drawing:"
+_HEAD = "# The machine as built, by"
+# What the first bytes of such a file contain.
+BUILT_MARK = _HEAD.encode()
+# Beyond three standard deviations a number is no matter of a tolerance.
+_DEVIATIONS = 3.0
 _MODEL_FILE: Location = ("state", "model_file")
 
 
@@ -106,7 +111,7 @@ def _same(stated: object, value: Value) -> bool:
 def _with_provenance(text: str, drawing: Path, provenance: Provenance, model_file: Path | None) -> str:
     """The text with where its numbers come from, below the comment with which it begins."""
     said = [
-        f"# The machine as built, by `{provenance.command}` of compd {__version__}, {provenance.date}.",
+        f"{_HEAD} `{provenance.command}` of compd {__version__}, {provenance.date}.",
         f"# Drawing: {drawing.name}; its number stands beside each that differs, after `{REMARK}`.",
         *(f"# Recording: {name}, sha256 {sha256}" for name, sha256 in provenance.recordings),
     ]
@@ -131,4 +136,14 @@ def _model(
         effects,
         np.asarray(covariance)[np.ix_(columns, columns)],
         geometry=machine.geometry_hash,
+        plausible={one.effect.id: _plausible(one, machine.geometry.links) for one in effects},
     )
+
+
+def _plausible(fitted: FittedEffect, links: int) -> dict[str, tuple[float, float]]:
+    """Ranges of an effect's numbers by their names: of a tolerance, which is a standard deviation, three times."""
+    return {
+        column.name: (_DEVIATIONS * column.parameter.low, _DEVIATIONS * column.parameter.high)
+        for column in fitted.effect.columns(links)
+        if column.parameter.rough
+    }

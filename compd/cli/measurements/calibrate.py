@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.cli.options import HoldOption, MachineOption, RangesOption
+from compd.cli.options import HoldOption, MachineOption, OverwriteOption, RangesOption
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,6 +37,17 @@ def calibrate(
     ] = None,
     ranges: RangesOption = None,
     hold: HoldOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="The machine as built: the configuration with the numbers found, NAME.yaml, and NAME-model.yaml with "
+            "what no drawing states, such as gains.",
+        ),
+    ] = None,
+    html: Annotated[Path | None, typer.Option("--html", help="Page (HTML) to write.")] = None,
+    overwrite: OverwriteOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
 ) -> None:
     """Learn how the machine is built: joints, lengths, zeros, gains, from its drawing and measured poses.
@@ -50,6 +61,16 @@ def calibrate(
     from compd.cli.progress import steps_shown
     from compd.comparison import open_recording
 
+    if html is not None:
+        from compd.report import check_page_path
+
+        check_page_path(html, overwrite)
+    if out is not None:
+        from compd.built_machine import BUILT_MARK
+        from compd.files import check_replaceable
+
+        check_replaceable(out, (BUILT_MARK,), "a machine as built", overwrite)
+
     def opened(path: Path, stated: list[str] | None = None) -> AlignedRecording:
         return open_recording(path, machine, ranges=stated or (), hold=hold or ())
 
@@ -59,6 +80,14 @@ def calibrate(
     with steps_shown(quiet=as_json) as progress:
         calibration = calibrate_aligned(learned, last, progress)
         checked = None if later is None else check_calibration(calibration, learned, later)
+    if out is not None:
+        from compd.api import write_built_machine
+
+        built = write_built_machine(calibration, learned, out, machine)
+    if html is not None:
+        from compd.report import write_calibration_page
+
+        write_calibration_page(html, calibration, "" if out is None else str(out))
     if as_json:
         data = {**calibration.as_json(), **({} if checked is None else {"check": checked.as_json()})}
         typer.echo(json.dumps(data, indent=1, allow_nan=False))
@@ -69,6 +98,9 @@ def calibrate(
         console.print(checked.verdict)
         for change in checked.changes:
             console.print(f"  {change.element}: {change.change:+.4g} +- {change.std:.2g} {change.unit}")
+    if out is not None:
+        beside = f", with {built.model} for what no drawing states" if built.model else ""
+        console.print(f"{built.machine}: the machine as built, {len(built.geometry.numbers)} numbers{beside}")
 
 
 def _print(console: Console, calibration: Calibration) -> None:
