@@ -33,8 +33,8 @@ def write_calibration_page(path: Path, calibration: Calibration, built: str = ""
     panels = [
         Panel(
             "Error before and after",
-            "At poses that took no part in the fit, and at those that did. Rms per coordinate of the tip; of links in "
-            "space of their lengths. After each instrument was registered.",
+            "As drawn, and calibrated: at poses that took no part in the fit, and in the last rows at those that did. "
+            "Rms per coordinate and per link, the largest in space. Each instrument is registered first.",
             _errors([*judged, *calibration.learned]),
         ),
         *_arrows(judged),
@@ -58,26 +58,26 @@ def write_calibration_page(path: Path, calibration: Calibration, built: str = ""
 
 
 def _errors(parts: Sequence[PoseErrors]) -> PageTable:
-    head = ("poses", "rows", "tip as drawn", "calibrated", "largest as drawn", "calibrated",
-            "attitude as drawn", "calibrated", "links as drawn", "calibrated")  # fmt: skip
+    head = ("poses", "rows", "tip, rms", "tip, largest", "attitude, rms", "links, rms")
     return PageTable(
         head,
         [
             [
                 one.what,
                 str(len(one.rows)),
-                _um(one.before_rms_um),
-                _um(one.after_rms_um),
-                _um(_largest_um(one.before_mm)),
-                _um(_largest_um(one.after_mm)),
-                _urad(one.before_rms_urad),
-                _urad(one.after_rms_urad),
-                _um(_rms_um(one.before_links_mm)),
-                _um(_rms_um(one.after_links_mm)),
+                _fall(_um(one.before_rms_um), _um(one.after_rms_um)),
+                _fall(_um(_largest_um(one.before_mm)), _um(_largest_um(one.after_mm))),
+                _fall(_urad(one.before_rms_urad), _urad(one.after_rms_urad)),
+                _fall(_um(_rms_um(one.before_links_mm)), _um(_rms_um(one.after_links_mm))),
             ]
             for one in parts
         ],
     )
+
+
+def _fall(before: str, after: str) -> str:
+    """As drawn, and calibrated."""
+    return "-" if before == after == "-" else f"{before} to {after}"
 
 
 def _arrows(parts: Sequence[PoseErrors]) -> Iterator[Panel]:
@@ -87,13 +87,13 @@ def _arrows(parts: Sequence[PoseErrors]) -> Iterator[Panel]:
         yield Panel("Errors of the tip", "The tip was not measured whole.", NOT_RECORDED)
         return
     reach_mm = max(float(np.ptp(one.place_mm[_known(one)], axis=0).max()) for one in shown) or 1.0
-    largest_mm = max(_largest_um(one.before_mm) for one in shown) / UM_PER_MM
-    enlarged = _round_down(ARROW_SHARE * reach_mm / max(largest_mm, 1e-9))
+    typical_mm = max(rms(np.linalg.norm(one.before_mm[_known(one)], axis=1)) for one in shown)
+    enlarged = _round_down(ARROW_SHARE * reach_mm / max(typical_mm, 1e-9))
     for one in shown:
         yield Panel(
             f"Errors of the tip: {one.what}",
-            f"Measured less modelled, enlarged {enlarged:g} times in both states and in all figures of this page. "
-            f"{STATES[0][0]} {_um(one.before_rms_um)}, {STATES[1][0]} {_um(one.after_rms_um)}, rms per coordinate.",
+            f"Measured less modelled, enlarged {enlarged:g} times in both states and in all figures of this page: "
+            f"{_um(one.before_rms_um)} as drawn, {_um(one.after_rms_um)} calibrated, rms per coordinate.",
             _arrow_figure(one, enlarged),
         )
 
@@ -123,7 +123,7 @@ def _arrow_figure(errors: PoseErrors, enlarged: float) -> Figure:
                 showlegend=False,
                 text=hover,
                 hoverinfo="text",
-                marker={"size": 3, "color": colour},
+                marker={"size": 2, "color": colour},
             )
         )
     style_figure(figure, "", "", 560)
@@ -157,8 +157,8 @@ def _numbers(calibration: Calibration) -> PageTable:
         [
             [
                 number.element,
-                f"{number.drawing:.6g}",
-                f"{number.value:.6g}",
+                _stated(number.drawing, number.unit),
+                _stated(number.value, number.unit),
                 f"{number.change:+.3g}",
                 f"{number.std:.2g}",
                 number.unit,
@@ -169,6 +169,11 @@ def _numbers(calibration: Calibration) -> PageTable:
             for number in calibration.numbers
         ],
     )
+
+
+def _stated(value: float, unit: str) -> str:
+    """A place to 0.1 um, any other number with four digits."""
+    return f"{value:.4f}" if unit == "mm" else f"{value:.4g}"
 
 
 def _blocks(calibration: Calibration) -> PageTable:
