@@ -16,7 +16,7 @@ from compd.calibration.parameters import Parameters, calibration_parameters
 from compd.calibration.pose_errors import errors_alone, errors_of_folds
 from compd.calibration.poses import MeasuredPoses, links_of_pose
 from compd.calibration.selection import Selection, select_blocks
-from compd.calibration.untested import untested_blocks
+from compd.calibration.untested import Untested, untested_blocks
 from compd.comparison import AlignedRecording, compare
 from compd.errors import CompdError, Problem
 from compd.model import MachineModel
@@ -48,7 +48,7 @@ def calibrate(
     whole = fit_machine(poses, parameters, everything)
     parts = folds(whole)
     untested = untested_blocks(model, whole)
-    selection = select_blocks(whole, parts, frozenset(untested), said)
+    selection = select_blocks(whole, parts, frozenset(untested.blocks), said)
     free = np.isin(parameters.block_of, selection.needed)
     said("the needed numbers")
     fit = fit_machine(poses, parameters, free, considered=whole.result.scale)
@@ -73,7 +73,7 @@ def calibrate(
         covariance=_in_units(parameters, fit.covariance),
         fitted=fitted,
         fitted_covariance=fit.covariance[np.ix_(order, order)],
-        blocks=_blocks(parameters, selection, untested),
+        blocks=_blocks(parameters, selection, untested.blocks),
         learned=tuple(
             errors_alone(one.aligned.recording.path.name, one, fitted, out)
             for one, out in zip(poses, fit.outlier, strict=True)
@@ -216,9 +216,11 @@ def _noise_um(fit: MachineFit) -> tuple[float, float]:
 
 
 def _warnings(
-    model: MachineModel, parameters: Parameters, fit: MachineFit, untested: dict[int, str], tolerance_mm: float
+    model: MachineModel, parameters: Parameters, fit: MachineFit, untested: Untested, tolerance_mm: float
 ) -> tuple[str, ...]:
-    said = [f"{parameters.blocks[b].words}: {why}" for b, why in untested.items()]
+    said = [f"{parameters.blocks[b].words}: {why}" for b, why in untested.blocks.items()]
+    if untested.thin:
+        said.append(f"{'; '.join(untested.thin)}: how far the prediction errs elsewhere, no pose of these tests.")
     if np.isnan(tolerance_mm):
         said.append(
             "the machine states no tolerance: numbers may leave the drawing by what the library thinks plausible. "
