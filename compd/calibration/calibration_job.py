@@ -10,7 +10,7 @@ import numpy as np
 from compd.arrays import FloatArray, rms
 from compd.calibration.calibration import CalibratedNumber, Calibration, GrossPose, TriedBlock
 from compd.calibration.held_out import Fold, folds
-from compd.calibration.identifiability import HELD_SHARE, held_combinations, length_scale_is_told
+from compd.calibration.identifiability import held_combinations, length_scale_is_told
 from compd.calibration.machine_fit import MachineFit, fit_machine, in_likelier_coordinates, registered_mm
 from compd.calibration.parameters import Parameters, calibration_parameters
 from compd.calibration.pose_errors import errors_alone, errors_of_folds
@@ -20,6 +20,10 @@ from compd.calibration.untested import Untested, untested_blocks
 from compd.comparison import AlignedRecording, compare
 from compd.errors import CompdError, Problem
 from compd.model import MachineModel
+
+# Standard deviation after over before, above which a single number counts as held at the drawing: a tolerance that is
+# wrong by a factor of two then moves it by less than its standard error.
+_TOLD_SHARE = 0.5
 
 
 def calibrate(
@@ -176,7 +180,7 @@ def _numbers(parameters: Parameters, fit: MachineFit, prior: FloatArray) -> tupl
                 correlation=size,
                 with_whom=parameters.elements[other] if size else "",
                 needed=bool(fit.free[k]),
-                held=bool(std[k] > HELD_SHARE * prior[k]),
+                held=bool(std[k] > _TOLD_SHARE * prior[k]),
             )
         )
     return tuple(numbers)

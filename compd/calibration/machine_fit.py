@@ -169,7 +169,7 @@ def _sigma_mm(now: PosesNow, use: BoolArray, numbers: float) -> FloatArray:
     left_mm = registered_mm(now, use)[0][use]
     values = left_mm.size
     dof = max(values - numbers - now.registration_mm.shape[2], _FEWEST_SHARE * values)
-    sigma = _scatter_mm(now, left_mm) * np.sqrt(values / dof)
+    sigma: FloatArray = _scatter_mm(now, left_mm) * np.sqrt(values / dof)
     declared_mm = _declared_mm(now, len(sigma))
     for part in _sections(now, len(sigma)):
         stated = declared_mm[part]

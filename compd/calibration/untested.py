@@ -28,7 +28,8 @@ _SMALLEST_MM = 1e-9
 
 
 class Untested(NamedTuple):
-    """blocks : why each block that cannot be tested cannot, by its place.  thin : in words, what the poses do not vary."""
+    """blocks : why each block that cannot be tested cannot, by its place.
+    thin : in words, what the poses do not vary."""
 
     blocks: dict[int, str]
     thin: tuple[str, ...]
