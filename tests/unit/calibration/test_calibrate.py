@@ -136,6 +136,6 @@ def test_recordings_of_two_machines_are_refused(tmp_path: Path) -> None:
     both = []
     for kind in ("6-ups", "3-spr"):
         world, rng = world_of(tmp_path, kind, seed=9)
-        both.append(opened(record(tmp_path / f"{kind}.csv", world, rng, 12)))
+        both.append(opened(record(tmp_path / f"day-{kind}.csv", world, rng, 12)))
     with pytest.raises(compd.CompdError, match="2 machines"):
         compd.calibrate(both)
