@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 
 import compd
 from compd.arrays import FloatArray, rms
-from compd.calibration import Parameters, calibration_parameters
+from compd.calibration import Parameters, calibration_parameters, without
 from compd.calibration.machine_fit import fit_machine, registered_mm
 from compd.calibration.poses import MeasuredPoses
 from compd.comparison import AlignedRecording
@@ -104,16 +104,23 @@ def _scipy_um(learned: AlignedRecording, other: AlignedRecording, parameters: Pa
     if learned.with_attitude:
         sigma[3:] = 1e3 * NOISE_RAD
 
-    def residual(x: FloatArray) -> FloatArray:
+    def both(x: FloatArray) -> FloatArray:
+        """Residual beside its derivatives, the registration projected out."""
         theta = np.zeros(count)
         theta[free] = x * parameters.prior_std[free]
         now = poses.now(parameters.split(theta, np.zeros((count, count)), range(len(parameters.blocks))))
-        R = (now.registration_mm[poses.use] / sigma[:, None]).reshape(-1, now.registration_mm.shape[2])
-        y = (now.residual_mm[poses.use] / sigma).ravel()
-        y = y - R @ np.linalg.lstsq(R, y, rcond=None)[0]
-        return np.concatenate([y, prior * x])
+        use = poses.use
+        R = (now.registration_mm[use] / sigma[:, None]).reshape(-1, now.registration_mm.shape[2])
+        J = (now.columns_mm[use] / sigma[:, None]).reshape(len(R), -1)[:, free]
+        return without(np.column_stack([(now.residual_mm[use] / sigma).ravel(), -J]), R)
 
-    found = least_squares(residual, np.zeros(int(free.sum())), x_scale="jac" if not prior else 1.0, max_nfev=30)
+    numbers = int(free.sum())
+    found = least_squares(
+        lambda x: np.concatenate([both(x)[:, 0], prior * x]),
+        np.zeros(numbers),
+        lambda x: np.concatenate([both(x)[:, 1:], prior * np.eye(numbers)]),
+        max_nfev=30,
+    )
     theta = np.zeros(count)
     theta[free] = found.x * parameters.prior_std[free]
     return _error_um(other, parameters, theta)

@@ -12,7 +12,7 @@ from compd.calibration.calibration import CalibratedNumber, Calibration, GrossPo
 from compd.calibration.held_out import Fold, folds
 from compd.calibration.identifiability import held_combinations, length_scale_is_told
 from compd.calibration.machine_fit import MachineFit, fit_machine, in_likelier_coordinates, registered_mm
-from compd.calibration.parameters import Parameters, calibration_parameters
+from compd.calibration.parameters import WORDS, Parameters, calibration_parameters
 from compd.calibration.pose_errors import errors_alone, errors_of_folds
 from compd.calibration.poses import MeasuredPoses, links_of_pose
 from compd.calibration.selection import Selection, select_blocks
@@ -30,11 +30,12 @@ def calibrate(
     recordings: Sequence[AlignedRecording],
     sealed: Sequence[AlignedRecording] = (),
     progress: Callable[[str], None] | None = None,
+    blocks: Sequence[str] = (),
 ) -> Calibration:
     """Numbers of a machine's drawing from recordings at rest, each with its own instrument, frame and noise.
 
     recordings : of one machine, whose drawing and tolerance all have.  sealed : looked at last.
-    progress : called with what is done.
+    progress : called with what is done.  blocks : ids of the effects that may be taken; all if empty.
     Raises CompdError where the recordings are of different machines or of none, or hold too few poses.
     """
     said = progress or (lambda _: None)
@@ -42,7 +43,18 @@ def calibrate(
     rows = recordings[0].rows.extended_by(*(one.rows for one in recordings[1:]))
     # a target whose place is fitted along takes what the place of the tip would be
     without = ["tool_offset"] if all(one.target is not None for one in recordings) else []
+    without += [name for name in WORDS if blocks and name not in blocks]
     parameters = calibration_parameters(model, rows, recordings[0].ranges, without)
+    if not parameters.names or not set(blocks) <= set(WORDS):
+        raise CompdError(
+            Problem(
+                where="blocks",
+                what="name no numbers of this machine's drawing",
+                value=", ".join(blocks),
+                allowed=", ".join(WORDS),
+                next_step="choose of these, or leave it out for all",
+            )
+        )
     said("derivatives")
     poses = [MeasuredPoses.of(one, parameters) for one in recordings]
     _check_rows(poses)
