@@ -24,6 +24,7 @@ def calibrate(
     recordings: Recorded | Sequence[Recorded],
     sealed: Recorded | Sequence[Recorded] = (),
     *,
+    blocks: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
 ) -> Calibration:
     """Learn how a machine is built, from its drawing and recordings of poses at rest.
@@ -39,6 +40,8 @@ def calibrate(
         has its own instrument, frame and noise; all are of one machine.
     sealed : AlignedRecording, str, Path or sequence of these
         Recordings that are looked at last, for a test of the result.
+    blocks : sequence of str
+        Ids of the effects whose numbers may be taken, such as ``"link_zero"``; left out, all of the drawing.
     progress : callable, optional
         Called with a text as each step begins.
 
@@ -62,7 +65,7 @@ def calibrate(
     >>> calibration.held_out[0].after_rms_um  # error of poses that were left out, um per coordinate
     5.1
     """
-    return calibrate_aligned(_opened(recordings), _opened(sealed), progress)
+    return calibrate_aligned(_opened(recordings), _opened(sealed), progress, blocks)
 
 
 def write_built_machine(

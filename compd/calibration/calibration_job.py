@@ -10,27 +10,32 @@ import numpy as np
 from compd.arrays import FloatArray, rms
 from compd.calibration.calibration import CalibratedNumber, Calibration, GrossPose, TriedBlock
 from compd.calibration.held_out import Fold, folds
-from compd.calibration.identifiability import HELD_SHARE, held_combinations, length_scale_is_told
+from compd.calibration.identifiability import held_combinations, length_scale_is_told
 from compd.calibration.machine_fit import MachineFit, fit_machine, in_likelier_coordinates, registered_mm
-from compd.calibration.parameters import Parameters, calibration_parameters
+from compd.calibration.parameters import WORDS, Parameters, calibration_parameters
 from compd.calibration.pose_errors import errors_alone, errors_of_folds
 from compd.calibration.poses import MeasuredPoses, links_of_pose
 from compd.calibration.selection import Selection, select_blocks
-from compd.calibration.untested import untested_blocks
+from compd.calibration.untested import Untested, untested_blocks
 from compd.comparison import AlignedRecording, compare
 from compd.errors import CompdError, Problem
 from compd.model import MachineModel
+
+# Standard deviation after over before, above which a single number counts as held at the drawing: a tolerance that is
+# wrong by a factor of two then moves it by less than its standard error.
+_TOLD_SHARE = 0.5
 
 
 def calibrate(
     recordings: Sequence[AlignedRecording],
     sealed: Sequence[AlignedRecording] = (),
     progress: Callable[[str], None] | None = None,
+    blocks: Sequence[str] = (),
 ) -> Calibration:
     """Numbers of a machine's drawing from recordings at rest, each with its own instrument, frame and noise.
 
     recordings : of one machine, whose drawing and tolerance all have.  sealed : looked at last.
-    progress : called with what is done.
+    progress : called with what is done.  blocks : ids of the effects that may be taken; all if empty.
     Raises CompdError where the recordings are of different machines or of none, or hold too few poses.
     """
     said = progress or (lambda _: None)
@@ -38,7 +43,18 @@ def calibrate(
     rows = recordings[0].rows.extended_by(*(one.rows for one in recordings[1:]))
     # a target whose place is fitted along takes what the place of the tip would be
     without = ["tool_offset"] if all(one.target is not None for one in recordings) else []
+    without += [name for name in WORDS if blocks and name not in blocks]
     parameters = calibration_parameters(model, rows, recordings[0].ranges, without)
+    if not parameters.names or not set(blocks) <= set(WORDS):
+        raise CompdError(
+            Problem(
+                where="blocks",
+                what="name no numbers of this machine's drawing",
+                value=", ".join(blocks),
+                allowed=", ".join(WORDS),
+                next_step="choose of these, or leave it out for all",
+            )
+        )
     said("derivatives")
     poses = [MeasuredPoses.of(one, parameters) for one in recordings]
     _check_rows(poses)
@@ -48,7 +64,7 @@ def calibrate(
     whole = fit_machine(poses, parameters, everything)
     parts = folds(whole)
     untested = untested_blocks(model, whole)
-    selection = select_blocks(whole, parts, frozenset(untested), said)
+    selection = select_blocks(whole, parts, frozenset(untested.blocks), said)
     free = np.isin(parameters.block_of, selection.needed)
     said("the needed numbers")
     fit = fit_machine(poses, parameters, free, considered=whole.result.scale)
@@ -73,7 +89,7 @@ def calibrate(
         covariance=_in_units(parameters, fit.covariance),
         fitted=fitted,
         fitted_covariance=fit.covariance[np.ix_(order, order)],
-        blocks=_blocks(parameters, selection, untested),
+        blocks=_blocks(parameters, selection, untested.blocks),
         learned=tuple(
             errors_alone(one.aligned.recording.path.name, one, fitted, out)
             for one, out in zip(poses, fit.outlier, strict=True)
@@ -176,7 +192,7 @@ def _numbers(parameters: Parameters, fit: MachineFit, prior: FloatArray) -> tupl
                 correlation=size,
                 with_whom=parameters.elements[other] if size else "",
                 needed=bool(fit.free[k]),
-                held=bool(std[k] > HELD_SHARE * prior[k]),
+                held=bool(std[k] > _TOLD_SHARE * prior[k]),
             )
         )
     return tuple(numbers)
@@ -216,9 +232,11 @@ def _noise_um(fit: MachineFit) -> tuple[float, float]:
 
 
 def _warnings(
-    model: MachineModel, parameters: Parameters, fit: MachineFit, untested: dict[int, str], tolerance_mm: float
+    model: MachineModel, parameters: Parameters, fit: MachineFit, untested: Untested, tolerance_mm: float
 ) -> tuple[str, ...]:
-    said = [f"{parameters.blocks[b].words}: {why}" for b, why in untested.items()]
+    said = [f"{parameters.blocks[b].words}: {why}" for b, why in untested.blocks.items()]
+    if untested.thin:
+        said.append(f"{'; '.join(untested.thin)}: how far the prediction errs elsewhere, no pose of these tests.")
     if np.isnan(tolerance_mm):
         said.append(
             "the machine states no tolerance: numbers may leave the drawing by what the library thinks plausible. "

@@ -130,7 +130,7 @@ def check_calibration(
             break
         taken.append(best)
         A = J[:, taken]
-        covariance = np.linalg.inv(A.T @ inverse @ A)
+        covariance = np.asarray(np.linalg.inv(A.T @ inverse @ A), dtype=np.float64)
         y = covariance @ (A.T @ inverse @ d)
     misfit = float(d @ inverse @ d) / dof
     changes = tuple(

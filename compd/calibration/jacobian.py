@@ -8,13 +8,14 @@ combination than the drawing does.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from compd.arrays import FloatArray
 from compd.calibration.parameters import Parameters
 from compd.comparison import AlignedRecording
-from compd.model import MachineModel, sensitivities, split_by_port
+from compd.model import Deltas, MachineModel, Prediction, sensitivities, split_by_port
 from compd.model.effects import Observations, Port, evaluate_basis
 from compd.statistics import column_norms
 
@@ -26,6 +27,44 @@ def measured_columns(aligned: AlignedRecording, parameters: Parameters) -> Float
     """(N, m, P) derivatives of a recording's measured coordinates, mm (a urad of an attitude as a um) per tolerance."""
     columns = [aligned.columns(block.effect, {})[:, :, block.used] for block in parameters.blocks]
     return np.concatenate(columns, axis=2) * parameters.prior_std
+
+
+def moved_to(aligned: AlignedRecording, prediction: Prediction, added: Deltas) -> AlignedRecording:
+    """The recording on the machine with what effects add, at the poses that are predicted so: for derivatives there.
+
+    Of a tool that stands on the plate, whose pose the prediction does not give, as drawn.
+    """
+    model, rows = aligned.model, aligned.rows
+    if model is None or model.arrangement.on_plate or not added:
+        return aligned
+    base_mm = _moved(rows.base_joints_M_mm, added.get("base_joint"))
+    joints_mm, axes, tool_mm = (
+        _moved(points, None if port not in added else added[port][0])
+        for points, port in (
+            (model.platform_joints_P_mm, "platform_joint"),
+            (model.revolute_axes_P, "revolute_axis"),
+            (model.arrangement.tool_mm, "tool"),
+        )
+    )
+    origin_mm = prediction.tip_mm - prediction.rotation_M_P @ tool_mm
+    links_mm = origin_mm[:, None] + joints_mm @ prediction.rotation_M_P.transpose(0, 2, 1) - base_mm
+    link_mm = np.linalg.norm(links_mm, axis=2)
+    moved = replace(
+        rows,
+        constants=rows.constants._replace(platform_joints_P_mm=joints_mm, revolute_axes_P=axes),
+        base_joints_M_mm=base_mm,
+        origin_M_mm=origin_mm,
+        rotation_M_P=prediction.rotation_M_P,
+        tip_M_mm=prediction.tip_mm,
+        link_mm=link_mm,
+        directions_M=links_mm / link_mm[:, :, None],
+    )
+    built = replace(model, platform_joints_P_mm=joints_mm, revolute_axes_P=axes)
+    return replace(aligned, model=built, rows=moved, _by_port={})
+
+
+def _moved(points: FloatArray, by: FloatArray | None) -> FloatArray:
+    return points if by is None else points + by.reshape(points.shape)
 
 
 def pose_columns(model: MachineModel, rows: Observations, parameters: Parameters) -> FloatArray:

@@ -2,7 +2,7 @@
 
 In each round every instrument is registered again to the prediction so far (`aligned_with`), the noise of lengths and
 of angles is taken from what is left, rows with an error that no noise explains are left out, and the linear problem of
-`prior_fit` gives the next numbers. The derivatives by the numbers are taken once, on the machine as drawn.
+`prior_fit` gives the next numbers. The derivatives are those of the machine with the numbers so far.
 """
 
 from __future__ import annotations
@@ -71,21 +71,25 @@ def fit_machine(
     free: BoolArray,
     considered: FloatArray | None = None,
     outlier: Sequence[BoolArray] | None = None,
+    start: MachineFit | None = None,
 ) -> MachineFit:
     """The numbers `free` (P,) of the parameters, the others as drawn.
 
     considered : as of `fit_with_prior`.  outlier : of each recording the rows to leave out; None to find them.
+    start : a fit of the same recordings, whose numbers to begin with and whose noise to keep.
     """
     count = len(parameters.names)
-    result = PriorFit(np.zeros(count), np.ones(0), np.zeros((count, count)))
+    result = PriorFit(np.zeros(count), np.ones(0), np.zeros((count, count))) if start is None else start.result
     out = [np.zeros(len(one.use), dtype=bool) for one in recordings] if outlier is None else list(outlier)
     blocks = sorted(set(parameters.block_of[free].tolist()))
     numbers = float(free.sum()) / len(recordings)
+    sigmas = [] if start is None else list(start.sigma_mm)
     for _ in range(_ROUNDS):
         effects = parameters.split(result.x * parameters.prior_std, np.zeros((count, count)), blocks)
         now = [one.now(effects) for one in recordings]
         rows = [one.use & ~left for one, left in zip(now, out, strict=True)]
-        sigmas = [_sigma_mm(one, use, numbers) for one, use in zip(now, rows, strict=True)]
+        if start is None:
+            sigmas = [_sigma_mm(one, use, numbers) for one, use in zip(now, rows, strict=True)]
         linear = [_whitened(one, use, sigma, result.x) for one, use, sigma in zip(now, rows, sigmas, strict=True)]
         new = fit_with_prior(normal_equations(linear), parameters.block_of, free, considered)
         change = float(np.abs(new.x - result.x).max(initial=0.0))
@@ -112,7 +116,7 @@ def registered_mm(now: PosesNow, use: BoolArray, sigma_mm: FloatArray | None = N
     r = np.zeros(R_mm.shape[2])
     sigma = np.ones(residual_mm.shape[1]) if sigma_mm is None else sigma_mm
     # urad and um have no size in common: each counts in the scatter that the registration leaves
-    for _ in range(1 if sigma_mm is not None or not R_mm.shape[2] else _WEIGHT_ROUNDS):
+    for _ in range(_WEIGHT_ROUNDS if sigma_mm is None and R_mm.shape[2] and len(_sections(now, len(sigma))) > 1 else 1):
         if sigma_mm is None:
             sigma = _scatter_mm(now, (residual_mm - R_mm @ r)[use])
         if R_mm.shape[2]:
@@ -125,7 +129,7 @@ def registered_mm(now: PosesNow, use: BoolArray, sigma_mm: FloatArray | None = N
 def whitened_poses(now: PosesNow, use: BoolArray, sigma_mm: FloatArray) -> Whitened:
     """What is left of rows `use` (N,) in standard deviations sigma_mm (w,), beside columns of numbers and
     registration."""
-    return _whitened(now, use, sigma_mm, np.zeros(now.poses.columns_mm.shape[2]))
+    return _whitened(now, use, sigma_mm, np.zeros(now.columns_mm.shape[2]))
 
 
 def _whitened(now: PosesNow, use: BoolArray, sigma_mm: FloatArray, x: FloatArray) -> Whitened:
@@ -165,7 +169,7 @@ def _sigma_mm(now: PosesNow, use: BoolArray, numbers: float) -> FloatArray:
     left_mm = registered_mm(now, use)[0][use]
     values = left_mm.size
     dof = max(values - numbers - now.registration_mm.shape[2], _FEWEST_SHARE * values)
-    sigma = _scatter_mm(now, left_mm) * np.sqrt(values / dof)
+    sigma: FloatArray = _scatter_mm(now, left_mm) * np.sqrt(values / dof)
     declared_mm = _declared_mm(now, len(sigma))
     for part in _sections(now, len(sigma)):
         stated = declared_mm[part]

@@ -129,8 +129,8 @@ def _print(console: Console, calibration: Calibration) -> None:
     if calibration.held:
         console.print("These poses do not tell, and the drawing holds:")
     remedies: dict[str, list[str]] = {}
-    for held in calibration.held:
-        remedies.setdefault(held.remedy, []).append(held.words)
+    for combination in calibration.held:
+        remedies.setdefault(combination.remedy, []).append(combination.words)
     for remedy, words in remedies.items():
         console.print(f"  {'; '.join(words)}. To tell it: {remedy}.")
     for pose in calibration.gross:
