@@ -218,4 +218,5 @@ def _short_way(candidates: PoseCandidates, chosen: IntArray, start_M_mm: FloatAr
 
 def _row(poses: PoseCandidates, k: int, turned: bool, scales: int) -> dict[str, Any]:
     turns = dict(zip(TURN_COLUMNS, poses.turn_rad[k].tolist(), strict=True)) if turned else {}
-    return plan_row("calibration, at rest", 0.0, poses.tip_M_mm[k].tolist(), {}, [0.0] * scales, 0.0, turns)
+    row = plan_row("calibration, at rest", 0.0, poses.tip_M_mm[k].tolist(), {}, [0.0] * scales, 0.0, turns)
+    return {"row": k + 1, **row}

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import compd
 from compd.cli.app import app
 from compd.machine_check import load_whole
-from tests.calibration_truth import built, drawing, record
+from tests.support.built_machines import built, drawing, record
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     machine = drawing("6-ups", directory)
     world = built(machine, rng)
     for name, count in (("learn", 60), ("friday", 30)):
-        record(directory / f"{name}.csv", world, rng, count, True, "6-ups", True)
+        record(directory / f"{name}.csv", world, rng, count)
     arguments = ["--machine", machine, "--sealed", directory / "friday.csv", "--out", directory / "as-built.yaml"]
     arguments += ["--html", directory / "page.html"]
     done = CliRunner().invoke(app, ["calibrate", str(directory / "learn.csv"), *map(str, arguments)])
