@@ -81,6 +81,7 @@ def calibrate(
     )
     prior = whole.result.scale[parameters.block_of]
     noise_um, noise_urad = _noise_um(fit)
+    registered = any(one.registration is not None for one in recordings)
     left = held_out[0].after_rms_um
     return Calibration(
         machine=recordings[0].recording.machine,
@@ -104,7 +105,7 @@ def calibrate(
             )
             for one in sealed
         ),
-        held=held_combinations(model, parameters, fit.result.C, prior, free),
+        held=held_combinations(model, parameters, fit.result.C, prior, free, registered),
         gross=_gross(fit),
         warnings=_warnings(model, parameters, fit, untested, rows.constants.tolerance_mm),
         noise_um=noise_um,

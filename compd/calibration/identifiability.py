@@ -39,10 +39,15 @@ class _Motion(NamedTuple):
 
 
 def held_combinations(
-    model: MachineModel, parameters: Parameters, C: FloatArray, prior: FloatArray, free: BoolArray
+    model: MachineModel,
+    parameters: Parameters,
+    C: FloatArray,
+    prior: FloatArray,
+    free: BoolArray,
+    registered: bool,
 ) -> tuple[HeldCombination, ...]:
     """C : (P, P) after the poses, prior : (P,) standard deviations before, both in tolerances. free : (P,) numbers of
-    needed blocks."""
+    needed blocks.  registered : whether an instrument's frame was fitted along."""
     place = np.flatnonzero(free)
     if not len(place):
         return ()
@@ -62,7 +67,8 @@ def held_combinations(
             continue
         direction = open_ @ inside / np.linalg.norm(inside)
         share = float(np.sqrt(np.sum((inside / np.linalg.norm(inside)) ** 2 * open_shares**2)))
-        result.append(HeldCombination(motion.words, motion.remedy, _whole(direction, place, len(prior)), share))
+        remedy = motion.remedy if registered else _MORE_POSES
+        result.append(HeldCombination(motion.words, remedy, _whole(direction, place, len(prior)), share))
         # what is left of the held space beside this motion
         rest = np.linalg.svd((inside / np.linalg.norm(inside))[None, :])[2][1:]
         open_shares = np.sqrt((rest**2) @ (open_shares**2))
