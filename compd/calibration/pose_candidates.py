@@ -12,7 +12,7 @@ from compd.errors import CompdError, Problem
 from compd.machine_reach import amplification, amplifications, machine_reach
 from compd.model import MachineModel, observe
 from compd.model.effects import Observations
-from compd.model.kinematics import ActuatedPose, Mechanism, Movement, inverse_by_actuators, links_at
+from compd.model.kinematics import Mechanism, Movement, Pose, inverse_by_actuators, links_at
 from compd.rotation import compose, rotation_matrix, to_outer
 
 # Of the way to a singularity or to the end of the reach along one coordinate, so much is used: several coordinates are
@@ -125,7 +125,7 @@ def reachable(model: MachineModel, poses: FloatArray, stroke_mm: tuple[float, fl
     actuator_mm = np.broadcast_to(zero.actuator_mm, (len(poses), model.scales))
     good = np.ones(len(poses), dtype=bool)
     at_rest = inverse_by_actuators(mechanism, model.actuators, *zero.contact, zero.rotation_M_P, zero.actuator_mm)
-    sides = np.sign(_transmission(model, at_rest))
+    sides = np.sign(_transmission(model, at_rest.pose, at_rest.actuator_mm, at_rest.base_joints_M_mm))
     # followed from machine zero, so that no way crosses a singularity into another assembly
     for share in np.arange(1, _STEPS + 1) / _STEPS:
         found = inverse_by_actuators(
@@ -138,7 +138,9 @@ def reachable(model: MachineModel, poses: FloatArray, stroke_mm: tuple[float, fl
         )
         here, pose = mechanism._replace(base_joints_M_mm=found.base_joints_M_mm), found.pose
         good &= (pose.reason == 0) & (amplifications(here, pose.origin_M_mm, pose.rotation_M_P) <= most)
-        good &= (sides * _transmission(model, found) >= _LEAST_TRANSMISSION).all(axis=1)
+        good &= (
+            sides * _transmission(model, pose, found.actuator_mm, found.base_joints_M_mm) >= _LEAST_TRANSMISSION
+        ).all(axis=1)
         actuator_mm = np.where(good[:, None], found.actuator_mm, zero.actuator_mm)
     good &= (np.abs(actuator_mm - zero.actuator_mm) <= _stroke_mm(model)).all(axis=1)
     if stroke_mm is not None:
@@ -159,18 +161,15 @@ def _stroke_mm(model: MachineModel) -> float:
     return _STROKE_SHARE * float(model.zero.link_length_mm.mean())
 
 
-def _transmission(model: MachineModel, at: ActuatedPose) -> FloatArray:
+def _transmission(model: MachineModel, pose: Pose, actuator_mm: FloatArray, base_joints_M_mm: FloatArray) -> FloatArray:
     """(..., n) how much of an actuator's motion goes along its rod; 1 where it makes the rod longer.
 
     At 0 the actuator stands still however the platform moves, and a pose has two places of the actuator beyond.
     """
-    ends_M_mm = to_outer(
-        at.pose.rotation_M_P[..., None, :, :], at.pose.origin_M_mm[..., None, :], model.platform_joints_P_mm
-    )
-    rods = (ends_M_mm - at.base_joints_M_mm) / at.pose.link_length_mm[..., None]
+    ends_M_mm = to_outer(pose.rotation_M_P[..., None, :, :], pose.origin_M_mm[..., None, :], model.platform_joints_P_mm)
+    rods = (ends_M_mm - base_joints_M_mm) / pose.link_length_mm[..., None]
     ahead, behind = (
-        links_at(model.actuators, model.base_joints_at_0_M_mm, at.actuator_mm + step)[0]
-        for step in (_STEP_MM, -_STEP_MM)
+        links_at(model.actuators, model.base_joints_at_0_M_mm, actuator_mm + step)[0] for step in (_STEP_MM, -_STEP_MM)
     )
     along = ((ahead - behind) / (2 * _STEP_MM) * rods).sum(axis=-1)
     return np.where(model.extended, 1.0, along)

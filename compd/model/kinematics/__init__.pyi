@@ -1,5 +1,4 @@
 from .actuators import ACTUATOR_KINDS as ACTUATOR_KINDS
-from .actuators import ActuatedPose as ActuatedPose
 from .actuators import Actuators as Actuators
 from .actuators import inverse_by_actuators as inverse_by_actuators
 from .actuators import links_at as links_at
