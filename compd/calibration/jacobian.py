@@ -23,9 +23,17 @@ from compd.statistics import column_norms
 _IDLE = 1e-9
 
 
-def measured_columns(aligned: AlignedRecording, parameters: Parameters) -> FloatArray:
-    """(N, m, P) derivatives of a recording's measured coordinates, mm (a urad of an attitude as a um) per tolerance."""
-    columns = [aligned.columns(block.effect, {})[:, :, block.used] for block in parameters.blocks]
+def measured_columns(
+    aligned: AlignedRecording, parameters: Parameters, as_read: Observations | None = None
+) -> FloatArray:
+    """(N, m, P) derivatives of a recording's measured coordinates, mm (a urad of an attitude as a um) per tolerance.
+
+    as_read : rows from which the effects are computed, where those of the recording are moved; see `moved_to`.
+    """
+    columns = []
+    for block in parameters.blocks:
+        basis, _ = evaluate_basis(block.effect, aligned.rows if as_read is None else as_read, {}, None)
+        columns.append(aligned.propagated(block.effect, basis)[:, :, block.used])
     return np.concatenate(columns, axis=2) * parameters.prior_std
 
 
@@ -38,6 +46,9 @@ def moved_to(aligned: AlignedRecording, prediction: Prediction, added: Deltas) -
     if model is None or model.arrangement.on_plate or not added:
         return aligned
     base_mm = _moved(rows.base_joints_M_mm, added.get("base_joint"))
+    # what actuators that slide or turn carry goes with their readings
+    scale_mm = _moved(rows.scale_mm, added.get("scale"))
+    base_mm = base_mm + _carried_mm(model, scale_mm) - _carried_mm(model, rows.scale_mm)
     joints_mm, axes, tool_mm = (
         _moved(points, None if port not in added else added[port][0])
         for points, port in (
@@ -52,6 +63,7 @@ def moved_to(aligned: AlignedRecording, prediction: Prediction, added: Deltas) -
     moved = replace(
         rows,
         constants=rows.constants._replace(platform_joints_P_mm=joints_mm, revolute_axes_P=axes),
+        scale_mm=scale_mm,
         base_joints_M_mm=base_mm,
         origin_M_mm=origin_mm,
         rotation_M_P=prediction.rotation_M_P,
@@ -61,6 +73,12 @@ def moved_to(aligned: AlignedRecording, prediction: Prediction, added: Deltas) -
     )
     built = replace(model, platform_joints_P_mm=joints_mm, revolute_axes_P=axes)
     return replace(aligned, model=built, rows=moved, _by_port={})
+
+
+def _carried_mm(model: MachineModel, scale_mm: FloatArray) -> FloatArray:
+    """(N, n, 3) base joints on the frame as at machine zero, with the scales at (N, m)."""
+    mechanism, _ = model.links_on(model.frame.zero_rotation_M_B, model.base_joints_at_0_M_mm, scale_mm)
+    return mechanism.base_joints_M_mm
 
 
 def _moved(points: FloatArray, by: FloatArray | None) -> FloatArray:

@@ -50,7 +50,7 @@ class MeasuredPoses:
         registration_mm = aligned.registration_columns
         columns_mm = self.columns_mm
         if fitted:
-            columns_mm = measured_columns(moved_to(aligned, prediction, added), self.parameters)
+            columns_mm = measured_columns(moved_to(aligned, prediction, added), self.parameters, aligned.rows)
         finite = np.isfinite(residual_mm).all(axis=1) & np.isfinite(registration_mm).all(axis=(1, 2))
         use = self.use & finite & np.isfinite(columns_mm).all(axis=(1, 2))
         return PosesNow(self, aligned, residual_mm, registration_mm, columns_mm, use)

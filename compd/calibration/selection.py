@@ -11,9 +11,9 @@ from compd.arrays import BoolArray
 from compd.calibration.held_out import Fold, HeldOut, held_out
 from compd.calibration.machine_fit import MachineFit
 
-# By how much a block must lower the sum of the logarithms of the two mean squares: by 1 % of the error in each, more
-# than the held-out errors of some hundred values move by chance when a number of no use is added.
-LEAST_FALL = 0.04
+# By how much a block must lower the sum of the logarithms of the two mean squares, half a percent of the error in each:
+# a number of no use moves the held-out errors of some hundred values by less.
+LEAST_FALL = 0.02
 
 
 class Selection(NamedTuple):
