@@ -1,3 +1,6 @@
+from .api.calibration import calibrate as calibrate
+from .api.calibration import plan_calibration as plan_calibration
+from .api.calibration import write_built_machine as write_built_machine
 from .api.diagnosis import compare as compare
 from .api.diagnosis import diagnose as diagnose
 from .api.long_recordings import compare_stream as compare_stream

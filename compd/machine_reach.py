@@ -106,9 +106,16 @@ def machine_reach(model: MachineModel, stroke_mm: tuple[float, float] | None = N
 
 def amplification(mechanism: Mechanism, origin_M_mm: FloatArray, rotation_M_P: FloatArray) -> float:
     """See the module's docstring; inf at a singularity."""
+    return float(amplifications(mechanism, origin_M_mm, rotation_M_P))
+
+
+def amplifications(mechanism: Mechanism, origin_M_mm: FloatArray, rotation_M_P: FloatArray) -> FloatArray:
+    """(...) the amplification at poses (..., 3), (..., 3, 3); inf at a singularity and where a pose is not finite."""
     J = _scaled_rows(mechanism, origin_M_mm, rotation_M_P)
-    sizes = np.linalg.svd(J, compute_uv=False)
-    return float(np.sqrt((1.0 / sizes**2).sum())) if sizes[-1] > 0 else np.inf
+    known = np.asarray(np.isfinite(J).all(axis=(-2, -1)))
+    sizes: FloatArray = np.linalg.svd(np.where(known[..., None, None], J, 0.0), compute_uv=False)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.sqrt((1.0 / sizes**2).sum(axis=-1)))
 
 
 def dependent_rows(
@@ -146,13 +153,13 @@ def dependences_as_drawn(parts: MachineParts) -> tuple[tuple[str, ...], ...]:
 
 
 def _scaled_rows(mechanism: Mechanism, origin_M_mm: FloatArray, rotation_M_P: FloatArray) -> FloatArray:
-    """(6, 6) derivatives of the closure's rows by displacement, and by rotation times the platform's radius."""
+    """(..., 6, 6) derivatives of the closure's rows by displacement, and by rotation times the platform's radius."""
     closure = closure_at(mechanism, origin_M_mm, rotation_M_P)
     joints = mechanism.platform_joints_P_mm
     radius_mm = np.sqrt(((joints - joints.mean(axis=0)) ** 2).sum(axis=1).mean())
-    by_displacement = np.concatenate([closure.length_by_displacement, closure.offset_by_displacement])
-    by_rotation = np.concatenate([closure.length_by_rotation_mm, closure.offset_by_rotation_mm])
-    return np.concatenate([by_displacement, by_rotation / radius_mm], axis=1)
+    by_displacement = np.concatenate([closure.length_by_displacement, closure.offset_by_displacement], axis=-2)
+    by_rotation = np.concatenate([closure.length_by_rotation_mm, closure.offset_by_rotation_mm], axis=-2)
+    return np.concatenate([by_displacement, by_rotation / radius_mm], axis=-1)
 
 
 def _within(model: MachineModel, lengths_mm: FloatArray, stroke_mm: Sequence[float]) -> bool:

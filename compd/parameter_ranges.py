@@ -123,6 +123,7 @@ def _ranged(parameter: Parameter, rows: Observations, stated: StatedRange | None
     size_mm, what = {
         "place": (1.0, ""),
         "gain": (_stroke_mm(rows), " / stroke"),
+        "gain_change": (_stroke_mm(rows) ** 2, " / stroke^2"),
         "tilt": (_radius_mm(rows), " / radius of the platform joints"),
     }[parameter.tolerance]
     largest = (

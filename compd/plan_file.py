@@ -7,6 +7,7 @@ CSV with one row per measurement, a header, `.` decimal, UTF-8:
 | `row`, `purpose` | number from 1, and what the row is for; both for the reader |
 | `time_s` | seconds from the start of a programme; a time that does not rise begins a new programme |
 | `tip_x_mm`, `tip_y_mm`, `tip_z_mm` | where the tool's tip is to be, in {M} |
+| `turn_x_rad`, `turn_y_rad`, `turn_z_rad` | turn since machine zero, a rotation vector in {M}; 0 if left out |
 | `<name>_<unit>` | a quantity that is held meanwhile: temperature_room_degC, force_x_N, ... |
 | `approach_<i>` | +1/-1: the direction in which link i comes to the place; 0: as it comes |
 | `speed_mm_per_s` | speed of the fastest link while it passes the place; 0: at rest |
@@ -24,6 +25,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from compd.columns import approach_columns
@@ -32,6 +34,7 @@ from compd.files import write_files
 
 PURPOSE_COLUMN = "purpose"
 TIP_COLUMNS = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
+TURN_COLUMNS = ("turn_x_rad", "turn_y_rad", "turn_z_rad")
 SPEED_COLUMN = "speed_mm_per_s"
 NEEDED_COLUMNS = ("time_s", *TIP_COLUMNS)
 # Columns without a setting: time, and text for the reader.
@@ -46,15 +49,18 @@ def plan_row(
     quantities: Mapping[str, float],
     approach: Sequence[float],
     speed_mm_per_s: float,
+    turns_rad: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """One row by column, rounded to settable values.
 
-    tip_M_mm : (3,). quantities : name with unit -> value to hold. approach : (n,) +1, -1 or 0.
+    tip_M_mm : (3,). turns_rad : by TURN_COLUMNS; empty where the attitude is that of machine zero.
+    quantities : name with unit -> value to hold. approach : (n,) +1, -1 or 0.
     """
     return {
         PURPOSE_COLUMN: purpose,
         "time_s": round(float(time_s), 1),
         **{name: round(float(value), 3) for name, value in zip(TIP_COLUMNS, tip_M_mm, strict=True)},
+        **{name: round(float(value), 6) for name, value in turns_rad.items()},
         **{name: round(float(value), 3) for name, value in quantities.items()},
         **{name: int(sign) for name, sign in zip(approach_columns(len(approach)), approach, strict=True)},
         SPEED_COLUMN: round(float(speed_mm_per_s), 2),
@@ -132,6 +138,7 @@ class _PlanFileReader:
         self._limits: Mapping[str, tuple[float, float]] = {
             "time_s": (0.0, math.inf),
             **dict.fromkeys(TIP_COLUMNS, (-math.inf, math.inf)),
+            **dict.fromkeys(TURN_COLUMNS, (-math.pi, math.pi)),
             **limits,
             **dict.fromkeys(self._approaches, (-1.0, 1.0)),
         }

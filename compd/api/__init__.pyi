@@ -1,3 +1,6 @@
+from .calibration import calibrate as calibrate
+from .calibration import plan_calibration as plan_calibration
+from .calibration import write_built_machine as write_built_machine
 from .diagnosis import compare as compare
 from .diagnosis import diagnose as diagnose
 from .long_recordings import LongRecording as LongRecording

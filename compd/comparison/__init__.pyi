@@ -1,8 +1,8 @@
+from .alignment.align_recording import aligned_with as aligned_with
 from .alignment.aligned_recording import AlignedRecording as AlignedRecording
 from .comparison import Comparison as Comparison
 from .covariate import Covariate as Covariate
 from .covariate import covariates as covariates
-from .covariate import why_no_covariate as why_no_covariate
 from .criteria import ComparisonCriteria as ComparisonCriteria
 from .effect_fit import FitResult as FitResult
 from .effect_fit import fit as fit

@@ -38,6 +38,23 @@ class Covariate(NamedTuple):
     values: FloatArray
     link: int = 0
 
+    @staticmethod
+    def why_none(name: str, values: FloatArray) -> str:
+        """Why nothing can depend on a measured quantity, in words; "" where something can.
+
+        A label is a whole number without unit that names rows or counts up by ones through the recording, as a column
+        `star_1` or `run_1` does: everything that changed in time follows it. Two values, off and on, are no label.
+
+        values : (R,) those that are known.
+        """
+        if name.startswith(DERIVATIVE):
+            return "a derivative of the model's prediction, which belongs to an effect"
+        if unit_of(name) in _PURE and (values == np.rint(values)).all():
+            counts = len(np.unique(values)) > 2 and bool(np.isin(np.diff(values), (0.0, 1.0)).all())
+            if counts or _LABEL_WORDS & set(name.lower().split("_")):
+                return "only counts or names rows"
+        return ""
+
 
 def covariates(aligned: AlignedRecording) -> list[Covariate]:
     """Time, the tip's place, every measured quantity, gradients of temperature, each link's length and direction."""
@@ -49,7 +66,7 @@ def covariates(aligned: AlignedRecording) -> list[Covariate]:
         if np.isfinite(column).any()
     ]
     for name, column in quantities.items():
-        if why_no_covariate(name, column[np.isfinite(column)]):
+        if Covariate.why_none(name, column[np.isfinite(column)]):
             continue
         unit = unit_of(name)
         if link := _link_of_approach(name):
@@ -69,23 +86,6 @@ def covariates(aligned: AlignedRecording) -> list[Covariate]:
         for i, direction in enumerate(recording.approach.T, start=1):
             result.append(Covariate(f"direction of link {i}", "1", direction, i))
     return result
-
-
-def why_no_covariate(name: str, values: FloatArray) -> str:
-    """Why nothing can depend on a measured quantity, in words; "" where something can.
-
-    A label is a whole number without unit that names rows or counts up by ones through the recording, as a column
-    `star_1` or `run_1` does: everything that changed in time follows it. Two values, off and on, are no label.
-
-    values : (R,) those that are known.
-    """
-    if name.startswith(DERIVATIVE):
-        return "a derivative of the model's prediction, which belongs to an effect"
-    if unit_of(name) in _PURE and (values == np.rint(values)).all():
-        counts = len(np.unique(values)) > 2 and bool(np.isin(np.diff(values), (0.0, 1.0)).all())
-        if counts or _LABEL_WORDS & set(name.lower().split("_")):
-            return "only counts or names rows"
-    return ""
 
 
 def _link_of_approach(name: str) -> int:

@@ -41,9 +41,9 @@ def open_recording(
         The recording, NAME.csv or NAME.parquet; its sidecar NAME.yaml lies beside it. The sidecar says which machine
         it is, and what the reference instrument measured.
     machine : str, Path or Configuration, optional
-        The machine as `load_machine` takes it. Left out, the configuration that comes with compd under the name in
-        the sidecar; with ``machine: external`` in the sidecar there is none, and the prediction of your own model is
-        read from the columns ``model_x_mm`` ...
+        The machine as `load_machine` takes it. Left out, the configuration that the sidecar names as `machine_file:`,
+        or that comes with compd under the name in the sidecar; with ``machine: external`` in the sidecar there is none,
+        and the prediction of your own model is read from the columns ``model_x_mm`` ...
     criteria : ComparisonCriteria
         The numbers by which the recording is aligned, compared and fitted; every one has its default.
     ranges : sequence of str
@@ -111,11 +111,13 @@ def recorded_machine(path: Path, machine: Machine | None, problems: list[Problem
 
 
 def _shipped(sidecar_path: Path, problems: list[Problem]) -> Configuration | None:
-    """The configuration that comes with compd for the machine that the sidecar names."""
+    """The configuration that the sidecar names by its file, or that comes with compd under the machine's name."""
     reported_by_the_reader: list[Problem] = []
     sidecar = read_sidecar(sidecar_path, reported_by_the_reader)
     if sidecar is None or sidecar.machine in ("", EXTERNAL):
         return None
+    if sidecar.machine_file is not None:
+        return load_machine(sidecar.machine_file)
     if sidecar.machine not in shipped_names():
         problems.append(
             Problem(
@@ -123,8 +125,8 @@ def _shipped(sidecar_path: Path, problems: list[Problem]) -> Configuration | Non
                 what="no configuration of this machine comes with compd",
                 value=repr(sidecar.machine),
                 allowed=", ".join([*shipped_names(), EXTERNAL]),
-                next_step="give the machine's configuration (--machine PATH, in Python machine=PATH), or mend "
-                "`machine:` in the sidecar",
+                next_step="give the machine's configuration (--machine PATH, in Python machine=PATH), write its path "
+                "as `machine_file:` into the sidecar, or mend `machine:` there",
             )
         )
         return None

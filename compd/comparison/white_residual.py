@@ -23,7 +23,7 @@ from compd.arrays import BoolArray, FloatArray
 from compd.columns import ROW_ORDER
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.comparison import Comparison
-from compd.comparison.covariate import why_no_covariate
+from compd.comparison.covariate import Covariate
 from compd.comparison.noise_floor import (
     NoiseFloor,
     Units,
@@ -53,7 +53,7 @@ def row_orders(aligned: AlignedRecording) -> dict[str, FloatArray]:
     measured = {
         name: values
         for name, values in recording.quantities.items()
-        if not why_no_covariate(name, values[np.isfinite(values)])
+        if not Covariate.why_none(name, values[np.isfinite(values)])
     }
     return {"time" if recording.has_time else ROW_ORDER: recording.time_s, **places, **measured}
 

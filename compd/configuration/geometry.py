@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from compd.configuration.geometry_keys import GeometryKeys
 from compd.configuration.mechanism import (
     Actuator,
     Coordinate,
@@ -131,6 +132,12 @@ class Geometry(Section):
     def mechanism(self) -> MechanismDescription:
         """The links, whichever keys they are written with."""
         return described(self)
+
+    @property
+    def keys(self) -> GeometryKeys:
+        """Where its numbers stand in the file."""
+        hinge_names = tuple("axis_P" if hinge.axis_B is None else "axis_B" for hinge in self.hinges)
+        return GeometryKeys(bool(self.rods), hinge_names, isinstance(self.tool, ToolOnPlatformSettings))
 
     @property
     def links(self) -> int:

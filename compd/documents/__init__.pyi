@@ -3,6 +3,8 @@ from .document import CONFIGURATION as CONFIGURATION
 from .document import Document as Document
 from .document import read_document as read_document
 from .document import read_entries as read_entries
+from .edited_text import Value as Value
+from .edited_text import with_values as with_values
 from .section import AbsolutePath as AbsolutePath
 from .section import Finite as Finite
 from .section import Positive as Positive

@@ -6,6 +6,8 @@ from .export import ReadOptions as ReadOptions
 from .formats import instrument_formats as instrument_formats
 from .formats import written_forms as written_forms
 from .instrument_format import WrittenForm as WrittenForm
+from .number_columns import NumberColumns as NumberColumns
+from .number_columns import read_number_columns as read_number_columns
 from .preview import ExportPreview as ExportPreview
 from .preview import preview_export as preview_export
 from .read import read_export as read_export

@@ -8,4 +8,6 @@ from .join import JoinOptions as JoinOptions
 from .join import choose_by as choose_by
 from .join import match_export as match_export
 from .join import unfit_option as unfit_option
+from .machine_log import is_machine_log as is_machine_log
+from .machine_log import write_log_recording as write_log_recording
 from .summary import summary_lines as summary_lines

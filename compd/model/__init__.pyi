@@ -15,6 +15,7 @@ from .machine import machine_model as machine_model
 from .observer import EffectInputs as EffectInputs
 from .observer import observe as observe
 from .observer import observe_external as observe_external
+from .prediction import Prediction as Prediction
 from .prediction import predict as predict
 from .python_effect import python_effects as python_effects
 from .sensitivity import Sensitivity as Sensitivity

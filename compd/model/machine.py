@@ -337,6 +337,7 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         revolute_axes_P=model.revolute_axes_P,
         hinges=model.hinges,
         scale_of_link=model.actuators.of_link,
+        actuators=model.actuators,
         arrangement=model.arrangement,
         zero_directions_M=directions_M,
         zero_axes_M=axes_M / np.linalg.norm(axes_M, axis=1, keepdims=True),

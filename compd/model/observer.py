@@ -125,6 +125,7 @@ def observe_external(
         revolute_axes_P=no_vectors,
         hinges=np.zeros((0, 2), dtype=np.int64),
         scale_of_link=np.arange(links),
+        actuators=None,
         arrangement=ToolOnPlatform(unknown),
         zero_directions_M=no_vectors,
         zero_axes_M=no_vectors,

@@ -4,6 +4,7 @@ from .measurement_programmes import recorded_limits as recorded_limits
 from .plan_formats import DWELL_S as DWELL_S
 from .plan_formats import MARKS as MARKS
 from .plan_formats import PlanFormat as PlanFormat
+from .plan_formats import rows_text as rows_text
 from .planning_criteria import PlanningCriteria as PlanningCriteria
 from .proposal import measurement_of_constant as measurement_of_constant
 from .proposal import measurement_to_test as measurement_to_test

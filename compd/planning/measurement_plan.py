@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compd.instruments import FeedAndDwell, Way
-from compd.plan_file import NOT_SET, plan_text, write_text_file
-from compd.planning.plan_formats import DWELL_S, PlanFormat, target_bytes
+from compd.instruments import Way
+from compd.plan_file import NOT_SET, write_text_file
+from compd.planning.plan_formats import DWELL_S, PlanFormat, rows_text
 from compd.planning.planning_criteria import PlanningCriteria
 from compd.result_tables import Columns, data_frame, html_table
 from compd.text import join_words
@@ -128,11 +128,8 @@ class MeasurementPlan:
 
     def text(self, format: PlanFormat = "plan", feed_mm_per_min: float | None = None, dwell_s: float = DWELL_S) -> str:
         """The text of the file that `write` writes, with the same parameters."""
-        if format == "plan":
-            return plan_text(self.rows)
-        motion = None if feed_mm_per_min is None else FeedAndDwell(feed_mm_per_min, dwell_s)
         title = f"{', '.join(self.rivals)}; {len(self.rows)} rows"
-        return target_bytes(self.rows, format, self.ways, motion, title).decode()
+        return rows_text(self.rows, format, title, self.ways, feed_mm_per_min, dwell_s)
 
     def write(
         self,

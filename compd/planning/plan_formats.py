@@ -19,7 +19,7 @@ from compd.instruments import (
     write_gcode,
     write_sa_targets,
 )
-from compd.plan_file import NOT_SET, PURPOSE_COLUMN, SPEED_COLUMN, TIP_COLUMNS
+from compd.plan_file import NOT_SET, PURPOSE_COLUMN, SPEED_COLUMN, TIP_COLUMNS, TURN_COLUMNS, plan_text
 
 PlanFormat = Literal["plan", "sa", "csv", "gcode"]
 # Dwell (s) in which an instrument averages its readings, and every gauge is read again.
@@ -44,7 +44,9 @@ def plan_targets(rows: Sequence[Mapping[str, Any]], ways: Sequence[Way | None] =
         tip = np.array([row[name] for name in TIP_COLUMNS]) if with_place else None
         motion = [name for name in row if with_place and (name.startswith("approach_") or name == SPEED_COLUMN)]
         place = TIP_COLUMNS if with_place else ()
-        settings = {name: row[name] for name in row if name not in (*NOT_SET, *place, *motion)}
+        turn = np.array([row[name] for name in TURN_COLUMNS]) if with_place and TURN_COLUMNS[0] in row else None
+        turned = TURN_COLUMNS if turn is not None else ()
+        settings = {name: row[name] for name in row if name not in (*NOT_SET, *place, *turned, *motion)}
         way = ways[k] if ways else None
         wanted = any(row[name] for name in motion)
         targets.append(
@@ -52,6 +54,7 @@ def plan_targets(rows: Sequence[Mapping[str, Any]], ways: Sequence[Way | None] =
                 name=target_name(row.get("row", k + 1)),
                 purpose=row[PURPOSE_COLUMN],
                 tip_M_mm=tip,
+                turn_rad=turn,
                 settings=settings,
                 begins=not row["time_s"] > last_s,
                 time_s=row["time_s"],
@@ -61,6 +64,21 @@ def plan_targets(rows: Sequence[Mapping[str, Any]], ways: Sequence[Way | None] =
         )
         last_s = row["time_s"]
     return targets
+
+
+def rows_text(
+    rows: Sequence[Mapping[str, Any]],
+    shape: PlanFormat,
+    title: str,
+    ways: Sequence[Way | None] = (),
+    feed_mm_per_min: float | None = None,
+    dwell_s: float = DWELL_S,
+) -> str:
+    """The text of a file of a plan's rows. title : of a programme. Raises CompdError as `target_bytes` does."""
+    if shape == "plan":
+        return plan_text(rows)
+    motion = None if feed_mm_per_min is None else FeedAndDwell(feed_mm_per_min, dwell_s)
+    return target_bytes(rows, shape, ways, motion, title).decode()
 
 
 def target_bytes(

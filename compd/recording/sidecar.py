@@ -156,6 +156,14 @@ SECTIONS: Mapping[str, Any] = {
         BeforeValidator(_checked_machine),
         Field(description=f"name of the machine's configuration, or `{EXTERNAL}` with your own model's prediction"),
     ],
+    "machine_file": Annotated[
+        str,
+        BeforeValidator(_text_or_nothing),
+        Field(
+            description="the machine's configuration, as a path from the sidecar's directory; left out for a machine "
+            "that comes with compd, and where `--machine` names it"
+        ),
+    ],
     "reference": Annotated[
         Reference | None, Field(description="what the reference instrument measured; left out where there was none")
     ],
@@ -222,6 +230,7 @@ class Sidecar:
     format : number of the format that the file was written in.
     quantities_at_zero : by name, from which effects count; None if the sidecar does not say.
     trusted : spreadsheet row -> reason why it counts although it looks wrong.
+    machine_file : the machine's configuration; None where the sidecar names none.
     """
 
     path: Path
@@ -234,6 +243,7 @@ class Sidecar:
     folds: tuple[str, ...] = ()
     quantities_at_zero: Mapping[str, float] | None = None
     trusted: Mapping[int, str] = field(default_factory=dict)
+    machine_file: Path | None = None
 
     @property
     def external(self) -> bool:
@@ -307,6 +317,7 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
         sections["folds"] or (),
         sections["quantities_at_zero"],
         _reasons(sections["trusted_rows"]),
+        path.parent / sections["machine_file"] if sections["machine_file"] else None,
     )
 
 
@@ -324,6 +335,7 @@ def sidecar_contents(
     folds: Sequence[str] = (),
     quantities_at_zero: Mapping[str, float] | None = None,
     trusted: Mapping[int, str] | None = None,
+    machine_file: str = "",
 ) -> dict[str, Any]:
     """Contents of a sidecar as plain data, without keys that have no value.
 
@@ -331,6 +343,7 @@ def sidecar_contents(
     """
     contents = {
         "machine": machine,
+        "machine_file": machine_file,
         "reference": reference,
         "folds": list(folds),
         "quantities_at_zero": None if quantities_at_zero is None else dict(quantities_at_zero),

@@ -1,3 +1,4 @@
+from .calibration_page import write_calibration_page as write_calibration_page
 from .comparison_page import name_of as name_of
 from .comparison_page import no_trend_text as no_trend_text
 from .comparison_page import summary as summary

@@ -41,7 +41,11 @@ class FrameChoice(StrEnum):
 
 def join(
     gauges: Annotated[
-        Path, typer.Argument(help="The recording of the gauges, NAME.csv or NAME.parquet with NAME.yaml.")
+        Path,
+        typer.Argument(
+            help="The recording of the gauges, NAME.csv or NAME.parquet with NAME.yaml; or the machine's own log, a "
+            "workbook or text, with --machine and --log."
+        ),
     ],
     export: Annotated[Path, typer.Argument(help="The instrument's export, in a format that --as names.")],
     out: Annotated[
@@ -89,14 +93,33 @@ def join(
         typer.Option(help="Match rows by one clock; points at rest by their order, their names, or distances alone."),
     ] = None,
     machine: MachineOption = None,
+    log: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--log",
+            metavar="COLUMN=NAME[:UNIT]",
+            help='Of the machine\'s own log: a column and what it is in a recording, "X [mm]=commanded_x_mm". May be '
+            "repeated.",
+        ),
+    ] = None,
     plan: Annotated[
         Path | None, typer.Option(help="With --by name: the measured plan; its row k is the point P00k.")
     ] = None,
 ) -> None:
     """Join an instrument's export and a recording: on one clock with an estimated offset, or point by point."""
     from compd.cli.export_options import echo_taken, read_options
+    from compd.configuration import load_machine
     from compd.instruments import read_export
-    from compd.joining import Instrument, JoinOptions, choose_by, match_export, summary_lines, unfit_option
+    from compd.joining import (
+        Instrument,
+        JoinOptions,
+        choose_by,
+        is_machine_log,
+        match_export,
+        summary_lines,
+        unfit_option,
+        write_log_recording,
+    )
     from compd.recording import write_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
@@ -110,6 +133,13 @@ def join(
     chosen = choose_by(options.by, exported)
     if option := unfit_option(chosen, options):
         raise typer.BadParameter(f"contradicts --by {chosen}", param_hint=option)
+    if log or is_machine_log(gauges):
+        if machine is None:
+            raise typer.BadParameter(f"{gauges} has no sidecar, so it is a machine's own log, which needs --machine")
+        recorded = out.with_name(f"{out.stem}-machine.csv")
+        write_log_recording(gauges, recorded, load_machine(machine).machine, log or ())
+        typer.echo(f"{gauges}: the machine's own log, as a recording: {recorded}")
+        gauges = recorded
     joined = match_export(gauges, exported, options)
     write_recording(out, joined.columns, joined.sidecar)
     for line in summary_lines(joined):

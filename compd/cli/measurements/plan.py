@@ -1,4 +1,4 @@
-"""`compd plan`: plan the measurement that distinguishes two effects."""
+"""`compd plan`: plan the measurement that distinguishes two effects, or the poses of a calibration."""
 
 from __future__ import annotations
 
@@ -23,9 +23,32 @@ class PlanShape(StrEnum):
 
 def plan(
     recording: Annotated[
-        Path, typer.Argument(metavar="RECORDING", help="The recording so far: NAME.csv or NAME.parquet.")
-    ],
-    rivals: Annotated[str, typer.Option(help="Two effects or more, by id: A,B,C.")],
+        Path | None,
+        typer.Argument(
+            metavar="RECORDING",
+            help="The recording so far: NAME.csv or NAME.parquet; with --calibrate it may be left out.",
+            show_default=False,
+        ),
+    ] = None,
+    rivals: Annotated[str | None, typer.Option(help="Two effects or more, by id: A,B,C.")] = None,
+    calibrate: Annotated[
+        int | None,
+        typer.Option(
+            "--calibrate",
+            min=1,
+            metavar="N",
+            help="In place of rivals: N poses that tell most of how the machine is built, for `compd calibrate`.",
+        ),
+    ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            "--noise",
+            metavar="UM[,URAD]",
+            help="With --calibrate: standard deviation of the instrument, um of a position; of whole poses urad of the "
+            "attitude as well.",
+        ),
+    ] = None,
     rows: Annotated[int, typer.Option(min=2, help="Number of rows to measure.")] = 40,
     out: Annotated[Path | None, typer.Option(help="File for the rows (CSV); default: the screen.")] = None,
     machine: MachineOption = None,
@@ -69,17 +92,45 @@ def plan(
     """Plan the rows (poses, loads, temperatures, speeds, other settings) on which rival effects differ most.
 
     Of three rivals or more, those that no rows within the limits tell apart are named.
+
+    With --calibrate, plan the poses that tell most of how the machine is built, and say what they are worth.
     """
-    from compd.api import plan_measurement
+    from compd.api import plan_calibration, plan_measurement
     from compd.comparison import open_recording
     from compd.files import check_replaceable
     from compd.plan_file import PURPOSE_COLUMN
     from compd.planning import MARKS
 
+    if (rivals is None) == (calibrate is None):
+        raise typer.BadParameter("give --rivals A,B or --calibrate N, one of the two")
     if out is not None:
         mark = f"{PURPOSE_COLUMN},".encode() if shape is PlanShape.plan else MARKS[shape.value]
         check_replaceable(out, (mark,), "a plan", overwrite)
     box = None if workspace is None else _numbers("--workspace", workspace, 6)
+    corners = None if box is None else ((box[0], box[1]), (box[2], box[3]), (box[4], box[5]))
+    if calibrate is not None:
+        aligned = None if recording is None else open_recording(recording, machine)
+        if aligned is None and machine is None:
+            raise typer.BadParameter("--calibrate needs --machine, or a recording")
+        if noise is None:
+            raise typer.BadParameter("--calibrate needs --noise UM of the instrument, or UM,URAD of one for poses")
+        both = _numbers("--noise", noise, noise.count(",") + 1)
+        poses = plan_calibration(
+            str(aligned.recording.machine if machine is None and aligned is not None else machine),
+            calibrate,
+            both[0],
+            noise_urad=both[1] if len(both) > 1 else None,
+            workspace_M_mm=corners,
+            measured=() if aligned is None else (aligned,),
+        )
+        if out is None:
+            sys.stdout.write(poses.text(shape.value, feed, dwell))
+        else:
+            poses.write(out, shape.value, feed, dwell)
+        typer.echo(poses.summary, err=out is None)
+        return
+    if recording is None or rivals is None:
+        raise typer.BadParameter("--rivals needs a recording")
     heat = None if temperature is None else _numbers("--temperature", temperature, 2)
     planned = plan_measurement(
         open_recording(recording, machine),
@@ -88,7 +139,7 @@ def plan(
         model=model,
         effects=effects or (),
         beside=[name.strip() for name in beside.split(",")] if beside else (),
-        workspace_M_mm=None if box is None else ((box[0], box[1]), (box[2], box[3]), (box[4], box[5])),
+        workspace_M_mm=corners,
         force_N=force,
         temperature_degC=None if heat is None else (heat[0], heat[1]),
         speed_mm_per_s=speed,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
@@ -9,7 +11,10 @@ import typer
 
 from compd.cli.options import OverwriteOption
 
-machine = typer.Typer(no_args_is_help=True, help="Begin the configuration of a machine, and draw one.")
+machine = typer.Typer(
+    no_args_is_help=True,
+    help="Begin the configuration of a machine, draw one, and write its numbers for other programs.",
+)
 
 Kind: TypeAlias = Literal["6-ups", "6-pus", "6-rus", "3-spr", "3-rps", "3-prs", "linear-delta", "rotary-delta"]
 Tolerance: TypeAlias = Literal["ground", "measured", "machined", "printed", "hand-built"]
@@ -112,3 +117,77 @@ def draw(
     model = build_model(configuration.geometry, configuration.wiring)
     out.write_text(machine_svg(model, configuration.machine), encoding="utf-8")
     typer.echo(f"{out}: {configuration.machine} at machine zero")
+
+
+class Export(StrEnum):
+    """What reads the numbers of a machine."""
+
+    csv = "csv"
+    klipper = "klipper"
+    reprapfirmware = "reprapfirmware"
+    linuxcnc = "linuxcnc"
+
+
+@machine.command()
+def export(
+    config: Annotated[Path, typer.Argument(help="The machine's configuration (YAML).")],
+    shape: Annotated[
+        Export,
+        typer.Option(
+            "--as",
+            help="csv: joints, zeros, directions and gains of any machine; settings of a linear delta: klipper, "
+            "reprapfirmware, linuxcnc.",
+        ),
+    ] = Export.csv,
+    model_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--model", help="The model file with its effects; left out, the one of `state: model_file`, if any."
+        ),
+    ] = None,
+    bed_M_mm: Annotated[float, typer.Option("--bed", help="Deltas: height of the controller's z 0 in {M}, mm.")] = 0.0,
+    endstops: Annotated[
+        str, typer.Option("--endstops", help="Deltas: readings of scales 1, 2, 3 at the endstops, mm.")
+    ] = "0,0,0",
+    out: Annotated[Path | None, typer.Option("--out", help="Write the file; left out, the text is printed.")] = None,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Write a machine's numbers for other programs: a table of all, or the settings of a delta's controller.
+
+    What a controller's settings cannot hold, such as two rods of a pair that differ, is said as the error that it costs
+    at the tip.
+    """
+    from compd import open_model
+    from compd.built_machine import FORMS, delta_settings, numbers_text, settings_text
+    from compd.configuration import load
+    from compd.machine_builder import build_model
+
+    configuration = load(config)
+    if configuration.external is not None:
+        raise typer.BadParameter(f"{config}: compd knows no joints of `machine: external`")
+    stated = configuration.state.model_file
+    effects_in = model_file or (Path(stated) if stated else None)
+    effects = open_model(effects_in, configuration).fitted if effects_in else ()
+    if shape is Export.csv:
+        text = numbers_text(configuration, effects)
+    else:
+        model = replace(build_model(configuration.geometry, configuration.wiring), effects=effects)
+        settings = delta_settings(model, FORMS[shape.value], bed_M_mm, _three(endstops))
+        text = settings_text(shape.value, settings, configuration.machine)
+    if out is None:
+        typer.echo(text, nl=False)
+        return
+    if out.exists() and not overwrite:
+        raise typer.BadParameter(f"{out} exists: give --overwrite to replace it")
+    out.write_text(text, encoding="utf-8")
+    typer.echo(f"{out}: {configuration.machine} for {shape.value}")
+
+
+def _three(text: str) -> tuple[float, float, float]:
+    try:
+        first, second, third = (float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(
+            f"{text}: three numbers in mm, with commas between them", param_hint="--endstops"
+        ) from None
+    return first, second, third

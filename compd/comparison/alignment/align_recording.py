@@ -20,7 +20,7 @@ from compd.configuration import Configuration
 from compd.display_unit import ATTITUDE_LABELS
 from compd.errors import CompdError, Problem, RecordingError
 from compd.machine_builder import build_model
-from compd.model import MachineModel, observe
+from compd.model import MachineModel, Prediction, observe
 from compd.model.effects import Observations
 from compd.model.kinematics import Movement
 from compd.recording import Recording
@@ -151,6 +151,21 @@ def align_observations(
         target=target,
         held=held if part_of is None else part_of.held,
     )
+
+
+def aligned_with(aligned: AlignedRecording, prediction: Prediction) -> AlignedRecording:
+    """The recording registered again, to a prediction of its rows with effects in place of that without any.
+
+    An instrument's frame and its target's place are then as right as the prediction, and what is fitted along is small.
+    Fixed balls and pins, links and what was measured in {M} stay as they are.
+    """
+    if aligned.registration is None or aligned.ends is not None or aligned.model is None:
+        return aligned
+    rows = replace(aligned.rows, tip_M_mm=prediction.tip_mm, rotation_M_P=prediction.rotation_M_P)
+    again = align_observations(
+        aligned.recording, aligned.model, rows, aligned.geometry_hash, aligned.criteria, held=aligned.held
+    )
+    return replace(again, ranges=aligned.ranges)
 
 
 def _check_held(recording: Recording, model: MachineModel | None, held: frozenset[str]) -> None:

@@ -28,6 +28,7 @@ from compd.comparison.alignment.registration import (
 from compd.comparison.alignment.target_place import HELD, PlacedTarget
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.lone_visits import lone_distance
+from compd.comparison.outliers import outlier_rows
 from compd.display_unit import ATTITUDE_LABELS, ATTITUDE_UNIT, MM_PER_RAD, in_place_unit
 from compd.errors import CompdError
 from compd.model import (
@@ -306,6 +307,10 @@ class AlignedRecording:
         """
         use = use & ~np.isin(self.recording.row, list(self.recording.sidecar.trusted))
         return lone_distance(distance, use, self.recording.visit, self.conditions, self.criteria)
+
+    def outliers(self, residual_um: FloatArray, use: BoolArray) -> BoolArray:
+        """(N,) rows of `use` (N,) with a residual (N, m) that no noise explains; see `outlier_rows`."""
+        return outlier_rows(residual_um, use, self.recording.visit, self.criteria, self.conditions)
 
     @cached_property
     def usable(self) -> UsableRows:

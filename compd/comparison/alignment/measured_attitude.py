@@ -21,7 +21,8 @@ from compd.rotation import compose, rotation_matrix, rotation_vector
 
 def attitude_mm(rotation_M_P: FloatArray, nominal_M_P: FloatArray) -> FloatArray:
     """(N, 3) the rotation vector from nominal attitudes (N, 3, 3) to others, one urad counted as a um."""
-    return np.asarray(rotation_vector(compose(rotation_M_P, nominal_M_P.transpose(0, 2, 1)))) * MM_PER_RAD
+    with np.errstate(invalid="ignore"):  # rows without an attitude stay nan
+        return np.asarray(rotation_vector(compose(rotation_M_P, nominal_M_P.transpose(0, 2, 1)))) * MM_PER_RAD
 
 
 def target_turn(

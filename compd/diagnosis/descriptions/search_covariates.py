@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.comparison import AlignedRecording, why_no_covariate
+from compd.comparison import AlignedRecording, Covariate
 from compd.diagnosis.candidate_criteria import DescriptionCriteria
 from compd.units import UNIT_KINDS, unit_of
 
@@ -112,7 +112,7 @@ def untried_quantities(
     reasons: dict[str, str] = {}
     for name, column in aligned.gaps_filled.rows.quantities.items():
         known = column[usable & np.isfinite(column)]
-        if reason := why_no_covariate(name, known):
+        if reason := Covariate.why_none(name, known):
             reasons[name] = reason
         elif len(known) < usable.sum():
             empty = np.mean(~np.isfinite(aligned.rows.quantities[name]))

@@ -1,7 +1,8 @@
 """Targets for the controller: G-code of RS-274/NGC, as LinuxCNC reads it.
 
 Of the language only G1, G4, G21, G90, G94, M0 and M2 are used, which every dialect has. X Y Z are the tool's tip in
-{M}.
+{M}. A B C, where a plan turns the platform, are degrees about x, then y, then z of {M}, since machine zero: roll, pitch
+and yaw of LinuxCNC's hexapod kinematics (genhexkins).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
 from compd.instruments.writers.target import TargetPoint
@@ -51,6 +53,8 @@ class _Programme:
     def lines(self, targets: Sequence[TargetPoint], title: str) -> Iterator[str]:
         yield f"{MARK}: {_clean(title)})"
         yield "(X Y Z: tip of the tool in the machine's frame M, mm. Try it without the machine first.)"
+        if any(target.turn_rad is not None for target in targets):
+            yield "(A B C: degrees about x, then y, then z of M, since machine zero.)"
         yield "G21 G90 G94"
         for target in targets:
             yield from self._target(target)
@@ -74,20 +78,24 @@ class _Programme:
         if target.no_way:
             yield from _comments(target.no_way)
         if way is not None:
-            yield self._move(way.via_M_mm, self._motion.feed_mm_per_min)
+            yield self._move(way.via_M_mm, self._motion.feed_mm_per_min, target.turn_rad)
         if way is not None and way.end_M_mm is not None:
             yield "(passes the place in the middle of this move, without a stop)"
-            yield self._move(way.end_M_mm, 60.0 * way.speed_mm_per_s)
+            yield self._move(way.end_M_mm, 60.0 * way.speed_mm_per_s, target.turn_rad)
             return
-        yield self._move(target.tip_M_mm, self._motion.feed_mm_per_min)
+        yield self._move(target.tip_M_mm, self._motion.feed_mm_per_min, target.turn_rad)
         yield self._pause(self._motion.dwell_s)
 
-    def _move(self, to_M_mm: FloatArray, feed_mm_per_min: float) -> str:
+    def _move(self, to_M_mm: FloatArray, feed_mm_per_min: float, turn_rad: FloatArray | None) -> str:
         if self._here_M_mm is not None:
             self._time_s += 60.0 * float(np.linalg.norm(to_M_mm - self._here_M_mm)) / feed_mm_per_min
         self._here_M_mm = to_M_mm
         x, y, z = (_number(value) for value in to_M_mm.tolist())
-        return f"G1 X{x} Y{y} Z{z} F{_number(feed_mm_per_min, 1)}"
+        turn = ""
+        if turn_rad is not None:
+            degrees = Rotation.from_rotvec(turn_rad).as_euler("xyz", degrees=True).tolist()
+            turn = "".join(f" {axis}{_number(value, 4)}" for axis, value in zip("ABC", degrees, strict=True))
+        return f"G1 X{x} Y{y} Z{z}{turn} F{_number(feed_mm_per_min, 1)}"
 
     def _pause(self, seconds: float) -> str:
         self._time_s += seconds

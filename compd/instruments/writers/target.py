@@ -29,6 +29,7 @@ class TargetPoint:
     ----------
     name : unique in the plan, "P007". purpose : what it is for.
     tip_M_mm : (3,) place of the tool's tip in {M}; None if the plan sets something else.
+    turn_rad : (3,) turn of the platform since machine zero, a rotation vector in {M}; None where it stays as there.
     settings : what is to be set or held, by name with unit, in the order in which it is shown.
     begins : whether it begins a programme. time_s : after the programme's beginning.
     way : None if the tip may come as it likes, or where no straight way is as wanted.
@@ -38,6 +39,7 @@ class TargetPoint:
     name: str
     purpose: str
     tip_M_mm: FloatArray | None
+    turn_rad: FloatArray | None = None
     settings: Mapping[str, float] = field(default_factory=dict)
     begins: bool = True
     time_s: float = 0.0

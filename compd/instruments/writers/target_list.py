@@ -28,14 +28,16 @@ def write_sa_targets(targets: Sequence[TargetPoint]) -> bytes:
 
 
 def write_csv_targets(targets: Sequence[TargetPoint]) -> bytes:
-    """name; x_mm, y_mm, z_mm where the targets have a place; what is to be set or held; purpose."""
+    """name; x_mm, y_mm, z_mm of a place and turn_x_rad ... of a turn, where there are any; what to set; purpose."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     settings = list(dict.fromkeys(name for target in targets for name in target.settings))
     with_place = targets[0].tip_M_mm is not None
-    writer.writerow(["name", *(["x_mm", "y_mm", "z_mm"] if with_place else []), *settings, "purpose"])
+    turns = ["turn_x_rad", "turn_y_rad", "turn_z_rad"] if targets[0].turn_rad is not None else []
+    writer.writerow(["name", *(["x_mm", "y_mm", "z_mm"] if with_place else []), *turns, *settings, "purpose"])
     for target in targets:
         place = [] if target.tip_M_mm is None else [f"{value:.3f}" for value in target.tip_M_mm]
         held = [f"{target.settings[name]:.10g}" if name in target.settings else "" for name in settings]
-        writer.writerow([target.name, *place, *held, target.purpose])
+        turn = [] if target.turn_rad is None else [f"{value:.6f}" for value in target.turn_rad]
+        writer.writerow([target.name, *place, *turn, *held, target.purpose])
     return stream.getvalue().encode()

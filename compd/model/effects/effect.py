@@ -109,7 +109,8 @@ class Parameter:
         The fit is linear in 1/value: a compliance is fitted, a stiffness shown.
     tolerance : str
         How the tolerance to which a machine was made limits it: ``"place"`` by itself, ``"gain"`` over the stroke,
-        ``"tilt"`` over the radius of the platform joints; ``""`` for what no workshop's tolerance limits.
+        ``"gain_change"`` over its square, ``"tilt"`` over the radius of the platform joints; ``""`` for what no
+        workshop's tolerance limits.
     rough : bool
         The range follows from such a tolerance, which is stated to an order of magnitude.
     """
@@ -121,7 +122,7 @@ class Parameter:
     source: str
     per: Per = "machine"
     reciprocal: bool = False
-    tolerance: Literal["", "place", "gain", "tilt"] = ""
+    tolerance: Literal["", "place", "gain", "gain_change", "tilt"] = ""
     rough: bool = False
 
     def suffixes(self, links: int) -> list[str]:

@@ -206,4 +206,9 @@ def machine_structure(constants: MachineConstants) -> NDArray[np.void]:
     ):
         values = getattr(constants, name)
         machine[name][: len(values)] = values
+    if constants.actuators is not None and constants.zero is not None:
+        for name in ("kinds", "cosine_M", "sine_M", "radius_mm"):
+            values = getattr(constants.actuators, name)
+            machine[name][: len(values)] = values
+        machine["zero_actuator_mm"][: len(constants.zero.actuator_mm)] = constants.zero.actuator_mm
     return structure

@@ -13,7 +13,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.errors import CompdError, Problem
 from compd.link_count import LinkCount
-from compd.model.kinematics import Arrangement, Contact, Mechanism, link_forces
+from compd.model.kinematics import Actuators, Arrangement, Contact, Mechanism, link_forces
 from compd.reference_conditions import standard_value, value_at_zero
 from compd.rotation import to_outer
 
@@ -64,6 +64,7 @@ class MachineConstants(NamedTuple):
 
     platform_joints_P_mm (n, 3), revolute_axes_P (k, 3): at machine zero's temperature, unbent.  hinges (k, 2): the
     link of each axis, and whether the base carries it, as in `Mechanism`.  scale_of_link (n,): from 0.
+    actuators: what moves the links; None where the kinematics is not known.
     arrangement: where the tool is; its tool_mm (3,) in {P}, or in {M} where the tool stands on the plate, as at machine
         zero.
     zero_directions_M (n, 3): unit vectors of the links at machine zero, from base to platform.
@@ -83,6 +84,7 @@ class MachineConstants(NamedTuple):
     revolute_axes_P: FloatArray
     hinges: IntArray
     scale_of_link: IntArray
+    actuators: Actuators | None
     arrangement: Arrangement
     zero_directions_M: FloatArray
     zero_axes_M: FloatArray

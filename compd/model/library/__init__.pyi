@@ -1,3 +1,4 @@
+from .drawing import DRAWN as DRAWN
 from .effects_file import EFFECTS_FILE as EFFECTS_FILE
 from .effects_file import beside_library as beside_library
 from .effects_file import gather_effects as gather_effects

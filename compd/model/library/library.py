@@ -18,6 +18,7 @@ from typing import Any
 from compd.errors import PluginError, Problem
 from compd.model.effects import PORTS, Effect
 from compd.model.formula import formula_effect
+from compd.model.library.drawing import DRAWN
 from compd.plugins import EFFECTS, OWN_CODE, Code, load, names
 
 _PORT_FILES = {module.name for module in pkgutil.iter_modules([str(Path(__file__).parent)])}
@@ -68,7 +69,7 @@ def find_effect(
     if ":" in declaration:
         effect = _require_effect(load(EFFECTS, declaration, where, code), where)
         return effect if effect.declared else replace(effect, declared=declaration)
-    effects = {**load_library(), **(given or {})}
+    effects = {**{effect.id: effect for effect in DRAWN}, **load_library(), **(given or {})}
     if declaration not in effects:
         raise PluginError(
             Problem(

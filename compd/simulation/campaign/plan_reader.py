@@ -11,7 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.columns import approach_columns
 from compd.errors import CompdError, KinematicsError, Problem
-from compd.plan_file import SPEED_COLUMN, TIP_COLUMNS, PlanFile, PlanLine, read_plan_file
+from compd.plan_file import SPEED_COLUMN, TIP_COLUMNS, TURN_COLUMNS, PlanFile, PlanLine, read_plan_file
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.motion import SPEED_MM_PER_S
 from compd.simulation.truth.planned_row import PlannedRow
@@ -85,14 +85,15 @@ def _planned_rows(
     previous_s = math.inf
     for line in file.lines:
         tip_M_mm = tuple(line.values.get(name, math.nan) for name in TIP_COLUMNS)
+        turn_rad = tuple(line.values.get(name, 0.0) for name in TURN_COLUMNS)
         time_s = line.values.get("time_s", math.nan)
         row = PlannedRow(
             len(rows) + 1,
             line.purpose,
-            points.setdefault(tip_M_mm, len(points) + 1),
+            points.setdefault((*tip_M_mm, *turn_rad), len(points) + 1),
             not time_s > previous_s,
             time_s,
-            _scale_mm(file, line, tip_M_mm, mechanism, problems),
+            _scale_mm(file, line, tip_M_mm, turn_rad, mechanism, problems),
             np.array([line.values.get(name, 0.0) for name in approach_columns(mechanism.scales)]),
             line.values.get(SPEED_COLUMN, 0.0),
             {name: line.values[name] for name in names if name in line.values},
@@ -104,14 +105,19 @@ def _planned_rows(
 
 
 def _scale_mm(
-    file: PlanFile, line: PlanLine, tip_M_mm: Sequence[float], mechanism: Mechanism, problems: list[Problem]
+    file: PlanFile,
+    line: PlanLine,
+    tip_M_mm: Sequence[float],
+    turn_rad: Sequence[float],
+    mechanism: Mechanism,
+    problems: list[Problem],
 ) -> FloatArray:
-    """(n,) scale values for a tip in {M}, with the attitude of machine zero, all parts as drawn; nan where unknown."""
+    """(n,) scale values for a tip in {M} and a turn since machine zero, all parts as drawn; nan where unknown."""
     unknown = np.full(mechanism.scales, math.nan)
-    if not all(map(math.isfinite, tip_M_mm)):
+    if not all(map(math.isfinite, (*tip_M_mm, *turn_rad))):
         return unknown
     try:
-        posture = mechanism.posture_at(np.array(tip_M_mm), np.zeros(3))
+        posture = mechanism.posture_at(np.array(tip_M_mm), np.array(turn_rad))
     except KinematicsError:
         posture = None
     scale_mm = unknown if posture is None else mechanism.scales_at(posture)

@@ -1,0 +1,14 @@
+from .delta_fit import FORMS as FORMS
+from .delta_fit import DeltaForm as DeltaForm
+from .delta_fit import DeltaSettings as DeltaSettings
+from .delta_fit import delta_settings as delta_settings
+from .delta_formats import settings_text as settings_text
+from .drawn_numbers import BuiltGeometry as BuiltGeometry
+from .drawn_numbers import built_geometry as built_geometry
+from .machine_file import BUILT_MARK as BUILT_MARK
+from .machine_file import BuiltFiles as BuiltFiles
+from .machine_file import Provenance as Provenance
+from .machine_file import write_built_machine as write_built_machine
+from .number_table import MachineNumber as MachineNumber
+from .number_table import machine_numbers as machine_numbers
+from .number_table import numbers_text as numbers_text

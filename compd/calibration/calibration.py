@@ -1,0 +1,244 @@
+"""What a calibration says: the machine as built, how sure each number is, and how far its prediction errs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from compd.arrays import FloatArray, IntArray
+from compd.model.effects import FittedEffect
+from compd.text import nan_to_null
+
+# Variance of held-out errors over that of the noise above which more than noise is left: half of it has a cause.
+LEFT_OVER = 2.0
+
+
+class CalibratedNumber(NamedTuple):
+    """One number of the machine.
+
+    name : as in model files, "base_joint_position.d_3x".  block : the effect's id.  element : "rod 3 base x".
+    unit : "mm", "ppm", "urad", or what the effect has.  drawing, value, std : in `unit`; drawing is 0 for what a
+    drawing states as perfect, a zero, a gain or a direction's error.  std : posterior, with the tolerance as prior.
+    prior_std : before any pose was measured, of the tolerance.
+    correlation, with_whom : the largest with another number of the fit, and that one's element; 0 and "" without one.
+    needed : whether held-out poses are predicted better with its block; the number is the drawing's where it is not.
+    held : whether the poses leave it at the drawing: they do not tell it twice as well as the tolerance does.
+    """
+
+    name: str
+    block: str
+    element: str
+    unit: str
+    drawing: float
+    value: float
+    std: float
+    prior_std: float
+    correlation: float
+    with_whom: str
+    needed: bool
+    held: bool
+
+    @property
+    def change(self) -> float:
+        """value - drawing."""
+        return self.value - self.drawing
+
+    @property
+    def claimed(self) -> bool:
+        """Whether the calibration states this number: its block is needed, and the poses tell it."""
+        return self.needed and not self.held
+
+
+class PoseErrors(NamedTuple):
+    """Errors of R poses that took no part in the fit, or of all that did; each after its instrument was registered.
+
+    what : "random poses", "regions", "sealed friday.csv", "monday.csv".  rows : (R,) as a spreadsheet shows them, -1
+    where recordings are mixed.
+    place_mm : (R, 3) where the tip was, {M}.  before_mm, after_mm : (R, 3) measured less modelled tip, nan where no tip
+    was measured.  before_links_mm, after_links_mm : (R, n) the same as errors of links, nan where none can be told.
+    before_rms_um, after_rms_um : per coordinate of a length.  before_rms_urad, after_rms_urad : of the attitude; nan.
+    """
+
+    what: str
+    rows: IntArray
+    place_mm: FloatArray
+    before_mm: FloatArray
+    after_mm: FloatArray
+    before_links_mm: FloatArray
+    after_links_mm: FloatArray
+    before_rms_um: float
+    after_rms_um: float
+    before_rms_urad: float
+    after_rms_urad: float
+
+
+class HeldCombination(NamedTuple):
+    """A combination of numbers that these poses cannot tell, and that stays at the drawing.
+
+    words : what it is.  remedy : the poses or the measurement that would tell it.
+    weights : (P,) of the calibration's numbers, each over its prior; a unit vector.
+    share : its standard deviation after the poses over that before, near 1.
+    """
+
+    words: str
+    remedy: str
+    weights: FloatArray
+    share: float
+
+
+class TriedBlock(NamedTuple):
+    """A block of numbers, as held-out poses judge it.
+
+    name : the effect's id.  words : "places of the base joints".  needed : it is in the calibration.
+    without, with_it : error of held-out poses, in standard deviations of the noise, rms, without it and with it; of
+    random poses and of regions together.  why : why it is in, or not, in words.
+    """
+
+    name: str
+    words: str
+    needed: bool
+    without: float
+    with_it: float
+    why: str
+
+
+class GrossPose(NamedTuple):
+    """A pose with an error that no noise explains; it is left out.  row : as a spreadsheet shows it."""
+
+    recording: str
+    row: int
+    error_mm: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration:
+    """The machine as built, from its drawing and measured poses; P numbers of all blocks that were tried.
+
+    Attributes
+    ----------
+    machine : str
+        Its name.
+    recordings : tuple of str
+        The files that it was learned from.
+    numbers : tuple of CalibratedNumber
+        P numbers, of needed and of other blocks, in the order of the blocks and of `covariance`.
+    covariance : (P, P) array
+        Of the values, in their units; of what is not needed that of the drawing's tolerance.
+    fitted : tuple of FittedEffect
+        The needed blocks as effects of a model, from which predictions follow; each with its covariance.
+    fitted_covariance : (Q, Q) array
+        Of their parameters jointly, in the order of `fitted`.
+    blocks : tuple of TriedBlock
+        What was tried, in order of trial.
+    learned : tuple of PoseErrors
+        Of the poses that it was learned from, one for each recording.
+    held_out : tuple of PoseErrors
+        Of random poses, and of whole regions, that the numbers were not learned from.
+    sealed : tuple of PoseErrors
+        Of recordings that were opened last; registered alone.
+    held : tuple of HeldCombination
+        What these poses cannot tell.
+    gross : tuple of GrossPose
+        Poses left out.
+    warnings : tuple of str
+        Whatever a reader must know before he trusts it: a scale of length that is not in the data, poses that are all
+        at one height.
+    noise_um, noise_urad : float
+        Of the measurement, per coordinate; nan where nothing says it.
+    left_over : float
+        Variance of held-out errors over that of the noise; 1 where only noise is left.
+    sigma_mm : (w,) array
+        Standard deviation of what is left of the first recording, of each coordinate that was weighed: a urad of an
+        attitude as a um.
+    in_links : bool
+        Whether poses were weighed as errors of links, which then have one scatter: the machine errs more than the
+        instrument.
+    prior_scale : dict
+        Block, and by which factor the tolerance was scaled to fit what the poses tell of it.
+    """
+
+    machine: str
+    recordings: tuple[str, ...]
+    numbers: tuple[CalibratedNumber, ...]
+    covariance: FloatArray
+    fitted: tuple[FittedEffect, ...]
+    fitted_covariance: FloatArray
+    blocks: tuple[TriedBlock, ...]
+    learned: tuple[PoseErrors, ...]
+    held_out: tuple[PoseErrors, ...]
+    sealed: tuple[PoseErrors, ...]
+    held: tuple[HeldCombination, ...]
+    gross: tuple[GrossPose, ...]
+    warnings: tuple[str, ...]
+    noise_um: float
+    noise_urad: float
+    left_over: float
+    sigma_mm: FloatArray
+    in_links: bool
+    prior_scale: dict[str, float]
+
+    @property
+    def verdict(self) -> str:
+        """The result in a sentence."""
+        random = self.held_out[0]
+        needed = [block.words for block in self.blocks if block.needed]
+        if not needed:
+            return f"{self.machine}: no number of the drawing is told better by these poses; it stays as drawn."
+        return (
+            f"{self.machine}: the error at poses that were left out falls from {random.before_rms_um:.3g} to "
+            f"{random.after_rms_um:.3g} um (rms per coordinate), with {', '.join(needed)}."
+        )
+
+    @property
+    def diagnose_next(self) -> bool:
+        """Whether `compd diagnose` should go on: more than noise is left."""
+        return bool(np.isfinite(self.left_over) and self.left_over > LEFT_OVER)
+
+    def as_json(self) -> dict[str, Any]:
+        """What `compd calibrate --json` prints, as plain data; nan is None."""
+        return dict(
+            nan_to_null(
+                {
+                    "machine": self.machine,
+                    "recordings": list(self.recordings),
+                    "verdict": self.verdict,
+                    "numbers": [{**number._asdict(), "claimed": number.claimed} for number in self.numbers],
+                    "covariance": self.covariance.tolist(),
+                    "blocks": [block._asdict() for block in self.blocks],
+                    **{
+                        part: [_errors_json(errors) for errors in getattr(self, part)]
+                        for part in ("learned", "held_out", "sealed")
+                    },
+                    "held": [
+                        {"words": one.words, "remedy": one.remedy, "share": one.share, "weights": one.weights.tolist()}
+                        for one in self.held
+                    ],
+                    "gross": [pose._asdict() for pose in self.gross],
+                    "warnings": list(self.warnings),
+                    "sigma_mm": self.sigma_mm.tolist(),
+                    "in_links": self.in_links,
+                    "noise_um": self.noise_um,
+                    "noise_urad": self.noise_urad,
+                    "left_over": self.left_over,
+                    "diagnose_next": self.diagnose_next,
+                    "prior_scale": self.prior_scale,
+                }
+            )
+        )
+
+    def __repr__(self) -> str:
+        return f"<Calibration: {self.verdict}>"
+
+
+def summary_rows(errors: Sequence[PoseErrors]) -> list[tuple[str, float, float]]:
+    """What, rms before and after in um, of each."""
+    return [(one.what, one.before_rms_um, one.after_rms_um) for one in errors]
+
+
+def _errors_json(errors: PoseErrors) -> dict[str, Any]:
+    return {
+        name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in errors._asdict().items()
+    }

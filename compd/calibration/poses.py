@@ -1,0 +1,97 @@
+"""Measured poses of one recording beside what the machine with its numbers so far predicts of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from compd.arrays import BoolArray, FloatArray
+from compd.calibration.jacobian import measured_columns, moved_to
+from compd.calibration.parameters import Parameters
+from compd.comparison import AlignedRecording, aligned_with
+from compd.display_unit import MM_PER_RAD
+from compd.model import effect_deltas, predict, sum_deltas
+from compd.model.effects import FittedEffect
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPoses:
+    """A recording of N rows with m measured coordinates, and how they change with the P numbers of a drawing.
+
+    columns_mm : (N, m, P) per tolerance, of the machine as drawn.  use : (N,) rows with a pose and every value.
+    to_links : (N, n, m) from the measured coordinates to errors of links, in which the rows are then weighed; None
+        where they are weighed as measured.
+    """
+
+    aligned: AlignedRecording
+    parameters: Parameters
+    columns_mm: FloatArray
+    use: BoolArray
+    to_links: FloatArray | None = None
+
+    @classmethod
+    def of(cls, aligned: AlignedRecording, parameters: Parameters) -> MeasuredPoses:
+        """Of a recording with the parameters of its machine."""
+        columns_mm = measured_columns(aligned, parameters)
+        use = aligned.usable.mask & np.isfinite(columns_mm).all(axis=(1, 2))
+        return cls(aligned, parameters, columns_mm, use)
+
+    def now(self, fitted: Sequence[FittedEffect]) -> PosesNow:
+        """What is left with these effects, the instrument registered to their prediction, and its derivatives there."""
+        aligned, model = self.aligned, self.aligned.model
+        assert model is not None
+        added = sum_deltas([effect_deltas(one, aligned.rows)[0] for one in fitted])
+        prediction = predict(model, aligned.rows, added)
+        aligned = aligned_with(aligned, prediction)
+        residual_mm = aligned.measured_mm - aligned.predicted_mm(added)
+        registration_mm = aligned.registration_columns
+        columns_mm = self.columns_mm
+        if fitted:
+            columns_mm = measured_columns(moved_to(aligned, prediction, added), self.parameters, aligned.rows)
+        finite = np.isfinite(residual_mm).all(axis=1) & np.isfinite(registration_mm).all(axis=(1, 2))
+        use = self.use & finite & np.isfinite(columns_mm).all(axis=(1, 2))
+        return PosesNow(self, aligned, residual_mm, registration_mm, columns_mm, use)
+
+
+@dataclass(frozen=True, eq=False)
+class PosesNow:
+    """The same with the numbers so far.
+
+    residual_mm : (N, m).  registration_mm : (N, m, Q) columns of what is fitted along.  columns_mm : (N, m, P) per
+    tolerance.  use : (N,).
+    """
+
+    poses: MeasuredPoses
+    aligned: AlignedRecording
+    residual_mm: FloatArray
+    registration_mm: FloatArray
+    columns_mm: FloatArray
+    use: BoolArray
+
+    @cached_property
+    def weighed(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Residual (N, w), registration (N, w, Q) and columns (N, w, P) in the coordinates that are weighed."""
+        T, residual_mm = self.poses.to_links, self.residual_mm
+        if T is None:
+            return residual_mm, self.registration_mm, self.columns_mm
+        return (T @ residual_mm[:, :, None])[:, :, 0], T @ self.registration_mm, T @ self.columns_mm
+
+
+def links_of_pose(aligned: AlignedRecording) -> FloatArray | None:
+    """(N, n, m) errors of links by errors of the measured coordinates, which they explain at the pose as drawn.
+
+    Of a tip alone the smallest such errors; None where the tip was not measured whole.
+    """
+    if aligned.of_links or not aligned.shows_tip or aligned.model is None:
+        return None
+    link = aligned.sensitivity(["link"])["link"]
+    both = link.tip
+    if aligned.with_attitude:
+        both = np.concatenate([link.tip, link.rotation * MM_PER_RAD], axis=1)
+    good = np.isfinite(both).all(axis=(1, 2))
+    by_pose = np.full((len(both), both.shape[2], both.shape[1]), np.nan)
+    by_pose[good] = np.linalg.pinv(both[good])
+    return by_pose

@@ -1,0 +1,64 @@
+"""Least squares with the tolerance as prior: what data do not tell stays at the drawing, and covariances are right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from compd.calibration.prior_fit import Whitened, fit_with_prior, normal_equations, registration_of
+
+RNG = np.random.default_rng(1)
+BLOCK_OF = np.array([0, 0, 0, 1, 1])
+ALL = np.ones(5, dtype=bool)
+
+
+def part(J: np.ndarray, x: np.ndarray, R: np.ndarray, r: np.ndarray, noise: np.ndarray | float = 0.0) -> Whitened:
+    return Whitened(J @ x + R @ r + noise, J, R, np.arange(len(J)))
+
+
+def test_what_the_data_do_not_tell_stays_at_the_drawing_with_its_tolerance() -> None:
+    J = RNG.standard_normal((40, 5)) * 100
+    J[:, 2] = J[:, 1]  # only the sum of these two is told
+    R = RNG.standard_normal((40, 2))
+    x = np.array([1.0, 0.6, 0.6, -1.0, 0.5])
+    result = fit_with_prior(normal_equations([part(J, x, R, np.array([5.0, -7.0]))]), BLOCK_OF, ALL)
+    np.testing.assert_allclose(result.x, x, atol=1e-3)
+    difference = np.array([0, 1, -1, 0, 0]) / np.sqrt(2)
+    assert difference @ result.C @ difference == pytest.approx(result.scale[0] ** 2, rel=1e-3)
+    assert result.C[0, 0] < 1e-3
+
+
+def test_registrations_are_eliminated_each_for_its_recording() -> None:
+    x = np.array([0.3, -0.2, 0.8, 0.1, -0.4])
+    parts = []
+    for _ in range(3):
+        J, R = RNG.standard_normal((30, 5)) * 100, RNG.standard_normal((30, 3))
+        parts.append(part(J, x, R, 50 * RNG.standard_normal(3)))
+    result = fit_with_prior(normal_equations(parts), BLOCK_OF, ALL)
+    np.testing.assert_allclose(result.x, x, atol=1e-3)
+    left = [one.z - one.J @ x - one.R @ registration_of(one, x) for one in parts]
+    assert max(np.abs(one).max() for one in left) < 1e-9
+
+
+def test_the_scale_of_a_block_follows_from_its_numbers() -> None:
+    block_of = np.repeat([0, 1], 40)
+    J = 1e3 * np.eye(80)
+    x = np.concatenate([3.0 * RNG.standard_normal(40), 0.2 * RNG.standard_normal(40)])
+    empty = np.zeros((80, 0))
+    result = fit_with_prior(normal_equations([part(J, x, empty, np.zeros(0))]), block_of, np.ones(80, dtype=bool))
+    assert result.scale[0] == pytest.approx(3.0, rel=0.3)
+    assert result.scale[1] == pytest.approx(0.3, rel=0.4)
+
+
+def test_the_covariance_holds_the_errors_of_numbers_that_stay_as_drawn() -> None:
+    """Pooled over drawn machines; of 2,000 numbers a share of 95 % has a standard deviation of 0.5 %."""
+    free = BLOCK_OF == 0
+    inside = []
+    for _ in range(2000):
+        J = RNG.standard_normal((12, 5)) * 3
+        x = RNG.standard_normal(5)
+        one = part(J, x, np.ones((12, 1)), np.array([4.0]), RNG.standard_normal(12))
+        # the scale as it is: a prior that fits the numbers
+        result = fit_with_prior(normal_equations([one]), BLOCK_OF, free, considered=np.ones(2))
+        inside.append(np.abs(result.x - x)[free] <= 1.96 * np.sqrt(np.diag(result.C))[free])
+    assert 0.92 <= np.mean(inside) <= 0.98
