@@ -24,6 +24,8 @@ from compd.units import UM_PER_MM
 _ROUNDS = 12
 # A change of the numbers, in tolerances, that ends the rounds.
 _SETTLED = 1e-4
+# A change, in tolerances, from which on outliers are sought: what numbers still explain makes none.
+_NEAR = 0.05
 # Confidence at which a scatter contradicts the noise that is declared.
 _CONTRADICTS = 0.99
 # Share of the measured values that count as degrees of freedom where a fit has nearly as many numbers.
@@ -95,9 +97,9 @@ def fit_machine(
         change = float(np.abs(new.x - result.x).max(initial=0.0))
         result = new
         found = out
-        if outlier is None:
+        if outlier is None and change < _NEAR:
             found = [
-                one.poses.aligned.outliers(registered_mm(one, use, sigma)[0] / sigma, one.use)
+                _outliers(one, registered_mm(one, use, sigma)[0] / sigma)
                 for one, use, sigma in zip(now, rows, sigmas, strict=True)
             ]
         same = all((a == b).all() for a, b in zip(found, out, strict=True))
@@ -105,6 +107,15 @@ def fit_machine(
         if change < _SETTLED and same:
             break
     return MachineFit(parameters, tuple(now), tuple(linear), result, tuple(out), tuple(sigmas), free)
+
+
+def _outliers(now: PosesNow, left: FloatArray) -> BoolArray:
+    """(N,) rows with an error (N, w), in standard deviations, that neither the others nor the noise explain.
+
+    Of few rows the fit takes most of the scatter, so that the scatter alone would make outliers.
+    """
+    far = np.abs(left).max(axis=1) > now.aligned.criteria.outlier_sigmas
+    return np.asarray(now.poses.aligned.outliers(left, now.use) & far)
 
 
 def registered_mm(now: PosesNow, use: BoolArray, sigma_mm: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
