@@ -44,8 +44,8 @@ NO_RIVAL = "no other effect that was tried does as well"
 MAX_FAULTS = 2
 # A probability above this is said before the numbers.
 DOUBTFUL = 0.01
-# That a declaration is contradicted takes so many, with both numbers.
-LEFT_LINES = 3
+# What is left takes so many lines with the limits of another day, and with both numbers of a contradicted declaration.
+WITH_LIMITS, CONTRADICTED = 2, 3
 # With so many other texts the one is left out that says nothing.
 CROWDED = 8
 
@@ -65,7 +65,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         LabelledText("Explains", tuple(_explains(diagnosis, fall))),
         LabelledText("Follows", tuple(_follows(diagnosis, fall))),
         LabelledText("Start", tuple(_start(diagnosis, fall))),
-        LabelledText("Left", tuple(_left(diagnosis, fall)), least=1 if fall.unknown == CANNOT_KNOW else LEFT_LINES),
+        LabelledText("Left", tuple(_left(diagnosis, fall)), least=_left_lines(diagnosis, fall)),
         LabelledText("Gross", tuple(gross_texts(diagnosis.gross, diagnosis.after, fall.unit))),
         LabelledText("Right", tuple(probability_clause(diagnosis))),
         LabelledText("Sure", tuple(_sure(diagnosis))),
@@ -206,6 +206,13 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     else:
         meaning = "these rows do not show what acts"
     return [f"{text}; noise {number_text(fall.noise, fall.unit)} ({fall.source}): {meaning}", *remarks]
+
+
+def _left_lines(diagnosis: Diagnosis, fall: ErrorFall) -> int:
+    """How many lines it takes to say what is left."""
+    if fall.unknown != CANNOT_KNOW:
+        return CONTRADICTED
+    return 1 if math.isnan(diagnosis.left_interval_um[0]) else WITH_LIMITS
 
 
 def _on_another_day(diagnosis: Diagnosis, fall: ErrorFall) -> str:
