@@ -356,8 +356,8 @@ def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float
     member_by_name = {losses.name(k): k for k in members if k in library}
     constant = [k for k in members if losses.candidates[k].kind == "constant"]
     families, by_place = {}, []
-    tried = sum(losses.candidates[k].best_of for k in library)
-    for name in dict.fromkeys(losses.name(k) for k in library):
+    names = dict.fromkeys(losses.name(k) for k in library)
+    for name in names:
         others = beside(losses, members, member_by_name[name]) if name in member_by_name else constant
         nuisance = losses.nuisance_with(others).values
         complement = OrthogonalComplement(nuisance)
@@ -365,6 +365,8 @@ def _p_values(losses: SubsetLosses, members: tuple[int, ...]) -> dict[str, float
         variants = [complement(losses.values[k]) for k in own]
         best_of = [losses.candidates[k].best_of for k in own]
         families[name] = Family(variants, complement(losses.data.y), best_of)
+        # each effect has an equal part of the chance, whatever was searched for another
+        tried = len(names) * sum(best_of)
         values = [losses.values[k] for k in own]
         by_place.append(
             place_p_value(losses.data.y, nuisance, values, tried, losses.data.place, losses.criteria.search)

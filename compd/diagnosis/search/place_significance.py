@@ -31,8 +31,7 @@ def place_p_value(
     change within places, of which unevenness says nothing.
 
     y : (R, m).  nuisance : (R, m, Q) what is fitted beside them.  variants : each (R, m, P).
-    tried : how many were, unlike one another, with those of all other effects (Sidak, J. Am. Stat. Assoc. 62 (1967)
-        626).
+    tried : for how many tries, unlike one another, the best variant counts (Sidak, J. Am. Stat. Assoc. 62 (1967) 626).
     place : (R,) of each row, numbered from 0.
 
     For example, ten rows at each of three places::
