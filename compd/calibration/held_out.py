@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.calibration.jacobian import without
 from compd.calibration.machine_fit import MachineFit
-from compd.calibration.prior_fit import Whitened, fit_with_prior, normal_equations, registration_of
+from compd.calibration.prior_fit import Whitened, fit_with_prior, normal_equations, open_columns, registration_of
 
 # Parts into which rows are dealt at random, and how often.
 _PARTS, _DEALS = 5, 2
@@ -93,7 +94,8 @@ def left_of(fit: MachineFit, free: BoolArray, fold: Fold) -> list[FloatArray]:
     for known, tested in zip(learned, unseen, strict=True):
         # a recording of which nothing else is left is registered by itself
         by: Whitened = known if len(known.z) >= known.R.shape[1] + _SPARE_VALUES else tested
-        left.append(tested.z - tested.J @ x - tested.R @ registration_of(by, x))
+        own = tested.z - tested.J @ x - tested.R @ registration_of(by, x)
+        left.append(without(own[:, None], open_columns(by.R, tested.R))[:, 0])
     return left
 
 
