@@ -46,9 +46,10 @@ def _left_of_fold(now: PosesNow, learned: BoolArray, test: BoolArray) -> FloatAr
     values = R_mm.shape[1] * int(use.sum())
     use = use if values > 2 * R_mm.shape[2] else test
     left_mm = registered_mm(now, use)[1]
-    shape, numbers = left_mm[test].shape, R_mm.shape[2]
-    columns = open_columns(R_mm[use].reshape(-1, numbers), R_mm[test].reshape(-1, numbers))
-    left_mm[test] = without(left_mm[test].reshape(-1, 1), columns).reshape(shape)
+    if not test.any():
+        return left_mm
+    columns = open_columns(np.concatenate(R_mm[use]), np.concatenate(R_mm[test]))
+    left_mm[test] = without(left_mm[test].reshape(-1, 1), columns).reshape(left_mm[test].shape)
     return left_mm
 
 
