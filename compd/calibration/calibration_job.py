@@ -9,7 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, rms
 from compd.calibration.calibration import CalibratedNumber, Calibration, GrossPose, TriedBlock
-from compd.calibration.held_out import Fold, folds
+from compd.calibration.held_out import PARTS, Fold, folds
 from compd.calibration.identifiability import held_combinations, length_scale_is_told
 from compd.calibration.machine_fit import MachineFit, fit_machine, in_likelier_coordinates, registered_mm
 from compd.calibration.parameters import WORDS, Parameters, calibration_parameters
@@ -154,6 +154,17 @@ def _check_rows(poses: Sequence[MeasuredPoses]) -> None:
         for one, own, count in zip(poses, values, numbers, strict=True)
         if own < count + 6
     ]
+    rows = sum(int(one.use.sum()) for one in poses)
+    if not problems and rows < 2 * PARTS:
+        problems.append(
+            Problem(
+                where=", ".join(str(one.aligned.recording.path) for one in poses),
+                what="has too few poses",
+                value=f"{rows} rows with a pose and every value",
+                allowed=f"{2 * PARTS} or more: of {PARTS} parts each is predicted from the others",
+                next_step="measure more poses: `compd plan --calibrate` chooses them",
+            )
+        )
     if problems:
         raise CompdError(problems)
 

@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.calibration.jacobian import without
 from compd.calibration.machine_fit import MachineFit
-from compd.calibration.prior_fit import Whitened, fit_with_prior, normal_equations, registration_of
+from compd.calibration.prior_fit import Whitened, fit_with_prior, normal_equations, open_columns, registration_of
 
 # Parts into which rows are dealt at random, and how often.
-_PARTS, _DEALS = 5, 2
+PARTS, _DEALS = 5, 2
 _SEED = 40
 # A direction in which poses lie within this share of the widest one has no regions.
 THIN_SHARE = 0.05
@@ -50,7 +51,7 @@ def folds(fit: MachineFit) -> list[Fold]:
     result = []
     for _ in range(_DEALS):
         part = [_dealt(rng, now.aligned.recording.visit, len(now.use)) for now in fit.now]
-        result += [Fold(False, tuple(own == k for own in part)) for k in range(_PARTS)]
+        result += [Fold(False, tuple(own == k for own in part)) for k in range(PARTS)]
     places_mm = [now.aligned.rows.tip_M_mm for now in fit.now]
     used_mm = np.concatenate([place[now.use] for place, now in zip(places_mm, fit.now, strict=True)])
     middle_mm, directions, spread_mm = principal_directions(used_mm)
@@ -93,15 +94,16 @@ def left_of(fit: MachineFit, free: BoolArray, fold: Fold) -> list[FloatArray]:
     for known, tested in zip(learned, unseen, strict=True):
         # a recording of which nothing else is left is registered by itself
         by: Whitened = known if len(known.z) >= known.R.shape[1] + _SPARE_VALUES else tested
-        left.append(tested.z - tested.J @ x - tested.R @ registration_of(by, x))
+        own = tested.z - tested.J @ x - tested.R @ registration_of(by, x)
+        left.append(without(own[:, None], open_columns(by.R, tested.R))[:, 0])
     return left
 
 
 def _dealt(rng: np.random.Generator, visit: IntArray | None, rows: int) -> IntArray:
     """(N,) number of the random part of each row, alike for the repeats of a visit."""
-    own = rng.permutation(rows) % _PARTS
+    own = rng.permutation(rows) % PARTS
     if visit is None:
         return np.asarray(own)
     names, place = np.unique(visit, return_inverse=True)
-    of_visit = rng.permutation(len(names)) % _PARTS
+    of_visit = rng.permutation(len(names)) % PARTS
     return np.asarray(np.where(visit >= 0, of_visit[place], own))

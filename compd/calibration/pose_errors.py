@@ -9,8 +9,10 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.calibration.calibration import PoseErrors
 from compd.calibration.held_out import Fold
+from compd.calibration.jacobian import without
 from compd.calibration.machine_fit import MachineFit, fit_machine, registered_mm
 from compd.calibration.poses import MeasuredPoses, PosesNow, links_of_pose
+from compd.calibration.prior_fit import open_columns
 from compd.model.effects import FittedEffect
 from compd.units import UM_PER_MM
 
@@ -39,10 +41,16 @@ def errors_of_folds(what: str, fit: MachineFit, drawn: MachineFit, folds: Sequen
 
 
 def _left_of_fold(now: PosesNow, learned: BoolArray, test: BoolArray) -> FloatArray:
-    """(N, m) registered by the rows learned from, or by those tested where these are too few."""
-    use = now.use & learned
-    values = now.registration_mm.shape[1] * int(use.sum())
-    return registered_mm(now, use if values > 2 * now.registration_mm.shape[2] else test)[1]
+    """(N, m) registered by the rows learned from, or by those tested where these are too few or leave it open."""
+    use, R_mm = now.use & learned, now.registration_mm
+    values = R_mm.shape[1] * int(use.sum())
+    use = use if values > 2 * R_mm.shape[2] else test
+    left_mm = registered_mm(now, use)[1]
+    if not test.any():
+        return left_mm
+    columns = open_columns(np.concatenate(R_mm[use]), np.concatenate(R_mm[test]))
+    left_mm[test] = without(left_mm[test].reshape(-1, 1), columns).reshape(left_mm[test].shape)
+    return left_mm
 
 
 def _errors(what: str, parts: Sequence[tuple[PosesNow, BoolArray, FloatArray, FloatArray]]) -> PoseErrors:

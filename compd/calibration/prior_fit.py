@@ -24,7 +24,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.calibration.jacobian import without
-from compd.statistics import solve_least_squares
+from compd.statistics import determined, solve_least_squares
 
 # Numbers at the stated tolerance that count as seen before.
 _SEEN_BEFORE = 2.0
@@ -125,6 +125,12 @@ def registration_of(part: Whitened, x: FloatArray) -> FloatArray:
     if not part.R.shape[1]:
         return np.zeros(0)
     return solve_least_squares(part.R, part.z - part.J @ x)
+
+
+def open_columns(known: FloatArray, tested: FloatArray) -> FloatArray:
+    """(n, q) of the registration's columns `tested` (n, Q) those that rows with the columns `known` (m, Q) leave open,
+    such as the place of a ball of which no row is known."""
+    return np.asarray(tested[:, ~determined(known)]) if len(known) else tested
 
 
 def _inverse(A: FloatArray) -> FloatArray:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from compd.configuration import Configuration
 
 DEFAULT_SOCKET = "/run/compd/compd.sock"
 
@@ -47,8 +50,14 @@ OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Overwrite a 
 
 def unix_address(address: str) -> str:
     """An address as it is; for a configuration file, the Unix socket that it names."""
+    configuration = addressed_configuration(address)
+    return address if configuration is None else configuration.sockets.unix.path
+
+
+def addressed_configuration(address: str) -> Configuration | None:
+    """The configuration that an address is the file of; None for a socket."""
     if not address.endswith((".yaml", ".yml")):
-        return address
+        return None
     from compd.configuration import load
 
-    return load(Path(address)).sockets.unix.path
+    return load(Path(address))

@@ -13,4 +13,5 @@ from .file_kind import FileKind as FileKind
 from .file_kind import without_values as without_values
 from .file_trust import own_users as own_users
 from .file_trust import trust_problem as trust_problem
+from .output_file import check_directory as check_directory
 from .output_file import check_replaceable as check_replaceable

@@ -33,3 +33,11 @@ def check_replaceable(path: Path, marks: Sequence[bytes], what: str, overwrite: 
     if problem is not None:
         next_step = "choose another name, or " + ("remove it" if overwrite is None else "write over it: --overwrite")
         raise CompdError(Problem(where=str(path), what=problem, next_step=next_step))
+
+
+def check_directory(path: Path) -> None:
+    """Raise CompdError where the directory of a file that is to be written is not there; called before long work."""
+    if not path.parent.is_dir():
+        raise CompdError(
+            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
+        )

@@ -297,6 +297,7 @@ def _sidecar(
         recording.sidecar.notes,
         recording.sidecar.folds,
         recording.sidecar.quantities_at_zero,
+        machine_file=recording.sidecar.machine_file,
     )
 
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 
 from compd.comparison import read_with_machine
+from compd.configuration import load_machine
 from compd.errors import Problem, RecordingError
 from compd.instruments import InstrumentExport, track_of
 from compd.joining.assignment import REPEAT_MM
 from compd.joining.at_rest import RestJoin, match_at_rest
 from compd.joining.by_time import Instrument, JoinResult, match_by_time
-from compd.recording import read_recording
+from compd.recording import Recording, read_recording
 
 JoinBy = Literal["time", "order", "name", "distance"]
 JOIN_BY: tuple[JoinBy, ...] = get_args(JoinBy)
@@ -31,7 +32,8 @@ class JoinOptions:
     instrument : what gave the reference. by : what puts rows together; None: the time, of a track in time.
     offset_s : recording time minus instrument time, with "time"; None: estimated from the motion.
     moving : with "time": rows in motion too. plan : with "name": the plan that was measured.
-    machine : the configuration of the machine; None: the shipped one that the recording names.
+    machine : the configuration of the machine, which the joined recording then names; None: the one that the
+        recording names.
     """
 
     instrument: Instrument = field(default_factory=Instrument)
@@ -90,7 +92,16 @@ def match_export(gauges: Path, export: InstrumentExport, options: JoinOptions) -
     if option := unfit_option(by, options):
         raise RecordingError(Problem(where=option, what=f"contradicts --by {by}", next_step="leave it out"))
     if by == "time":
-        recording = read_recording(gauges, needs_reference=False)
+        configuration = None if options.machine is None else load_machine(options.machine)
+        recording = _of_machine(read_recording(gauges, configuration, needs_reference=False), options.machine)
         return match_by_time(recording, track_of(export), options.instrument, options.offset_s, options.moving)
     recording, configuration = read_with_machine(gauges, options.machine, needs_reference=False)
+    recording = _of_machine(recording, options.machine)
     return match_at_rest(recording, configuration, export, options.instrument, by, options.plan)
+
+
+def _of_machine(recording: Recording, machine: Path | None) -> Recording:
+    """The recording with the stated configuration, if any, as that of its machine."""
+    if machine is None:
+        return recording
+    return replace(recording, sidecar=replace(recording.sidecar, machine_file=machine))

@@ -97,7 +97,14 @@ def joined_sidecar(
     provenance = {**recording.sidecar.provenance, "join": joined}
     sidecar = recording.sidecar
     return sidecar_contents(
-        recording.machine, reference, {}, provenance, sidecar.notes, sidecar.folds, sidecar.quantities_at_zero
+        recording.machine,
+        reference,
+        {},
+        provenance,
+        sidecar.notes,
+        sidecar.folds,
+        sidecar.quantities_at_zero,
+        machine_file=sidecar.machine_file,
     )
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.instruments import NumberColumns, ReadOptions, read_number_columns
-from compd.recording import write_recording
+from compd.recording import sidecar_contents, write_recording
 from compd.units import unit_factor, unit_named, unit_of
 
 # "X [mm]", "A (deg)", "X / mm", "X_mm": the name and its unit.
@@ -25,11 +26,11 @@ def is_machine_log(path: Path) -> bool:
 
 
 def write_log_recording(
-    log: Path, out: Path, machine: str, named: Sequence[str] = (), options: ReadOptions | None = None
+    log: Path, out: Path, configuration: Configuration, named: Sequence[str] = (), options: ReadOptions | None = None
 ) -> None:
     """Write a log as a recording: NAME.csv (`out`) and NAME.yaml, one row for each row of the log.
 
-    machine : name of the machine's configuration, for the sidecar.
+    configuration : of the machine, which the sidecar names.
     named : "COLUMN OF THE LOG=column of a recording", the unit after a colon where the log's header has none. Columns
         of the log that have the name of a recording's column already are taken as they are.
     options : how the file is read, as of an instrument's export.
@@ -51,7 +52,7 @@ def write_log_recording(
         raise RecordingError(problems)
     if not {"time_s", "point"} & set(columns):
         columns = {"point": np.arange(1.0, len(table.values) + 1), **columns}
-    write_recording(out, columns, {"machine": machine})
+    write_recording(out, columns, sidecar_contents(configuration.machine, machine_file=configuration.path))
 
 
 def _wanted(table: NumberColumns, named: Sequence[str], problems: list[Problem]) -> Mapping[int, tuple[str, str]]:

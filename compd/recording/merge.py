@@ -234,6 +234,7 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
         for recording, start_s in zip(recordings, starts_s, strict=True)
     ]
     first = recordings[0].sidecar
+    machine_files = {file and file.resolve() for file in (recording.sidecar.machine_file for recording in recordings)}
     return sidecar_contents(
         first.machine,
         reference_contents,
@@ -242,4 +243,5 @@ def _sidecar(recordings: Sequence[Recording], starts_s: Sequence[float]) -> dict
         folds=first.folds,
         quantities_at_zero=first.quantities_at_zero,
         trusted=trusted,
+        machine_file=first.machine_file if len(machine_files) == 1 else None,
     )

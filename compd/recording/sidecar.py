@@ -161,7 +161,8 @@ SECTIONS: Mapping[str, Any] = {
         BeforeValidator(_text_or_nothing),
         Field(
             description="the machine's configuration, as a path from the sidecar's directory; left out for a machine "
-            "that comes with compd, and where `--machine` names it"
+            "that comes with compd, and where `--machine` names it. `compd join --machine FILE` and "
+            "`compd record --daemon FILE.yaml` write it"
         ),
     ],
     "reference": Annotated[
@@ -335,15 +336,16 @@ def sidecar_contents(
     folds: Sequence[str] = (),
     quantities_at_zero: Mapping[str, float] | None = None,
     trusted: Mapping[int, str] | None = None,
-    machine_file: str = "",
+    machine_file: Path | None = None,
 ) -> dict[str, Any]:
     """Contents of a sidecar as plain data, without keys that have no value.
 
     excluded, trusted : spreadsheet row -> reason, as `Sidecar.excluded`.
+    machine_file : the machine's configuration; `sidecar_text` shortens it.
     """
     contents = {
         "machine": machine,
-        "machine_file": machine_file,
+        "machine_file": "" if machine_file is None else str(machine_file.resolve()),
         "reference": reference,
         "folds": list(folds),
         "quantities_at_zero": None if quantities_at_zero is None else dict(quantities_at_zero),
@@ -357,9 +359,16 @@ def sidecar_contents(
     }
 
 
-def sidecar_text(contents: Mapping[str, Any]) -> str:
-    """The file's text, with the format's number first."""
-    return yaml.safe_dump({"format": FORMAT, **contents}, sort_keys=False, allow_unicode=True)
+def sidecar_text(contents: Mapping[str, Any], directory: Path) -> str:
+    """The text of a sidecar in `directory`, with the format's number first.
+
+    A `machine_file` beside the sidecar or below becomes relative, so that both can be moved together, and the text
+    tells nothing of the place. Elsewhere it stays an absolute path.
+    """
+    told = {"format": FORMAT, **contents}
+    if (machine_file := Path(told.get("machine_file", ""))).is_relative_to(directory.resolve()):
+        told["machine_file"] = machine_file.relative_to(directory.resolve()).as_posix()
+    return yaml.safe_dump(told, sort_keys=False, allow_unicode=True)
 
 
 def _refuse_newer_format(document: Document) -> None:

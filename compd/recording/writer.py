@@ -41,7 +41,7 @@ def write_recording(
         raise RecordingError(problems)
     rounded = {name: _rounded(name, values) for name, values in arrays.items()}
     table = _parquet(path, rounded) if path.suffix == PARQUET else _csv_text(rounded)
-    write_recording_files({path.with_suffix(".yaml"): sidecar_text(sidecar), path: table})
+    write_recording_files({path.with_suffix(".yaml"): sidecar_text(sidecar, path.parent), path: table})
 
 
 def write_recording_files(contents: Mapping[Path, Content]) -> None:

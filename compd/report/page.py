@@ -21,8 +21,7 @@ from markupsafe import Markup
 from plotly.graph_objects import Figure
 from plotly.offline import get_plotlyjs
 
-from compd.errors import CompdError, Problem
-from compd.files import check_replaceable
+from compd.files import check_directory, check_replaceable
 from compd.release import __version__
 from compd.report.page_table import PageTable
 
@@ -70,10 +69,7 @@ def check_page_path(path: Path, overwrite: bool | None = None) -> None:
 
     overwrite : whether to write over a file that is no page of compd; another page is replaced in any case.
     """
-    if not path.parent.is_dir():
-        raise CompdError(
-            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
-        )
+    check_directory(path)
     check_replaceable(path, _PAGE_MARKS, "a page of compd", overwrite)
 
 

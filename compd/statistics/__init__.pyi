@@ -5,6 +5,7 @@ from .gaps import filled as filled
 from .last_digit import last_digit_um as last_digit_um
 from .least_squares import DIAGONAL_GUARD as DIAGONAL_GUARD
 from .least_squares import column_norms as column_norms
+from .least_squares import determined as determined
 from .least_squares import normal_inverse as normal_inverse
 from .least_squares import normal_norms as normal_norms
 from .least_squares import ridge_inverse as ridge_inverse

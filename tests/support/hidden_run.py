@@ -55,7 +55,11 @@ def write_configuration(directory: Path) -> Path:
         )
         data["wiring"]["quantities"].append({"name": name, "gauge": f"cabinet.{name.lower()}"})
         address += 2
-    # several machines side by side on one computer: each with its own Unix socket, none in a hurry
+    return write_unhurried(directory / TRIPOD.name, data)
+
+
+def write_unhurried(path: Path, data: dict[str, Any]) -> Path:
+    """A configuration for one of several machines side by side on one computer: its own Unix socket, no hurry."""
     del data["sockets"]["tcp"]
     data["loop"]["rate_hz"] = LOOP_HZ
     for line in data["lines"].values():
@@ -63,7 +67,6 @@ def write_configuration(directory: Path) -> Path:
     # their devices stand still with the computer, and count on after it
     for gauge in data["gauges"].values():
         gauge["trust_after_loss"] = True
-    path = directory / TRIPOD.name
     path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
     return path
 

@@ -19,7 +19,7 @@ from compd.configuration import load
 from compd.machine_kinds import KINDS, machine_text
 from compd.simulation import Mechanism
 from compd.simulation.truth.workspace import draw_points_mm
-from tests.support.hidden_run import LOOP_HZ, POLL_EVERY_S, hidden_run, parse_output
+from tests.support.hidden_run import hidden_run, parse_output, write_unhurried
 from tests.support.hidden_visits import Visit, check_visits, survey_visits, visits_to
 from tests.support.pose_controller import pose_controller
 from tests.support.simulated import run_directory
@@ -72,14 +72,7 @@ def written(directory: Path, machine: Machine) -> Path:
         data["gauges"] = {"thermometers": data["gauges"]["thermometers"]}
         data["wiring"] = {"quantities": data["wiring"]["quantities"], "frame_drift_um": 0}
         data["sockets"]["target"] = {"valid_for_s": 60}
-    del data["sockets"]["tcp"]
-    data["loop"]["rate_hz"] = LOOP_HZ
-    data["lines"]["cabinet"]["poll_every_s"] = POLL_EVERY_S
-    for gauge in data["gauges"].values():
-        gauge["trust_after_loss"] = True
-    path = directory / "mine.yaml"
-    path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
-    return path
+    return write_unhurried(directory / "mine.yaml", data)
 
 
 def visits(path: Path) -> tuple[list[Visit], list[Visit]]:

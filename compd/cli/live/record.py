@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, addressed_configuration
 from compd.tables import TableFormat
 
 _MB = 1_000_000
@@ -59,7 +59,8 @@ def record(
 ) -> None:
     """Record raw, uncorrected readings from the running daemon: table, sidecar, and all input of a replay.
 
-    When the daemon ends and starts again, the recording goes on in a new part.
+    When the daemon ends and starts again, the recording goes on in a new part. With `--daemon FILE.yaml` the sidecars
+    name that file as the machine's, and later commands need no `--machine`.
     """
     from compd.cli.progress import ElapsedShown
     from compd.client import connect
@@ -71,7 +72,8 @@ def record(
     )
     for_s = burst if burst is not None else seconds
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    clock, socket_path = MonotonicClock(), unix_address(address)
+    clock, configuration = MonotonicClock(), addressed_configuration(address)
+    socket_path = address if configuration is None else configuration.sockets.unix.path
     with ElapsedShown(for_s, clock) as shown:
         feed = ReadingsFeed(
             lambda: connect(socket_path, max(_TIMEOUT_S, 3 / rate_hz)),
@@ -79,7 +81,7 @@ def record(
             shown.say,
             clock,
         )
-        recorder = Recorder(name, *feed.first_messages, keeping, shown.say, clock, table_format)
+        recorder = Recorder(name, *feed.first_messages, keeping, shown.say, clock, table_format, configuration)
         recorder.start()
         try:
             recorder.follow(shown.show(feed.messages(for_s), lambda: f"{recorder.rows} rows"))

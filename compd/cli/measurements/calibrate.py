@@ -67,8 +67,11 @@ def calibrate(
         check_page_path(html, overwrite)
     if out is not None:
         from compd.built_machine import BUILT_MARK
-        from compd.files import check_replaceable
+        from compd.files import check_directory, check_replaceable
 
+        if out.suffix not in (".yaml", ".yml"):
+            raise typer.BadParameter(f"{out} is no configuration: NAME.yaml", param_hint="--out")
+        check_directory(out)
         check_replaceable(out, (BUILT_MARK,), "a machine as built", overwrite)
 
     def opened(path: Path, stated: list[str] | None = None) -> AlignedRecording:

@@ -137,7 +137,7 @@ def join(
         if machine is None:
             raise typer.BadParameter(f"{gauges} has no sidecar, so it is a machine's own log, which needs --machine")
         recorded = out.with_name(f"{out.stem}-machine.csv")
-        write_log_recording(gauges, recorded, load_machine(machine).machine, log or ())
+        write_log_recording(gauges, recorded, load_machine(machine), log or ())
         typer.echo(f"{gauges}: the machine's own log, as a recording: {recorded}")
         gauges = recorded
     joined = match_export(gauges, exported, options)

@@ -180,7 +180,7 @@ def _numbers(option: str, text: str, count: int) -> list[float]:
                 where=option,
                 what="is not understood",
                 value=text,
-                allowed=f"{count} numbers with commas, low before high",
+                allowed="a number" if count == 1 else f"{count} numbers with commas, low before high",
             )
         )
     return values

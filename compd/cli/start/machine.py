@@ -87,8 +87,7 @@ def new(
     if out is None:
         typer.echo(text, nl=False)
         return
-    if out.exists() and not overwrite:
-        raise typer.BadParameter(f"{out} exists: give --overwrite to replace it")
+    _check_free(out, overwrite)
     out.write_text(text, encoding="utf-8")
     typer.echo(f"{out}: a {kind}. Next: `compd machine draw {out}`, `compd check {out}`")
 
@@ -177,10 +176,17 @@ def export(
     if out is None:
         typer.echo(text, nl=False)
         return
-    if out.exists() and not overwrite:
-        raise typer.BadParameter(f"{out} exists: give --overwrite to replace it")
+    _check_free(out, overwrite)
     out.write_text(text, encoding="utf-8")
     typer.echo(f"{out}: {configuration.machine} for {shape.value}")
+
+
+def _check_free(out: Path, overwrite: bool) -> None:
+    from compd.files import check_directory
+
+    check_directory(out)
+    if out.exists() and not overwrite:
+        raise typer.BadParameter(f"{out} exists: give --overwrite to replace it")
 
 
 def _three(text: str) -> tuple[float, float, float]:

@@ -30,6 +30,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from compd.clock import Clock
+from compd.configuration import Configuration
 from compd.errors import CompdError, Problem, RecordingError, StateError
 from compd.live.record.part_table import close_left_parts
 from compd.live.record.readings_feed import FeedItem
@@ -89,9 +90,11 @@ class Recorder:
         report: Callable[[str], None],
         clock: Clock,
         table_format: TableFormat = TableFormat.CSV,
+        configuration: Configuration | None = None,
     ) -> None:
         """`name`: path of the parts without "-0001.csv"; `version`, `watch`: the daemon's first two messages;
-        `report`: called with sentences for the user. Raises RecordingError where a recording of this name exists, and
+        `report`: called with sentences for the user; `configuration`: the daemon's as far as it is known, which the
+        sidecars of its parts name. Raises RecordingError where a recording of this name exists, and
         for Parquet without pyarrow.
         """
         close_left_parts(name, report)
@@ -109,6 +112,7 @@ class Recorder:
         self._name = name
         self._first_messages = (version, watch)
         self._table_format = table_format
+        self._configuration = configuration
         self._every_cycle = "rate_hz" not in watch
         self._limits = limits
         self._report = report
@@ -267,11 +271,24 @@ class Recorder:
         stem = self._name.with_name(f"{self._name.name}-{self._part_count + 1:04d}")
         age = timedelta(seconds=self._clock.monotonic() - message["time_s"])
         started_at = (datetime.now(UTC) - age).isoformat(timespec="milliseconds")
-        part = RecordingPart(stem, item.first_messages, message, self._origin_s, started_at, self._table_format)
+        machine_file = self._machine_file(item.first_messages[0])
+        part = RecordingPart(
+            stem, item.first_messages, message, self._origin_s, started_at, self._table_format, machine_file
+        )
         self._parts.append(part)
         self._part_count += 1
         self._report(f"{part.path} begins")
         return part
+
+    def _machine_file(self, version: Message) -> Path | None:
+        """The file of the configuration, where the daemon runs with what it holds."""
+        known = self._configuration
+        if known is None:
+            return None
+        if known.config_hash != version["config_hash"]:
+            self._report(f"the daemon runs with another configuration than {known.path}, which is not named")
+            return None
+        return known.path
 
     def _total_bytes(self) -> int:
         return sum(part.size for part in self._parts)

@@ -40,6 +40,7 @@ class RecordingPart:
         origin_s: float,
         started_at: str,
         table_format: TableFormat = TableFormat.CSV,
+        machine_file: Path | None = None,
     ) -> None:
         """Write the sidecar and begin the other files. Raises OSError, and leaves none of them then.
 
@@ -51,8 +52,10 @@ class RecordingPart:
         origin_s : monotonic time that is 0 in the column time_s.
         started_at : UTC of the first row, ISO 8601.
         table_format : of the table.
+        machine_file : the machine's configuration, where it is known.
         """
         version, watch = self.first_messages = first_messages
+        self._machine_file = machine_file
         self._sidecar_path = stem.with_name(f"{stem.name}.yaml")
         self._cycles_path = stem.with_name(f"{stem.name}{CYCLES_SUFFIX}")
         self.zero: Message = first_readings["zero"]
@@ -60,7 +63,7 @@ class RecordingPart:
         self.rows = 0
         self._rows_added = 0
         self._table_rows = TableRows(watch, first_readings, origin_s)
-        sidecar = sidecar_text(self._sidecar(version, watch, started_at)).encode()
+        sidecar = sidecar_text(self._sidecar(version, watch, started_at), stem.parent).encode()
         first_lines = b"".join(encode_compact(message).encode() + b"\n" for message in first_messages)
         self._table = part_table(stem, table_format, self._table_rows.names, self._table_rows.in_full)
         self._stem = stem
@@ -176,5 +179,6 @@ class RecordingPart:
             },
             # effects of an external machine count as they are written
             quantities_at_zero=None if version["machine"] == EXTERNAL else self.zero.get("quantities"),
+            machine_file=self._machine_file,
             notes="Raw readings less machine zero, before any correction: raw in mm = zero_mm + sign * column.",
         )

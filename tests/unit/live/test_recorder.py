@@ -52,6 +52,25 @@ def test_it_is_a_recording_of_the_format(tmp_path, name):
     assert set(recording.quantities) == {q.name for q in run.machine.configuration.wiring.quantities}
 
 
+def test_it_names_its_machine_where_the_daemon_runs_with_that_file(tmp_path):
+    """A file that has changed since the daemon started is another machine's."""
+    run, reports = Run(machine()), []
+    known = run.machine.configuration
+    for name, config_hash in (("own", known.config_hash), ("changed", "0" * 64)):
+        version = run.version | {"config_hash": config_hash}
+        recorder = Recorder(
+            tmp_path / name, version, run.watch, ROOMY, reports.append, MonotonicClock(), configuration=known
+        )
+        recorder.start()
+        for line, message, _ in run.quiet(3):
+            recorder.put(line, message)
+        recorder.close()
+    own, other = (yaml.safe_load((tmp_path / f"{name}-0001.yaml").read_text()) for name in ("own", "changed"))
+    assert own["machine_file"] == str(known.path.resolve())
+    assert "machine_file" not in other
+    assert any("runs with another configuration" in text for text in reports)
+
+
 def test_zero_plus_column_is_the_raw_reading_whatever_the_sign(tmp_path):
     plain = machine().configuration
     first, *others = plain.wiring.joint

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from compd.errors import RecordingError
 from compd.recording.convert import convert_recording
@@ -54,6 +55,14 @@ def test_the_gap_is_from_the_sidecars_where_both_say_when_they_began(tmp_path: P
     assert result.starts_s == (0.0, 3600.0)
     backwards = merge_recordings([second, first], tmp_path / "backwards.csv")
     assert not backwards.gap_known
+
+
+@pytest.mark.parametrize(("other", "named"), [("../mine.yaml", "mine.yaml"), ("../yours.yaml", None)])
+def test_the_machine_is_named_where_all_name_the_same(tmp_path: Path, other: str, named: str | None) -> None:
+    first = recording(tmp_path / "first", csv_text(), SIDECAR + "machine_file: ../mine.yaml\n")
+    second = recording(tmp_path / "second", csv_text(), SIDECAR + f"machine_file: {other}\n")
+    merge_recordings([first, second], tmp_path / "both.csv")
+    assert yaml.safe_load((tmp_path / "both.yaml").read_text(encoding="utf-8")).get("machine_file") == named
 
 
 def test_what_does_not_fit_together_is_refused_all_at_once(tmp_path: Path) -> None:
