@@ -76,7 +76,7 @@ class Campaign:
             if item.session != session:
                 session = item.session
                 self._switch_on(item)
-            self._wait_until(item.start_s)
+            self._wait_until(item.start_s, item)
             self._world.heat(item.heat)
             self._world.force_M_N = item.force_M_N
             if item.kind == "visit":
@@ -98,12 +98,14 @@ class Campaign:
         self._world.heat(switched_off(self._mechanism.links))
         self._world.force_M_N = np.zeros(3)
         if self._plan.warm_up:
-            self._wait_until(first.start_s - self._plan.warm_up_s)
+            self._wait_until(first.start_s - self._plan.warm_up_s, first)
             self._world.heat(self._plan.warm_up[first.session - 1])
 
-    def _wait_until(self, time_s: float) -> None:
+    def _wait_until(self, time_s: float, following: CampaignItem) -> None:
+        """Stand still until `time_s`. A pass begins with a row on the spot; a visit moves away first."""
+        wait = self._stay if following.kind == "pass" else self._world.wait
         while time_s - self._world.time_s > 1e-9:
-            self._stay(min(time_s - self._world.time_s, MAX_WAIT_S))
+            wait(min(time_s - self._world.time_s, MAX_WAIT_S))
 
     def _stay(self, time_s: float) -> None:
         self._world.advance_to(self._world.scale_mm, self._world.posture, time_s, 0.0)

@@ -102,6 +102,7 @@ class GaugeLatency(Cause):
     unit = "ms"
     max_strength = 50.0
     only_in_motion = True
+    remembers_readings = True
 
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
         super().__init__(strength, mechanism, rng)
