@@ -86,7 +86,7 @@ class Equilibrium:
 
         supports_M = self._frame.supports_M(warm, np.zeros((3, 3)))
         base_M = machine.base_joints_M(supports_M, stretch, scale_mm)
-        closure = self._closure.with_base_turned(machine.base_turn(supports_M))
+        closure = machine.turned_with_base(self._closure, supports_M)
         posture = closure.by_lengths(base_M, joints_P, lengths_mm, guess)
         platform_M = homogeneous(joints_P) @ posture
         total_N, total_lateral_M = self._forces(closure, posture, base_M, joints_P, force_M_N)
@@ -120,7 +120,7 @@ class Equilibrium:
             + _sum((cause.link_extension_mm(inputs) for cause in causes), machine.links)
             + machine.extensions(beyond_mm)
         )
-        closure = self._closure.with_base_turned(machine.base_turn(supports_M))
+        closure = machine.turned_with_base(self._closure, supports_M)
         posture = closure.by_lengths(
             machine.base_joints_M(supports_M, stretch, scale_mm + beyond_mm)
             + balls.base_across_M

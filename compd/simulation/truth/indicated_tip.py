@@ -46,7 +46,7 @@ class IndicatedTip:
             supports_M = self._supports_M(self._distances0_mm + frame_mm)
         base_M = mechanism.base_joints_M(supports_M, 0.0, scale_mm)
         lengths_mm = mechanism.lengths_at(scale_mm) - self._weights @ joint_mm
-        closure = mechanism.closure.with_base_turned(mechanism.base_turn(supports_M))
+        closure = mechanism.turned_with_base(mechanism.closure, supports_M)
         posture = closure.by_lengths(base_M, mechanism.joints_P, lengths_mm, guess)
         if mechanism.tip_frame == "M":
             return np.asarray(homogeneous(mechanism.tip0_P) @ posture)
