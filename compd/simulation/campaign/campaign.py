@@ -28,7 +28,6 @@ from compd.simulation.truth.instruments import EXACT, ReferenceInstrument
 from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, Move
 from compd.simulation.truth.probing import PROBING_STEP_S, probing_steps_mm
 from compd.simulation.truth.strengths import Strengths
-from compd.simulation.truth.workspace import posture_at_scales
 from compd.simulation.truth.world import World
 
 # Longest step (s) of the time between sessions, for causes with a memory.
@@ -66,7 +65,6 @@ class Campaign:
         self._balls_M = balls_M
         self._places = places
         self._direction = np.ones(self._mechanism.scales)
-        self._postures = [posture_at_scales(self._mechanism, scale_mm) for scale_mm in plan.points_mm]
         self._visit = 0
 
     def run(self) -> LoggedRows:
@@ -113,13 +111,13 @@ class Campaign:
     def _go_to(self, item: CampaignItem) -> None:
         """Move to the item's point, rest, and touch what is to be touched there."""
         self._visit += 1
-        guess = self._postures[item.point - 1]
+        guess = self._plan.postures[item.point - 1]
         self._move(self._plan.points_mm[item.point - 1], guess, VISIT_S - 2 * REPEAT_AFTER_S)
         self._touch(item.point - 1)
 
     def _touch(self, point: int) -> None:
         """Bring the tip to the object that it touches at a point (from 0), if there is one."""
-        target_M, guess = self._target_M(point), self._postures[point]
+        target_M, guess = self._target_M(point), self._plan.postures[point]
         if target_M is not None:
             for scale_mm in probing_steps_mm(self._world, target_M, guess):
                 self._move(scale_mm, guess, PROBING_STEP_S)

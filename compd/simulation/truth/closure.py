@@ -49,7 +49,9 @@ _NOTHING = np.zeros(1)
 
 def homogeneous(points_P: FloatArray) -> FloatArray:
     """(..., 3) places in {P}, mm -> (..., 4) rows; rows @ posture are the places in {M}."""
-    return np.concatenate([np.ones((*points_P.shape[:-1], 1)), points_P], axis=-1)
+    rows = np.empty((*points_P.shape[:-1], 4))
+    rows[..., 0], rows[..., 1:] = 1.0, points_P
+    return rows
 
 
 def direction_rows(axes_P: FloatArray) -> FloatArray:
@@ -198,9 +200,7 @@ class _Joints:
         self._by_hinge = self._by_joint[self._link]
         self._by_axis = self._axes[:, :, None]
 
-    def at(
-        self, posture: Posture, base_M: FloatArray
-    ) -> tuple[FloatArray, FloatArray, Callable[[], list[FloatArray]]]:
+    def at(self, posture: Posture, base_M: FloatArray) -> tuple[FloatArray, FloatArray, Callable[[], list[FloatArray]]]:
         """Link lengths (n,), link components along the revolute axes (r,), and their gradients (n, 12) and (r, 12)."""
         links_M = self._rows @ posture - base_M
         lengths = np.sqrt((links_M * links_M).sum(axis=1))

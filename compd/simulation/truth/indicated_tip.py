@@ -6,6 +6,7 @@ that the gauges do not measure.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -62,7 +63,8 @@ class IndicatedTip:
             ends = np.concatenate([supports_M, plate_M])
             gradient = np.zeros((9, 6, 3))
             for row, (first, second) in enumerate(DISTANCE_ENDS):
-                along = (ends[first] - ends[second]) / np.linalg.norm(ends[first] - ends[second])
+                between = ends[first] - ends[second]
+                along = between / math.sqrt(between @ between)
                 gradient[row, first], gradient[row, second] = along, -along
             supports_M = supports_M + np.linalg.solve(gradient[:, :3].reshape(9, 9), residual_mm).reshape(3, 3)
         return supports_M
