@@ -116,4 +116,4 @@ def angles(axes: FloatArray, directions: FloatArray) -> FloatArray:
 
 
 def _across(triads: FloatArray, displacement: FloatArray) -> FloatArray:
-    return np.asarray(displacement[:, [1]] * triads[:, 1] + displacement[:, [2]] * triads[:, 2])
+    return np.asarray(displacement[:, 1:2] * triads[:, 1] + displacement[:, 2:3] * triads[:, 2])
