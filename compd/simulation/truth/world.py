@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -76,7 +77,6 @@ class World:
         self._frame = Frame(self._mechanism, self._strengths)
         self._joints = Joints(self._mechanism, self._strengths, joint_rng)
         self._sensors = Sensors(geometry, wiring, self._strengths, sensor_rng)
-        self._points_mm = draw_points_mm(self._mechanism, self._tour_rng)
         self._stroke_mm = self._mechanism.stroke_mm
         self._motion: TourMotion | SetpointMotion | PlanMotion | FollowMotion = SetpointMotion(
             standing(np.zeros(self._mechanism.scales))
@@ -162,6 +162,11 @@ class World:
             )
         self._motion = PlanMotion(self._rows, self._braking(), self.hold, self._speedup, [*self._points_mm])
         self.mode, self.zero_hold_s = "plan", 0.0
+
+    @cached_property
+    def _points_mm(self) -> FloatArray:
+        """(POINTS, n) scale values at the tour's points; a campaign, which has points of its own, never asks."""
+        return draw_points_mm(self._mechanism, self._tour_rng)
 
     @property
     def unnatural_K_per_s(self) -> float:
