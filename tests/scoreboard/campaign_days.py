@@ -39,8 +39,8 @@ HEIGHTS, VISITS_PER_HEIGHT = 8, 24
 ELSEWHERE_K = (5.0, 12.0)
 # Places at which a plane is touched.
 TOUCHED = 48
-# Families whose campaign is unlike the usual one, so that the size of an error counts in it.
-OWN_DAYS = (hard.ONE_WARM_UP, hard.PLACE_BY_PLACE, hard.PLANE, hard.ZERO_ELSEWHERE)
+# Families in which the size of an error counts in the usual campaign and not in their own, as in all others.
+SIZED_ON_USUAL_DAYS = ("short", "warm-start", hard.WRONG_NOISE)
 
 
 class LaterWeather(WorkshopWeather):

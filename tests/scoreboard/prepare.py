@@ -21,7 +21,7 @@ from compd.simulation.causes.hidden_cause import HiddenCause, answer
 from compd.simulation.causes.sudden_change import NoCause, SuddenChange
 from compd.simulation.truth.instruments import PIN
 from tests.scoreboard import recording_faults as faults
-from tests.scoreboard.campaign_days import OWN_DAYS, air_at_zero, days, touched_plane
+from tests.scoreboard.campaign_days import SIZED_ON_USUAL_DAYS, air_at_zero, days, touched_plane
 from tests.scoreboard.case import THERMOMETERS, Case
 from tests.scoreboard.case_machine import configuration_of, period_mm
 from tests.scoreboard.expectation import ALWAYS_THERE, LEFT_UM, expectation
@@ -93,7 +93,7 @@ def _record(case: Case, directory: Path) -> dict[str, Any]:
     mechanism = Mechanism(geometry)
     places = touched_plane(case, mechanism) if case.family == PLANE else None
     plans = [days(case, mechanism, number, places) for number in range(len(RECORDINGS))]
-    sized_on = plans[0] if case.family in OWN_DAYS else None
+    sized_on = None if case.family in SIZED_ON_USUAL_DAYS else plans[0]
     sizer = CauseSizer(geometry, wiring, case.seed, air_at_zero=air_at_zero(case), plan=sized_on)
     hidden = [sizer.size(HiddenCause(*wanted)) for wanted in zip(case.causes, [None] * 9, case.floors, strict=False)]
     weak = sizer.weak_disturbances(case.causes)

@@ -28,7 +28,6 @@ from compd.simulation.truth.instruments import EXACT, ReferenceInstrument
 from compd.simulation.truth.motion import ACCELERATION_MM_PER_S2, Move
 from compd.simulation.truth.probing import PROBING_STEP_S, probing_steps_mm
 from compd.simulation.truth.strengths import Strengths
-from compd.simulation.truth.workspace import posture_at_scales
 from compd.simulation.truth.world import World
 
 # Longest step (s) of the time between sessions, for causes with a memory.
@@ -66,7 +65,6 @@ class Campaign:
         self._balls_M = balls_M
         self._places = places
         self._direction = np.ones(self._mechanism.scales)
-        self._postures = [posture_at_scales(self._mechanism, scale_mm) for scale_mm in plan.points_mm]
         self._visit = 0
 
     def run(self) -> LoggedRows:
@@ -76,7 +74,7 @@ class Campaign:
             if item.session != session:
                 session = item.session
                 self._switch_on(item)
-            self._wait_until(item.start_s)
+            self._wait_until(item.start_s, item)
             self._world.heat(item.heat)
             self._world.force_M_N = item.force_M_N
             if item.kind == "visit":
@@ -98,12 +96,14 @@ class Campaign:
         self._world.heat(switched_off(self._mechanism.links))
         self._world.force_M_N = np.zeros(3)
         if self._plan.warm_up:
-            self._wait_until(first.start_s - self._plan.warm_up_s)
+            self._wait_until(first.start_s - self._plan.warm_up_s, first)
             self._world.heat(self._plan.warm_up[first.session - 1])
 
-    def _wait_until(self, time_s: float) -> None:
+    def _wait_until(self, time_s: float, following: CampaignItem) -> None:
+        """Stand still until `time_s`. A pass begins with a row on the spot; a visit moves away first."""
+        wait = self._stay if following.kind == "pass" else self._world.wait
         while time_s - self._world.time_s > 1e-9:
-            self._stay(min(time_s - self._world.time_s, MAX_WAIT_S))
+            wait(min(time_s - self._world.time_s, MAX_WAIT_S))
 
     def _stay(self, time_s: float) -> None:
         self._world.advance_to(self._world.scale_mm, self._world.posture, time_s, 0.0)
@@ -111,13 +111,13 @@ class Campaign:
     def _go_to(self, item: CampaignItem) -> None:
         """Move to the item's point, rest, and touch what is to be touched there."""
         self._visit += 1
-        guess = self._postures[item.point - 1]
+        guess = self._plan.postures[item.point - 1]
         self._move(self._plan.points_mm[item.point - 1], guess, VISIT_S - 2 * REPEAT_AFTER_S)
         self._touch(item.point - 1)
 
     def _touch(self, point: int) -> None:
         """Bring the tip to the object that it touches at a point (from 0), if there is one."""
-        target_M, guess = self._target_M(point), self._postures[point]
+        target_M, guess = self._target_M(point), self._plan.postures[point]
         if target_M is not None:
             for scale_mm in probing_steps_mm(self._world, target_M, guess):
                 self._move(scale_mm, guess, PROBING_STEP_S)

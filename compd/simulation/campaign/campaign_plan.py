@@ -12,7 +12,7 @@ from compd.arrays import FloatArray
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.warm_up import COLUMNS, Heat
 from compd.simulation.truth.weather import STANDARD_AIR, AirAtZero, Weather, WorkshopWeather
-from compd.simulation.truth.workspace import draw_points_mm
+from compd.simulation.truth.workspace import draw_points_mm, posture_at_scales
 
 SESSIONS = 4
 POINTS = 48
@@ -61,7 +61,8 @@ class CampaignItem:
 class CampaignPlan:
     """A campaign's items in order of time.
 
-    number : of the campaign on the same machine. points_mm : (points, n) scale values. weather : of all sessions.
+    number : of the campaign on the same machine. points_mm : (points, n) scale values. postures : (points, 4, 3) there,
+    all parts as drawn. weather : of all sessions.
     warm_up_s, warm_up : time (s) that the machine is on before each session, with this heat (one per session); 0: it is
     switched on as the session begins.
     """
@@ -69,6 +70,7 @@ class CampaignPlan:
     number: int
     items: tuple[CampaignItem, ...]
     points_mm: FloatArray
+    postures: FloatArray
     weather: Weather
     warm_up_s: float = 0.0
     warm_up: tuple[Heat, ...] = ()
@@ -109,6 +111,7 @@ def draw_campaign_plan(
     rng = np.random.default_rng([seed, 1, number])
     if points_mm is None:
         points_mm = draw_points_mm(mechanism, rng, POINTS)
+    postures = np.array([posture_at_scales(mechanism, scale_mm) for scale_mm in points_mm])
     session_s = (VISITS_PER_SESSION + passes) * VISIT_S
     starts_s = [warm_up_s + session * (session_s + GAP_S) for session in range(SESSIONS)]
     weather = WorkshopWeather(starts_s, session_s, rng, air_at_zero)
@@ -118,10 +121,10 @@ def draw_campaign_plan(
         for item in _session(session, start, mechanism.links, len(points_mm), passes, rng)
     ]
     if warm_up_s == 0:
-        return CampaignPlan(number, tuple(items), points_mm, weather)
+        return CampaignPlan(number, tuple(items), points_mm, postures, weather)
     warm_up_rng = np.random.default_rng([seed, 3, number])
     warm_up = tuple(_heat(mechanism.links, warm_up_rng, WARM_UP_W) for _ in starts_s)
-    return CampaignPlan(number, tuple(items), points_mm, weather, warm_up_s, warm_up)
+    return CampaignPlan(number, tuple(items), points_mm, postures, weather, warm_up_s, warm_up)
 
 
 def switched_off(links: int) -> Heat:

@@ -71,15 +71,18 @@ class RowLog:
         self._indicated = IndicatedTip(world.mechanism, wiring) if reference.sigma_um == 0 else None
         # machine zero averages for a second, which removes nearly all noise of a thermometer
         self.rows = LoggedRows(quantities_at_zero=world.quantities())
+        self._scale_columns = scale_columns(world.mechanism.scales)
+        self._approach_columns = approach_columns(world.mechanism.scales * self._has_scales)
+        displacements = [name for kind in ("joint_", "frame_") for name in world.names if name.startswith(kind)]
+        self._displacement_columns = {name: f"{name}_um" for name in displacements}
+        others = ("temperature_", "pressure_", "humidity_", "force_")
+        self._others = [name for name in world.names if name.startswith(others)]
 
     def add(self, session: int, visit: int, point: int | None, direction: FloatArray, measured: bool = True) -> None:
         """Add a row. direction : (n,) of each link's last motion. measured : whether the reference measures, too."""
         world = self._world
         readings = {name: world.sense(name) for name in world.names}
-        joints = [name for name in readings if name.startswith("joint_")]
-        frames = [name for name in readings if name.startswith("frame_")]
-        scales = {column: readings[f"scale_{i}"] for i, column in enumerate(scale_columns(world.mechanism.scales), 1)}
-        others = [name for name in readings if name.startswith(("temperature_", "pressure_", "humidity_", "force_"))]
+        scales = {column: readings[f"scale_{i}"] for i, column in enumerate(self._scale_columns, 1)}
         self.rows.add(
             {
                 "time_s": round(world.time_s, 6),
@@ -87,9 +90,9 @@ class RowLog:
                 "point": np.nan if point is None else point,
                 "visit": visit,
                 **(scales if self._has_scales else self._told(np.array(list(scales.values())))),
-                **{f"{name}_um": readings[name] / UM for name in (*joints, *frames)},
-                **{name: round(readings[name], 3) for name in others},
-                **dict(zip(approach_columns(len(direction) * self._has_scales), direction, strict=False)),
+                **{column: readings[name] / UM for name, column in self._displacement_columns.items()},
+                **{name: round(readings[name], 3) for name in self._others},
+                **dict(zip(self._approach_columns, direction, strict=False)),
                 **(self._reference_values(point) if measured else dict.fromkeys(self._reference_columns(), np.nan)),
             }
         )

@@ -103,18 +103,26 @@ class JointContact(Cause):
     min_strength = 0.01
     max_strength = 1.0
 
+    def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
+        super().__init__(strength, mechanism, rng)
+        # forces at machine zero and the approaches that belong to them, which one machine keeps
+        self._at_zero: tuple[FloatArray, FloatArray] | None = None
+
     def link_extension_mm(self, inputs: CauseInputs) -> FloatArray:
-        return np.asarray(self._approach_mm(inputs.axial_N) - self._approach_mm(inputs.axial0_N))
+        if self._at_zero is None or self._at_zero[0] is not inputs.axial0_N:
+            self._at_zero = inputs.axial0_N, self._approach_mm(inputs.axial0_N)
+        return np.asarray(self._approach_mm(inputs.axial_N) - self._at_zero[1])
 
     def _approach_mm(self, force_N: FloatArray) -> FloatArray:
         """(n,) displacement at which the forces of the two seats differ by `force_N`."""
         contact = max(self.strength * UM, 1e-12)
         closed = contact * PRELOAD_N ** (2 / 3)
-        low, high = np.zeros_like(force_N), np.full_like(force_N, contact * (np.abs(force_N).max() + 4) ** (2 / 3))
+        wanted = np.abs(force_N)
+        low, high = np.zeros_like(force_N), np.full_like(force_N, contact * (wanted.max() + 4) ** (2 / 3))
         for _ in range(BISECTIONS):
             middle = (low + high) / 2
-            load = (np.maximum(closed + middle, 0) / contact) ** 1.5 - (np.maximum(closed - middle, 0) / contact) ** 1.5
-            short = load < np.abs(force_N)
+            load = ((closed + middle) / contact) ** 1.5 - (np.maximum(closed - middle, 0) / contact) ** 1.5
+            short = load < wanted
             low, high = np.where(short, middle, low), np.where(short, high, middle)
         return np.asarray(np.sign(force_N) * high) if self.strength else np.zeros_like(force_N)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import deque
+from operator import itemgetter
 
 import numpy as np
 
@@ -102,6 +104,7 @@ class GaugeLatency(Cause):
     unit = "ms"
     max_strength = 50.0
     only_in_motion = True
+    remembers_readings = True
 
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
         super().__init__(strength, mechanism, rng)
@@ -127,10 +130,13 @@ class GaugeLatency(Cause):
 
     def _delayed(self, history: deque[tuple[float, FloatArray]], present_mm: FloatArray) -> FloatArray:
         """(m,) values `strength` ago; `present_mm`: (m,) values now."""
-        times = np.array([time_s for time_s, _ in history] + [self._time_s])
-        values = np.array([value for _, value in history] + [present_mm])
+        states = [*history, (self._time_s, present_mm)]
         past_s = self._time_s - self.strength * MS
-        return np.array([np.interp(past_s, times, column) for column in values.T])
+        after = bisect_right(states, past_s, key=itemgetter(0))
+        if after in (0, len(states)):
+            return states[max(after - 1, 0)][1].copy()
+        (start_s, start_mm), (end_s, end_mm) = states[after - 1 : after + 1]
+        return np.asarray((end_mm - start_mm) / (end_s - start_s) * (past_s - start_s) + start_mm)
 
 
 class Backlash(Cause):

@@ -35,6 +35,7 @@ class SuddenChange(Cause):
     def __init__(self, before: Cause, after: Cause, time_s: float) -> None:
         self.before, self.after, self.time_s = before, after, time_s
         self._passed_s = 0.0
+        self.remembers_readings = before.remembers_readings or after.remembers_readings
         self.strength, self.mechanism, self.part_strengths = after.strength, after.mechanism, after.part_strengths
 
     @property

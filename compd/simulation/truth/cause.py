@@ -77,6 +77,7 @@ class Cause:
     in_library : the effect library has an effect of the same id. If not, `covariates` names the recorded quantities
         by which the cause can be described.
     only_in_motion : no effect while the machine is at rest.
+    remembers_readings : its memory holds readings, so that it depends on when the gauges are read.
     acts_on_frame : it acts on the plate, or on what measures the frame, which a machine may not have.
     acts_on_joint_comparators : it acts on them alone, which a machine may not have.
 
@@ -97,6 +98,7 @@ class Cause:
     in_library: ClassVar[bool] = True
     covariates: ClassVar[tuple[str, ...]] = ()
     only_in_motion: ClassVar[bool] = False
+    remembers_readings: bool = False
 
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
         """`rng`: for scatter from part to part. The same seed gives the same parts at every strength."""

@@ -26,12 +26,32 @@ MAX_ITERATIONS = 25
 LOST_MM = 1e5
 # Weights errors of the axes: as the millimetres that they displace at this radius.
 PLATFORM_RADIUS_MM = 100.0
+_UNIT = np.eye(3)
+# Pairs of axes whose products rigidity fixes: the upper triangle of (3, 3), by row, column and place when flat.
 _FIRST, _SECOND = np.triu_indices(3)
+_UPPER = 3 * _FIRST + _SECOND
+# Parts of equations, and a function for their gradients, each with 12 columns, in the same order.
+Equations = tuple[list[FloatArray], Callable[[], list[FloatArray]]]
+
+
+def _rigidity_entries() -> NDArray[np.intp]:
+    """(6, 12) where the gradient of each product of two axes has its entries: in 0, the axes, the axes twice, flat."""
+    entries = np.zeros((6, 4, 3), dtype=np.intp)
+    for row, (first, second) in enumerate(zip(_FIRST, _SECOND, strict=True)):
+        entries[row, 1 + first] = 1 + 3 * second + np.arange(3)
+        entries[row, 1 + second] = 1 + 3 * first + np.arange(3) + (9 if first == second else 0)
+    return entries.reshape(6, 12)
+
+
+_ENTRIES = _rigidity_entries()
+_NOTHING = np.zeros(1)
 
 
 def homogeneous(points_P: FloatArray) -> FloatArray:
     """(..., 3) places in {P}, mm -> (..., 4) rows; rows @ posture are the places in {M}."""
-    return np.concatenate([np.ones((*points_P.shape[:-1], 1)), points_P], axis=-1)
+    rows = np.empty((*points_P.shape[:-1], 4))
+    rows[..., 0], rows[..., 1:] = 1.0, points_P
+    return rows
 
 
 def direction_rows(axes_P: FloatArray) -> FloatArray:
@@ -50,7 +70,7 @@ class TargetRows:
         """fixed : (6,).  tip_P, tip_M : (3,) the place of the platform, and where it is to be.  axes : (3, 3), rows."""
         self.tip_M = tip_M
         self._fixed, self._row, self._axes = fixed, homogeneous(tip_P), axes
-        self._by_tip = np.einsum("k,cd->ckd", self._row, np.eye(3)).reshape(3, 12)
+        self._by_tip = np.einsum("k,cd->ckd", self._row, _UNIT).reshape(3, 12)
         by_turn = np.zeros((3, 4, 3))
         for j in range(3):
             x, y, z = PLATFORM_RADIUS_MM / 2 * axes[j]
@@ -73,9 +93,9 @@ class Closure:
         link_of_axis : (r,), from 0.
         """
         # an axis of the base does not move with the platform: its row is 0, and it is added in {M}
-        self._axes = direction_rows(np.where(on_base[:, None], 0.0, axes))
-        self._fixed_M: FloatArray = np.where(on_base[:, None], axes, 0.0)
-        self._link = link_of_axis
+        self.axes = direction_rows(np.where(on_base[:, None], 0.0, axes))
+        self.fixed_M: FloatArray = np.where(on_base[:, None], axes, 0.0)
+        self.link_of_axis = link_of_axis
         self._given = axes, on_base
 
     def with_base_turned(self, turn: FloatArray) -> Closure:
@@ -83,7 +103,7 @@ class Closure:
         axes, on_base = self._given
         if not on_base.any():
             return self
-        return Closure(np.where(on_base[:, None], axes @ turn.T, axes), self._link, on_base)
+        return Closure(np.where(on_base[:, None], axes @ turn.T, axes), self.link_of_axis, on_base)
 
     def by_lengths(self, base_M: FloatArray, joints_P: FloatArray, lengths_mm: FloatArray, guess: Posture) -> Posture:
         """The posture in which the links have these lengths.
@@ -91,11 +111,11 @@ class Closure:
         base_M, joints_P : (n, 3) joint centres, mm. lengths_mm : (n,). Newton's method from `guess`; raises
         KinematicsError where the links cannot meet.
         """
-        rows = homogeneous(joints_P)
+        joints = _Joints(self, joints_P)
 
-        def equations(posture: Posture) -> tuple[FloatArray, FloatArray]:
-            along, across = self._joints(posture, base_M, rows)
-            return np.concatenate([along[0] - lengths_mm, across[0]]), np.concatenate([along[1], across[1]])
+        def equations(posture: Posture) -> Equations:
+            lengths, across, gradients = joints.at(posture, base_M)
+            return [lengths - lengths_mm, across], gradients
 
         return _newton(equations, guess, "lengths", lengths_mm)
 
@@ -103,13 +123,13 @@ class Closure:
         self, base_M: FloatArray, joints_P: FloatArray, tip_P: FloatArray, tip_M: FloatArray, guess: Posture
     ) -> Posture:
         """Tripod only: the posture in which the place `tip_P` of the platform is at `tip_M`, (3,) mm each."""
-        rows = homogeneous(joints_P)
+        joints = _Joints(self, joints_P)
         tip_row = homogeneous(tip_P)
-        gradient = np.einsum("k,cd->ckd", tip_row, np.eye(3)).reshape(3, 12)
+        gradient = np.einsum("k,cd->ckd", tip_row, _UNIT).reshape(3, 12)
 
-        def equations(posture: Posture) -> tuple[FloatArray, FloatArray]:
-            _, across = self._joints(posture, base_M, rows)
-            return np.concatenate([tip_row @ posture - tip_M, across[0]]), np.concatenate([gradient, across[1]])
+        def equations(posture: Posture) -> Equations:
+            _, across, gradients = joints.at(posture, base_M)
+            return [tip_row @ posture - tip_M, across], lambda: [gradient, gradients()[1]]
 
         return _newton(equations, guess, "tip", tip_M)
 
@@ -126,22 +146,21 @@ class Closure:
         moved : from actuators (m,) to the base joints (n, 3), their derivatives (n, 3, m), the links' lengths (n,) and
             theirs (n, m).
         """
-        rows = homogeneous(joints_P)
+        rows, joints = homogeneous(joints_P), _Joints(self, joints_P)
         posture, actuator_mm = guess, guess_mm
         for _ in range(MAX_ITERATIONS):
             base_M, base_by, lengths_mm, lengths_by = moved(actuator_mm)
-            along, across = self._joints(posture, base_M, rows)
-            directions_M = (rows @ posture - base_M) / along[0][:, None]
+            lengths, across, gradients = joints.at(posture, base_M)
             wanted, by_posture = target.equations(posture)
-            departure, rigid = _rigidity(posture)
-            residual = np.concatenate([along[0] - lengths_mm, across[0], wanted, departure])
-            if np.abs(residual).max() < CLOSED_MM and np.linalg.det(posture[1:]) > 0:
+            residual = np.concatenate([lengths - lengths_mm, across, wanted, _departure(posture)])
+            if _largest(residual) < CLOSED_MM and _is_right_handed(posture):
                 return posture, actuator_mm
+            directions_M = (rows @ posture - base_M) / lengths[:, None]
             along_by = -np.einsum("nd,ndm->nm", directions_M, base_by) - lengths_by
-            axes_M = self._axes @ posture + self._fixed_M
-            across_by = -np.einsum("rd,rdm->rm", axes_M, base_by[self._link])
+            axes_M = self.axes @ posture + self.fixed_M
+            across_by = -np.einsum("rd,rdm->rm", axes_M, base_by[self.link_of_axis])
             by_actuator = np.concatenate([along_by, across_by, np.zeros((len(wanted) + 6, len(actuator_mm)))])
-            gradient = np.concatenate([along[1], across[1], by_posture, rigid])
+            gradient = np.concatenate([*gradients(), by_posture, _rigidity(posture)])
             try:
                 step = np.linalg.solve(np.concatenate([gradient, by_actuator], axis=1), residual)
             except np.linalg.LinAlgError:
@@ -161,59 +180,78 @@ class Closure:
         Returns axial (n,), N, tension positive, and (n, 3) the lateral force in {M}, N, that each link's
         base ball takes from the link (tripod: along its revolute axis; hexapod: none).
         """
-        along, across = self._joints(posture, base_M, homogeneous(joints_P))
-        _, rigid = _rigidity(posture)
+        _, _, gradients = _Joints(self, joints_P).at(posture, base_M)
         generalised = sum((np.outer(homogeneous(at_P), force_M) for force_M, at_P in loads), np.zeros((4, 3)))
-        gradients = np.concatenate([along[1], across[1], rigid])
-        multipliers = np.linalg.solve(gradients.T, generalised.ravel())
+        multipliers = np.linalg.solve(np.concatenate([*gradients(), _rigidity(posture)]).T, generalised.ravel())
         n = len(base_M)
-        lateral = multipliers[n : n + len(self._axes)]
+        lateral = multipliers[n : n + len(self.axes)]
         lateral_M = np.zeros((n, 3))
-        np.add.at(lateral_M, self._link, lateral[:, None] * (self._axes @ posture + self._fixed_M))
+        np.add.at(lateral_M, self.link_of_axis, lateral[:, None] * (self.axes @ posture + self.fixed_M))
         return multipliers[:n], lateral_M
 
-    def _joints(
-        self, posture: Posture, base_M: FloatArray, rows: FloatArray
-    ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
-        """Link lengths (n,) and gradient (n, 12); link components along the revolute axes (r,) and gradient (r, 12)."""
-        links_M = rows @ posture - base_M
+
+class _Joints:
+    """The joints of a closure at any posture, for platform joints (n, 3) that stay where they are in {P}, mm."""
+
+    def __init__(self, closure: Closure, joints_P: FloatArray) -> None:
+        self._rows = homogeneous(joints_P)
+        self._by_joint = self._rows[:, :, None]
+        self._axes, self._fixed_M, self._link = closure.axes, closure.fixed_M, closure.link_of_axis
+        self._by_hinge = self._by_joint[self._link]
+        self._by_axis = self._axes[:, :, None]
+
+    def at(self, posture: Posture, base_M: FloatArray) -> tuple[FloatArray, FloatArray, Callable[[], list[FloatArray]]]:
+        """Link lengths (n,), link components along the revolute axes (r,), and their gradients (n, 12) and (r, 12)."""
+        links_M = self._rows @ posture - base_M
         lengths = np.sqrt((links_M * links_M).sum(axis=1))
-        along = (rows[:, :, None] * (links_M / lengths[:, None])[:, None, :]).reshape(-1, 12)
         axes_M = self._axes @ posture + self._fixed_M
         hinged_M = links_M[self._link]
-        across = rows[self._link][:, :, None] * axes_M[:, None, :] + self._axes[:, :, None] * hinged_M[:, None, :]
-        return (lengths, along), ((hinged_M * axes_M).sum(axis=1), across.reshape(-1, 12))
+
+        def gradients() -> list[FloatArray]:
+            along = self._by_joint * (links_M / lengths[:, None])[:, None, :]
+            across = self._by_hinge * axes_M[:, None, :] + self._by_axis * hinged_M[:, None, :]
+            return [along.reshape(-1, 12), across.reshape(-1, 12)]
+
+        return lengths, (hinged_M * axes_M).sum(axis=1), gradients
 
 
-def _rigidity(posture: Posture) -> tuple[FloatArray, FloatArray]:
-    """Departure of the axes from an orthonormal triad (6,), as mm at the platform's radius; gradient (6, 12)."""
+def _departure(posture: Posture) -> FloatArray:
+    """(6,) departure of the axes from an orthonormal triad, as mm at the platform's radius."""
     axes = posture[1:]
-    departure = (axes @ axes.T - np.eye(3))[_FIRST, _SECOND]
-    gradient = np.zeros((6, 4, 3))
-    rows = np.arange(6)
-    gradient[rows, 1 + _FIRST] += axes[_SECOND]
-    gradient[rows, 1 + _SECOND] += axes[_FIRST]
-    return PLATFORM_RADIUS_MM * departure, PLATFORM_RADIUS_MM * gradient.reshape(6, 12)
+    return PLATFORM_RADIUS_MM * (axes @ axes.T - _UNIT).take(_UPPER)
 
 
-def _newton(
-    equations: Callable[[Posture], tuple[FloatArray, FloatArray]], guess: Posture, what: str, wanted: FloatArray
-) -> Posture:
+def _rigidity(posture: Posture) -> FloatArray:
+    """(6, 12) gradient of `_departure`."""
+    axes = PLATFORM_RADIUS_MM * posture[1:].ravel()
+    return np.concatenate([_NOTHING, axes, 2 * axes]).take(_ENTRIES)
+
+
+def _is_right_handed(posture: Posture) -> bool:
+    """Whether it is no mirror image, which a rigid platform cannot reach."""
+    (a, b, c), (d, e, f), (g, h, i) = posture[1:].tolist()
+    return bool(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0)
+
+
+def _largest(residual: FloatArray) -> float:
+    return float(np.maximum.reduce(np.abs(residual)))
+
+
+def _newton(equations: Callable[[Posture], Equations], guess: Posture, what: str, wanted: FloatArray) -> Posture:
     """The posture at which `equations`, together with rigidity, vanish. `what`, `wanted`: for the error's text."""
     posture = guess
     for _ in range(MAX_ITERATIONS):
-        error, gradient = equations(posture)
-        departure, rigid = _rigidity(posture)
-        residual = np.concatenate([error, departure])
-        largest_mm = np.abs(residual).max()
+        left, gradients = equations(posture)
+        residual = np.concatenate([*left, _departure(posture)])
+        largest_mm = _largest(residual)
         if largest_mm > LOST_MM:
             break
         if largest_mm < CLOSED_MM:
-            if np.linalg.det(posture[1:]) < 0:
-                break  # the mirror image, which a rigid platform cannot reach
+            if not _is_right_handed(posture):
+                break
             return posture
         try:
-            step = np.linalg.solve(np.concatenate([gradient, rigid]), residual)
+            step = np.linalg.solve(np.concatenate([*gradients(), _rigidity(posture)]), residual)
         except np.linalg.LinAlgError:
             break
         posture = posture - step.reshape(4, 3)

@@ -84,19 +84,18 @@ class Equilibrium:
         rods_mm = strengths.scale_rod_expansion_ppm_per_K * PPM * warm.links_K * machine.lengths0_mm
         lengths_mm = machine.lengths_at(scale_mm) + rods_mm
 
-        supports_M = self._frame.supports_M(warm, np.zeros((3, 3)))
-        base_M = machine.base_joints_M(supports_M, stretch, scale_mm)
-        closure = self._closure.with_base_turned(machine.base_turn(supports_M))
+        unloaded_M = self._frame.unloaded_M(warm)
+        base_M = machine.base_joints_M(unloaded_M, stretch, scale_mm)
+        closure = machine.turned_with_base(self._closure, unloaded_M)
         posture = closure.by_lengths(base_M, joints_P, lengths_mm, guess)
-        platform_M = homogeneous(joints_P) @ posture
         total_N, total_lateral_M = self._forces(closure, posture, base_M, joints_P, force_M_N)
         axial_N, lateral_M = total_N - self._axial0_N, total_lateral_M - self._lateral0_M
 
         pull_M = np.zeros((3, 3))
-        directions_M = link_directions(base_M, platform_M)
+        directions_M = link_directions(base_M, homogeneous(joints_P) @ posture)
         np.add.at(pull_M, machine.support_of_joint, axial_N[:, None] * directions_M + lateral_M)
-        supports_M = self._frame.supports_M(warm, pull_M)
-        balls = self._joints.balls(posture, base_M, platform_M, axial_N, lateral_M)
+        supports_M = unloaded_M + self._frame.give_M(pull_M)
+        balls = self._joints.balls(posture, directions_M, axial_N, lateral_M)
         inputs = CauseInputs(
             scale_mm,
             lengths_mm,
@@ -120,7 +119,7 @@ class Equilibrium:
             + _sum((cause.link_extension_mm(inputs) for cause in causes), machine.links)
             + machine.extensions(beyond_mm)
         )
-        closure = self._closure.with_base_turned(machine.base_turn(supports_M))
+        closure = machine.turned_with_base(self._closure, supports_M)
         posture = closure.by_lengths(
             machine.base_joints_M(supports_M, stretch, scale_mm + beyond_mm)
             + balls.base_across_M
@@ -171,5 +170,6 @@ class Equilibrium:
 def _sum(displacements: Iterable[FloatArray | float], *shape: int) -> FloatArray:
     total = np.zeros(shape)
     for displacement in displacements:
-        total = total + displacement
+        if isinstance(displacement, np.ndarray) or displacement != 0:
+            total = total + displacement
     return total

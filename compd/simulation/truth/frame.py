@@ -19,6 +19,8 @@ LEAN_KEPT_SHARE = 0.2
 DISTANCE_ENDS = ((0, 1), (1, 2), (2, 0), (0, 3), (0, 5), (1, 3), (1, 4), (2, 4), (2, 5))
 _FROM, _TO = np.array(DISTANCE_ENDS).T
 DISTANCES = ("t1", "t2", "t3", "u1", "u2", "u3", "u4", "u5", "u6")
+# Distance of each storey's middle from the column's top, as a share of its height.
+_BELOW_TOP = 1 - (np.arange(COLUMN_STOREYS) + 0.5) / COLUMN_STOREYS
 PPM = 1e-6
 UM = 1e-3
 
@@ -44,13 +46,18 @@ class Frame:
         length = np.linalg.norm(outward, axis=1, keepdims=True)
         self._outward_M = np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
         self._distances0_mm = distances_mm(supports, mechanism.plate0_M)
+        across, along = strengths.column_give_across_um_per_N, strengths.column_give_along_um_per_N
+        self._compliance_mm_per_N = np.array([across, across, along]) * UM
 
-    def supports_M(self, warm: WarmUp, pull_M: FloatArray) -> FloatArray:
-        """(3, 3) mm. pull_M : (3, 3) N, force on each support less that at machine zero. A frame of which nothing is
-        described stands still."""
+    def unloaded_M(self, warm: WarmUp) -> FloatArray:
+        """(3, 3) mm: supports under the forces of machine zero. A frame of which nothing is described stands still."""
         if not self._mechanism.has_frame:
             return self._mechanism.supports0_M
-        return self._mechanism.supports0_M + self._growth(warm) + self._lean(warm) + self._give(pull_M)
+        return self._mechanism.supports0_M + self._growth(warm) + self._lean(warm)
+
+    def give_M(self, pull_M: FloatArray) -> FloatArray | float:
+        """(3, 3) mm: elastic displacement of the supports; pull_M : (3, 3) N, force on each less that at zero."""
+        return pull_M * self._compliance_mm_per_N if self._mechanism.has_frame else 0.0
 
     def plate_M(self, warm: WarmUp) -> FloatArray:
         """(3, 3) mm: plate points after expansion of the plate about its middle, the origin of {M}."""
@@ -77,13 +84,7 @@ class Frame:
         """
         inner_K, outer_K = warm.columns_K[:, 0, :], warm.columns_K[:, 1, :]
         curvature = self._strengths.column_expansion_ppm_per_K * PPM / COLUMN_DEPTH_MM * (outer_K - inner_K)
-        storey = (np.arange(COLUMN_STOREYS) + 0.5) / COLUMN_STOREYS
-        inwards = (curvature * (1 - storey)).sum(axis=1) * self._heights_mm**2 / COLUMN_STOREYS
+        inwards = (curvature * _BELOW_TOP).sum(axis=1) * self._heights_mm**2 / COLUMN_STOREYS
         lean_M = -inwards[:, None] * self._outward_M
         mean_M = lean_M.mean(axis=0)
         return np.asarray(mean_M + LEAN_KEPT_SHARE * (lean_M - mean_M))
-
-    def _give(self, pull_M: FloatArray) -> FloatArray:
-        """(3, 3) mm: elastic displacement of the supports."""
-        across, along = self._strengths.column_give_across_um_per_N, self._strengths.column_give_along_um_per_N
-        return np.asarray(pull_M * (np.array([across, across, along]) * UM))

@@ -53,6 +53,7 @@ class HeatNetwork:
         self._from_modes = modes / root[:, None]
         self._to_modes = modes.T * root
         self._resistance = np.linalg.inv(conductance)
+        self._decay: tuple[float, Floats] = 0.0, np.ones(len(self.index))  # of the modes, over the last step's time
 
     def steady_degC(self, room_degC: float, heat_W: Floats) -> Floats:
         """(bodies,) steady state for this room temperature and heat (bodies,)."""
@@ -60,6 +61,8 @@ class HeatNetwork:
 
     def advance(self, time_s: float, room_degC: float, heat_W: Floats) -> None:
         """Advance by `time_s` at constant room temperature and heat (bodies,)."""
+        if time_s != self._decay[0]:
+            self._decay = time_s, np.exp(-self._rates_per_s * time_s)
         steady = self.steady_degC(room_degC, heat_W)
-        decayed = np.exp(-self._rates_per_s * time_s) * (self._to_modes @ (self.temperature_degC - steady))
+        decayed = self._decay[1] * (self._to_modes @ (self.temperature_degC - steady))
         self.temperature_degC = steady + self._from_modes @ decayed

@@ -6,6 +6,7 @@ that the gauges do not measure.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -46,7 +47,7 @@ class IndicatedTip:
             supports_M = self._supports_M(self._distances0_mm + frame_mm)
         base_M = mechanism.base_joints_M(supports_M, 0.0, scale_mm)
         lengths_mm = mechanism.lengths_at(scale_mm) - self._weights @ joint_mm
-        closure = mechanism.closure.with_base_turned(mechanism.base_turn(supports_M))
+        closure = mechanism.turned_with_base(mechanism.closure, supports_M)
         posture = closure.by_lengths(base_M, mechanism.joints_P, lengths_mm, guess)
         if mechanism.tip_frame == "M":
             return np.asarray(homogeneous(mechanism.tip0_P) @ posture)
@@ -62,7 +63,8 @@ class IndicatedTip:
             ends = np.concatenate([supports_M, plate_M])
             gradient = np.zeros((9, 6, 3))
             for row, (first, second) in enumerate(DISTANCE_ENDS):
-                along = (ends[first] - ends[second]) / np.linalg.norm(ends[first] - ends[second])
+                between = ends[first] - ends[second]
+                along = between / math.sqrt(between @ between)
                 gradient[row, first], gradient[row, second] = along, -along
             supports_M = supports_M + np.linalg.solve(gradient[:, :3].reshape(9, 9), residual_mm).reshape(3, 3)
         return supports_M

@@ -69,11 +69,8 @@ class Joints:
         self._platform = Runout(self._n, amplitude_um, rng)
         self._shank = Runout(self._n, strengths.shank_eccentricity_um * np.array([1.0, 0.0, 0.0]), rng)
 
-    def balls(
-        self, posture: Posture, base_M: FloatArray, platform_M: FloatArray, axial_N: FloatArray, lateral_M: FloatArray
-    ) -> Balls:
-        """base_M, platform_M : (n, 3) joint centres. axial_N (n,), lateral_M (n, 3) : forces less those at zero."""
-        directions_M = link_directions(base_M, platform_M)
+    def balls(self, posture: Posture, directions_M: FloatArray, axial_N: FloatArray, lateral_M: FloatArray) -> Balls:
+        """directions_M : (n, 3) as of `link_directions`. axial_N (n,), lateral_M (n, 3) : forces less those at zero."""
         base = self._base.displacement_mm(angles(self._base_triads, directions_M))
         platform_angles_rad = angles(self._platform_triads, directions_M @ posture[1:].T)
         platform = self._platform.displacement_mm(platform_angles_rad)
@@ -119,4 +116,4 @@ def angles(axes: FloatArray, directions: FloatArray) -> FloatArray:
 
 
 def _across(triads: FloatArray, displacement: FloatArray) -> FloatArray:
-    return np.asarray(displacement[:, [1]] * triads[:, 1] + displacement[:, [2]] * triads[:, 2])
+    return np.asarray(displacement[:, 1:2] * triads[:, 1] + displacement[:, 2:3] * triads[:, 2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ class Mechanism:
         self.plate0_M: FloatArray = np.array(geometry.plate_points_M_mm or np.full((3, 3), np.nan))
         self.joints_P: FloatArray = np.array([rod.platform_P_mm for rod in parts.rods])
         self.hinge_on_base: NDArray[np.bool_] = np.array([h.axis_B is not None for h in parts.hinges], dtype=bool)
+        self._hinges_on_base = bool(self.hinge_on_base.any())
         self.link_of_axis: NDArray[np.intp] = np.array([h.rod - 1 for h in parts.hinges], dtype=np.intp)
         axes = [h.axis_P if h.axis_B is None else self.rotation_M_B0 @ np.array(h.axis_B) for h in parts.hinges]
         self.axes_P: FloatArray = np.array(axes, dtype=np.float64).reshape(-1, 3)
@@ -60,6 +62,7 @@ class Mechanism:
         )
         self._ways = [_Way(actuator) for actuator in parts.actuators]
         self.extended: NDArray[np.bool_] = np.array([self._ways[a].extends for a in self.scale_of_link])
+        self._all_extended = bool(self.extended.all())
         # links that extend one by one, with the platform's hinges on them in order: posture and lengths follow directly
         self.extends_alone = bool(
             self.extended.all()
@@ -155,7 +158,7 @@ class Mechanism:
         """
         axes = self._base_axes(supports_M)
         joints_M: FloatArray = supports_M[self.support_of_joint] + (1 + stretch) * self.joint_offsets_B @ axes
-        if scale_mm is None or self.extended.all():
+        if scale_mm is None or self._all_extended:
             return joints_M
         moved_M: FloatArray = joints_M + self._displacements_B(self._zero_mm + scale_mm) @ axes
         return moved_M
@@ -164,14 +167,18 @@ class Mechanism:
         """(3, 3) matrix in {M} by which a base on these supports is turned since machine zero."""
         return self._base_axes(supports_M).T @ self._base_axes(self.supports0_M)
 
+    def turned_with_base(self, closure: Closure, supports_M: FloatArray) -> Closure:
+        """The closure with the revolute axes of a base that stands on these supports."""
+        return closure.with_base_turned(self.base_turn(supports_M)) if self._hinges_on_base else closure
+
     def _base_axes(self, supports_M: FloatArray) -> FloatArray:
         """(3, 3) the axes of {B} in {M}, as rows."""
         if not self.has_frame:
             return np.asarray(self.rotation_M_B0.T)
-        z_M = np.cross(supports_M[1] - supports_M[0], supports_M[2] - supports_M[0])
-        y_M = supports_M[0] - supports_M.mean(axis=0)
-        z_M, y_M = z_M / np.linalg.norm(z_M), y_M / np.linalg.norm(y_M)
-        return np.array([np.cross(y_M, z_M), y_M, z_M])
+        z_M = _cross(supports_M[1] - supports_M[0], supports_M[2] - supports_M[0])
+        y_M = supports_M[0] - supports_M.sum(axis=0) / len(supports_M)
+        z_M, y_M = z_M / math.sqrt(z_M @ z_M), y_M / math.sqrt(y_M @ y_M)
+        return np.array([_cross(y_M, z_M), y_M, z_M])
 
     def moves_M(self, scale_mm: FloatArray) -> FloatArray:
         """(n, 3) by how much the actuators have moved the base joints since machine zero; scale_mm : (m,)."""
@@ -260,6 +267,12 @@ class _Way:
         turns = [2 * np.pi * turn for turn in (-1, 0, 1)]
         places = [self._radius_mm * (middle + side * half + turn) for side in (-1, 1) for turn in turns]
         return float(min(places, key=lambda q: abs(q - near_mm)))
+
+
+def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    """(3,) vector product of two vectors (3,): `numpy.cross` takes twenty times as long for a single one."""
+    (x, y, z), (u, v, w) = first.tolist(), second.tolist()
+    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
 def _triangle_about(joints_B: FloatArray) -> FloatArray:

@@ -31,6 +31,7 @@ class Sensors:
         self._distances = {wire.distance for wire in wiring.frame}
         self._strengths = strengths
         self._rng = rng
+        self._gauges = 0  # of the last reading
 
     def read(
         self, scale_mm: FloatArray, joint_mm: FloatArray, frame_mm: FloatArray, thermometers_degC: Mapping[str, float]
@@ -42,6 +43,7 @@ class Sensors:
         joint = self._measure(joint_mm, noise_mm, step_mm)
         frame = self._measure(frame_mm, noise_mm, step_mm)
         degC = np.array(list(thermometers_degC.values()))
+        self._gauges = len(scale) + len(joint) + len(frame) + len(degC)
         thermometer = self._measure(degC, self._strengths.thermometer_noise_K, 0.0)
         return {
             **{f"scale_{i + 1}": value for i, value in enumerate(scale.tolist())},
@@ -53,6 +55,10 @@ class Sensors:
             },
             **dict(zip(thermometers_degC, thermometer.tolist(), strict=True)),
         }
+
+    def skip_reading(self) -> None:
+        """Draw the noise of one reading like the last one, which nobody takes: what follows has the same noise."""
+        self._rng.standard_normal(self._gauges)
 
     def scale_mm(self, scale_mm: FloatArray) -> FloatArray:
         """(n,) one noisy reading of every scale, from true values (n,)."""

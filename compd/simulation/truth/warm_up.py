@@ -92,6 +92,13 @@ class WarmUp:
                 zip(PARTS, (["base"], ["platform"], ["tool"], columns, self._plate[:1], self._plate[-1:]), strict=True)
             ),
         }
+        middles = {f"link_{i + 1}": pieces[LINK_PIECES // 2] for i, pieces in enumerate(self._links)}
+        single = middles | {body: body for body in ("base", "platform", "tool")}
+        faces = {"plate_top": self._plate[0], "plate_bottom": self._plate[-1]}
+        # place in the network by a thermometer's name: before and after that of the frame, which no single body has
+        self._on_bodies, self._on_plate = (
+            {f"temperature_{place}_degC": index[body] for place, body in of.items()} for of in (single, faces)
+        )
         self.heat = usual_heat(links, heat_share)
         self._moving_W: Floats = np.zeros(len(index))
         self._moving_W[self._at_link] = heat_share * _DRIVE_MOVING_W * _DRIVE_SHARES
@@ -142,18 +149,13 @@ class WarmUp:
 
         A link's thermometer is at its middle; the frame's shows the mean of the columns.
         """
-        places = {
-            "room": self.room_degC,
-            **{f"link_{i + 1}": self._at(pieces[LINK_PIECES // 2]) for i, pieces in enumerate(self._links)},
-            **{body: self._at(body) for body in ("base", "platform", "tool")},
-            "frame": self.zero_degC + float(self.columns_K.mean()),
-            "plate_top": self._at(self._plate[0]),
-            "plate_bottom": self._at(self._plate[-1]),
+        bodies_degC = self._network.temperature_degC.tolist()
+        return {
+            "temperature_room_degC": self.room_degC,
+            **{name: bodies_degC[body] for name, body in self._on_bodies.items()},
+            "temperature_frame_degC": self.zero_degC + float(self.columns_K.mean()),
+            **{name: bodies_degC[body] for name, body in self._on_plate.items()},
         }
-        return {f"temperature_{place}_degC": value for place, value in places.items()}
-
-    def _at(self, body: str) -> float:
-        return float(self._network.temperature_degC[self._network.index[body]])
 
     def _standing_W(self) -> Floats:
         """(bodies,) heat that does not depend on motion."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -102,16 +103,23 @@ class WorkshopWeather(Weather):
                 if time_s > knots[-1][0]:
                     room_K, pressure_hPa, humidity_pct = level + rng.uniform(-1.0, 1.0, 3) * ROOM_WANDERS
                     knots.append((time_s, room_K, pressure_hPa, humidity_pct))
-        self._knots = np.array(knots).T
+        self._times_s = [time_s for time_s, *_ in knots]
+        self._knots = [(float(room_K), float(hPa), float(pct)) for _, room_K, hPa, pct in knots]
 
     def _room_K(self, time_s: float) -> float:
-        return self._at(1, time_s)
+        return self._at(0, time_s)
 
     def _over_zero_hPa(self, time_s: float) -> float:
-        return self._at(2, time_s)
+        return self._at(1, time_s)
 
     def _over_zero_pct(self, time_s: float) -> float:
-        return self._at(3, time_s)
+        return self._at(2, time_s)
 
-    def _at(self, row: int, time_s: float) -> float:
-        return float(np.interp(time_s, self._knots[0], self._knots[row]))
+    def _at(self, value: int, time_s: float) -> float:
+        """A value of the knots between two of them, or of the first or last one beyond."""
+        after = bisect_right(self._times_s, time_s)
+        if after in (0, len(self._times_s)):
+            return self._knots[max(after - 1, 0)][value]
+        start_s, end_s = self._times_s[after - 1], self._times_s[after]
+        start, end = self._knots[after - 1][value], self._knots[after][value]
+        return (end - start) / (end_s - start_s) * (time_s - start_s) + start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -76,7 +77,6 @@ class World:
         self._frame = Frame(self._mechanism, self._strengths)
         self._joints = Joints(self._mechanism, self._strengths, joint_rng)
         self._sensors = Sensors(geometry, wiring, self._strengths, sensor_rng)
-        self._points_mm = draw_points_mm(self._mechanism, self._tour_rng)
         self._stroke_mm = self._mechanism.stroke_mm
         self._motion: TourMotion | SetpointMotion | PlanMotion | FollowMotion = SetpointMotion(
             standing(np.zeros(self._mechanism.scales))
@@ -132,6 +132,18 @@ class World:
         self.mode, self.zero_hold_s = "commanded", 0.0
         self._readings = self._read_gauges()
 
+    def wait(self, time_s: float) -> None:
+        """Stand still for `time_s` while nobody looks: state and readings stay those of the last advance.
+
+        For campaigns; the next `advance_to` finds what it would find after an `advance_to` on the spot.
+        """
+        if any(cause.remembers_readings for cause in self._causes):
+            self.advance_to(self.scale_mm, self.posture, time_s, 0.0)
+            return
+        self.time_s += time_s
+        self._pass_time(self.scale_mm, time_s, 0.0)
+        self._sensors.skip_reading()
+
     def start_tour(self) -> None:
         """Visit random points of the workspace from now on, dwelling at each, as a measuring machine does."""
         self._leave_plan()
@@ -150,6 +162,11 @@ class World:
             )
         self._motion = PlanMotion(self._rows, self._braking(), self.hold, self._speedup, [*self._points_mm])
         self.mode, self.zero_hold_s = "plan", 0.0
+
+    @cached_property
+    def _points_mm(self) -> FloatArray:
+        """(POINTS, n) scale values at the tour's points; a campaign, which has points of its own, never asks."""
+        return draw_points_mm(self._mechanism, self._tour_rng)
 
     @property
     def unnatural_K_per_s(self) -> float:
@@ -314,12 +331,16 @@ class World:
 
     def _advance_state(self, scale_mm: FloatArray, guess: Posture, time_s: float, travel_s: float) -> None:
         """Advance temperatures and the causes' memories, then solve for the state at `scale_mm`."""
+        self._pass_time(scale_mm, time_s, travel_s)
+        self._state = self._solve(scale_mm, guess)
+
+    def _pass_time(self, scale_mm: FloatArray, time_s: float, travel_s: float) -> None:
+        """Advance temperatures and the causes' memories, the links on their way to `scale_mm` for `travel_s`."""
         weather_s = time_s * self._speedup
         self._warm.advance(weather_s, travel_s / time_s)
         interval = Interval(self._state.scale_mm, scale_mm, travel_s, time_s, weather_s)
         for cause in self._causes:
             cause.pass_time(interval, self._warm)
-        self._state = self._solve(scale_mm, guess)
 
     def _braking(self) -> Approach:
         """The motion that brings the links to rest from now on."""

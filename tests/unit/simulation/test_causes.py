@@ -91,6 +91,22 @@ def test_without_strength_a_cause_does_nothing(name: str) -> None:
     assert shown[0] == pytest.approx(shown[1], abs=1e-12)
 
 
+@pytest.mark.parametrize("name", sampled(possible_causes(MACHINE), 3))
+def test_a_machine_that_nobody_looks_at_while_it_waits_is_the_same_afterwards(name: str) -> None:
+    """To the last bit, with the noise of its gauges."""
+    waiting, watched = (
+        World(tripod(), wiring(), 3, causes=[cause(name, CAUSES[name].max_strength / 10)]) for _ in range(2)
+    )
+    waiting.wait(400.0)
+    watched.advance_to(watched.scale_mm, watched.posture, 400.0, 0.0)
+    for world in (waiting, watched):
+        # so soon that a late gauge still shows what was before
+        world.advance_to(np.array([5.0, -3.0, 2.0]), MACHINE.posture0, 0.02, 0.02)
+    assert waiting.time_s == watched.time_s
+    np.testing.assert_array_equal(waiting.reference_tip_mm(), watched.reference_tip_mm())
+    assert {n: waiting.sense(n) for n in waiting.names} == {n: watched.sense(n) for n in watched.names}
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("geometry", [hexapod(), tripod_with_tool_on_plate()], ids=["hexapod", "tool on plate"])
 def test_other_machines_have_causes_too(geometry: Any) -> None:
