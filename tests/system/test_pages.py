@@ -25,8 +25,8 @@ NEEDS = {"docs/how-to/read-mqtt.md": needs_mosquitto}
 LONGEST = {
     f"docs/how-to/{name}.md"
     for name in (
-        "add-an-effect", "calibrate-a-machine", "change-the-running-model", "describe-a-gauge", "diagnose-a-telescope", "join-an-instrument",
-        "look-at-the-processes", "measure-at-a-fixed-pin", "measure-with-a-ballbar", "other-controllers", "read-mqtt",
+        "add-an-effect", "calibrate-a-machine", "change-the-running-model", "describe-a-gauge", "diagnose-a-telescope",
+        "join-an-instrument", "look-at-the-processes", "measure-at-a-fixed-pin", "measure-with-a-ballbar", "other-controllers", "read-mqtt",
         "read-opc-ua", "record-and-replay", "tell-two-effects-apart", "watch-a-fleet", "write-a-driver",
     )
 }  # fmt: skip
