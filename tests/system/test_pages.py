@@ -27,7 +27,8 @@ LONGEST = {
     for name in (
         "add-an-effect", "calibrate-a-machine", "change-the-running-model", "describe-a-gauge", "diagnose-a-telescope",
         "join-an-instrument", "look-at-the-processes", "measure-at-a-fixed-pin", "measure-with-a-ballbar",
-        "other-controllers", "read-mqtt", "read-opc-ua", "record-and-replay", "tell-two-effects-apart", "watch-a-fleet", "write-a-driver",
+        "other-controllers", "read-mqtt", "read-opc-ua", "record-and-replay", "tell-two-effects-apart",
+        "watch-a-fleet", "write-a-driver",
     )
 }  # fmt: skip
 
