@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
 from typing import Any
 
 from compd import plan_file
@@ -70,7 +71,7 @@ def page() -> str:
         heading(3, "`excluded_rows`", "recording-sidecar-excluded"),
         _keys(Exclusion),
         "For example:",
-        fence(sidecar_text(_example()), "yaml"),
+        fence(sidecar_text(_example(), Path()), "yaml"),
         heading(2, "Rules and limits", "recording-rules"),
         prose((inspect.getdoc(checks) or "").partition("\n")[2]),
         table(
