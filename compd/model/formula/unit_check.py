@@ -11,6 +11,7 @@ import ast
 import math
 import re
 from collections.abc import Mapping
+from functools import cache
 from typing import NamedTuple
 
 from compd.columns import is_sensitivity
@@ -76,6 +77,7 @@ class Quantity(NamedTuple):
 _NUMBER = Quantity({}, 1.0, 1.0)
 
 
+@cache
 def read_unit(text: str) -> Quantity | None:
     """A unit as people write it: "um/K", "um/mm^2", "ppm/K", "um/(m K)"; None for one that is not known."""
     above, _, below = text.replace("\u00b7", " ").replace("\u03bc", "u").replace("\u00b5", "u").partition("/")
