@@ -25,7 +25,7 @@ class CalibratedNumber(NamedTuple):
     prior_std : before any pose was measured, of the tolerance.
     correlation, with_whom : the largest with another number of the fit, and that one's element; 0 and "" without one.
     needed : whether held-out poses are predicted better with its block; the number is the drawing's where it is not.
-    held : whether the poses leave it at the drawing: they do not tell it twice as well as the tolerance does.
+    held : whether the poses tell it less than twice as well as the tolerance does; it may have moved with others.
     """
 
     name: str
