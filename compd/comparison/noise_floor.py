@@ -29,7 +29,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray, rms
 from compd.comparison.criteria import ComparisonCriteria
 from compd.display_unit import format_error
 from compd.recording import sigma_key
-from compd.statistics import SCALE_EFFICIENCY, replicate_pairs, trimmed_scale
+from compd.statistics import SCALE_EFFICIENCY, replicate_pairs, trimmed_scale, unseen_rounding_um
 
 # Variance of the estimate from N differences of neighbours, as a share of that of N independent values' (von
 # Neumann).
@@ -48,6 +48,7 @@ class NoiseFloor:
     declared_um : root mean square of a declaration that an estimate takes the place of; nan without one.
     angles : how many of the coordinates, the last ones, are an attitude's, in urad.
     digit_um : (m,) standard uncertainty of the reference's last digit, 0 where unknown.
+    unseen_um : (m,) the part of it that is the same in each repeat of a place; all of it without repeats.
     """
 
     by_axis_um: FloatArray
@@ -58,6 +59,7 @@ class NoiseFloor:
     declared_um: float = float("nan")
     angles: int = 0
     digit_um: FloatArray = field(default_factory=lambda: np.zeros(1))
+    unseen_um: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     @property
     def um(self) -> float:
@@ -128,11 +130,11 @@ def noise_floor(
     unit : in which people read the residual, in place of um.  angles : how many of the coordinates, the last ones, are
         an attitude's, in urad.
     """
-    return replace(
-        _noise_floor(residual_um, use, visit, declared_um, gauges_um, digit_um, orders, criteria, Units(unit, angles)),
-        angles=angles,
-        digit_um=digit_um,
+    floor = _noise_floor(
+        residual_um, use, visit, declared_um, gauges_um, digit_um, orders, criteria, Units(unit, angles)
     )
+    unseen_um = floor.unseen_um if floor.source == "repeats" else digit_um
+    return replace(floor, angles=angles, digit_um=digit_um, unseen_um=unseen_um)
 
 
 class Units(NamedTuple):
@@ -169,9 +171,12 @@ def _noise_floor(
     scatter = repeat_scatter(residual_um, use, visit, criteria)
     if scatter is not None and scatter.pairs >= criteria.fewest_pairs:
         rounded_um = _rounded_scatter(residual_um, use, visit, digit_um, criteria)
-        scatter = scatter._replace(by_axis_um=np.where(scatter.by_axis_um < digit_um, rounded_um, scatter.by_axis_um))
+        seen_um = np.where(scatter.by_axis_um < digit_um, rounded_um, scatter.by_axis_um)
+        unseen_um = unseen_rounding_um(seen_um, digit_um)
+        scatter = scatter._replace(by_axis_um=np.hypot(seen_um, unseen_um))
         if (scatter.by_axis_um > 0).all():
-            return _from_repeats(scatter, expected_um if is_declared else None, criteria, units)
+            floor = _from_repeats(scatter, expected_um if is_declared else None, criteria, units)
+            return replace(floor, unseen_um=unseen_um)
     no_repeats = _why_no_repeats(scatter, criteria)
     estimate = from_differences(residual_um[use], tuple(order[use] for order in orders), digit_um, no_repeats)
     if is_declared:
@@ -189,17 +194,16 @@ def _noise_floor(
 def _rounded_scatter(
     residual_um: FloatArray, use: BoolArray, visit: IntArray | None, digit_um: FloatArray, criteria: ComparisonCriteria
 ) -> FloatArray:
-    """(m,) noise where repeats differ by less than the last digit's uncertainty: both together.
+    """(m,) scatter where repeats differ by less than the last digit's uncertainty.
 
-    What rounding takes off a place is the same in each of its repeats, so that these show only how often the digit
-    turns. A robust scatter does not see that; it is the root mean square of the differences, none larger than a few
-    steps.
+    They show only how often the digit turns, which a robust scatter does not see; it is the root mean square of the
+    differences, none larger than a few steps.
     """
     pairs = replicate_pairs(use & np.isfinite(residual_um).all(axis=1), visit, criteria.max_rows_of_visit)
     assert pairs is not None, "there are repeats"
     most_um = criteria.outlier_sigmas * digit_um
     difference_um = np.clip(pairs.difference(residual_um), -most_um, most_um)
-    return np.asarray(np.sqrt(digit_um**2 + np.average(difference_um**2, axis=0, weights=pairs.weight)))
+    return np.asarray(np.sqrt(np.average(difference_um**2, axis=0, weights=pairs.weight)))
 
 
 def _too_large(estimate: NoiseFloor, expected_um: FloatArray, criteria: ComparisonCriteria, units: Units) -> str:

@@ -3,6 +3,7 @@ from .covariance import cluster_std as cluster_std
 from .covariance import covariance_of_normals as covariance_of_normals
 from .gaps import filled as filled
 from .last_digit import last_digit_um as last_digit_um
+from .last_digit import unseen_rounding_um as unseen_rounding_um
 from .least_squares import DIAGONAL_GUARD as DIAGONAL_GUARD
 from .least_squares import column_norms as column_norms
 from .least_squares import determined as determined

@@ -127,7 +127,9 @@ def _with_constant(losses: SubsetLosses, subset: Subset) -> Subset:
     other = _best(losses, ((*(other for other in subset.members if other != k), constant) for k in large))
     if other is None or losses.score(other) > losses.score(subset) + losses.criteria.effect_price:
         return subset
-    return _pruned(losses, other)
+    simple = _pruned(losses, other)
+    # where the constant alone is not worth its price, it is not what the effect contains
+    return simple if constant in simple.members else subset
 
 
 def _proven(losses: SubsetLosses, subset: Subset) -> Subset:

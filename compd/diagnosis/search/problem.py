@@ -70,15 +70,15 @@ class DiagnosisProblem:
 
     @property
     def least_loss(self) -> float:
-        """Below which nothing is gained: 1, the noise; more where the last digit makes most of it; 0 where the noise is
-        not known.
+        """Below which nothing is gained: 1, the noise; more where rounding that repeats have in common makes most of it;
+        0 where the noise is not known.
 
         What rounding takes off follows from the value, and over a row of places it is as regular as they are: an effect
         within half a step, sqrt(3) times the digit's uncertainty, cannot be told from it.
         """
         if not self.floor_known:
             return 0.0
-        half_step = 3.0 * float(np.mean((self.comparison.floor.digit_um / self.sigma_um) ** 2))
+        half_step = 3.0 * float(np.mean((self.comparison.floor.unseen_um / self.sigma_um) ** 2))
         return max(1.0, half_step / self.criteria.most_at_floor)
 
     def may_be_noise(self, loss: float) -> bool:

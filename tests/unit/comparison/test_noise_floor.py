@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from compd.comparison.noise_floor import noise_floor, repeat_scatter
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.prediction_uncertainty import gauge_noise
-from compd.statistics import SCALE_EFFICIENCY, last_digit_um, replicate_pairs
+from compd.statistics import SCALE_EFFICIENCY, last_digit_um, replicate_pairs, unseen_rounding_um
 from tests.support.measured import GAUGE_SIGMA_UM, aligned, gauges, record
 
 Floats = NDArray[np.float64]
@@ -144,6 +144,23 @@ def test_repeats_that_are_alike_have_the_uncertainty_of_the_last_digit() -> None
     )
     assert found.source == "repeats"
     assert found.um == pytest.approx(0.1 / np.sqrt(12))
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.05, 0.1, 0.2])
+def test_what_repeats_do_not_show_of_rounding_is_what_their_mean_is_off(noise: float) -> None:
+    """`noise`: in steps. Many places are read six times each, and the error of each place's mean is known."""
+    generator = np.random.default_rng(7)
+    true = generator.uniform(0.0, 1000.0, 20_000)[:, None]
+    readings = np.round(true + noise * generator.standard_normal((len(true), 6)))
+    scatter2 = readings.var(axis=1, ddof=1).mean()
+    in_common = np.sqrt(((readings.mean(axis=1) - true[:, 0]) ** 2).mean() - scatter2 / 6)
+    unseen = unseen_rounding_um(np.array([np.sqrt(scatter2)]), np.array([12**-0.5]))
+    assert unseen[0] == pytest.approx(in_common, rel=0.01)
+
+
+def test_repeats_that_are_all_alike_show_nothing_of_rounding_and_loud_noise_shows_all() -> None:
+    digit_um = np.array([12**-0.5, 12**-0.5, 0.0])
+    assert unseen_rounding_um(np.array([0.0, 1.0, 1.0]), digit_um) == pytest.approx([12**-0.5, 0.0, 0.0], abs=1e-3)
 
 
 def test_values_far_below_a_step_show_nothing_of_it() -> None:

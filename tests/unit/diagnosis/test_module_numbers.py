@@ -50,7 +50,7 @@ NUMBERS = {
     "comparison/shape_search.py": {"FINE": ITERATION},
     "statistics/replicates.py": {"CHANCE_PAIRS": ROUNDING},
     "comparison/prediction_uncertainty.py": {"NOISE_SEED": SEED},
-    "statistics/last_digit.py": {"PER_STEP": DEFINITION, "STEPS_UM": DEFINITION},
+    "statistics/last_digit.py": {"PER_STEP": DEFINITION, "STEPS_UM": DEFINITION, "_HARMONICS": DEFINITION},
     "statistics/least_squares.py": {
         "RANK_CUT": CONDITIONING,
         "DIAGONAL_GUARD": CONDITIONING,
