@@ -178,7 +178,8 @@ def install_compd(directory: Path) -> dict[Path, Path]:
     packages.mkdir(parents=True)
     for package in ("compd", "drivers/compd_drivers"):
         shutil.copytree(ROOT / package, packages / Path(package).name, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copytree(ROOT / "config", packages / "compd" / "shipped_config")
+    for directory_of, name in (("config", "shipped_config"), ("systemd", "shipped_systemd")):
+        shutil.copytree(ROOT / directory_of, packages / "compd" / name)
     (packages / "other.pth").write_text(f"{LIBRARIES}\n")
     compileall.compile_dir(packages, quiet=1, stripdir=str(directory), prependdir=str(COMPD))
     programs = directory / "bin"

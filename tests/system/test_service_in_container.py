@@ -27,6 +27,8 @@ UNITS = Path("/opt/systemd")
 SIMULATED = Path("/run/simulated")
 MACHINE = Path("/etc/compd/machine.yaml")
 SOCKET = Path("/run/compd/compd.sock")
+# Another environment beside COMPD.
+NEXT = Path("/opt/compd-next")
 TOKENS = Path("/etc/compd/page-tokens.yaml")
 OF_THE_PAGE = Path("/var/lib/compd-page")
 SHIPPED = "tripod-cmm.yaml"
@@ -34,6 +36,8 @@ SHIPPED = "tripod-cmm.yaml"
 MAX_EXPOSURE = 2.0
 # After a stop that takes longer a person wonders whether it hangs.
 STOP_S = 2.0
+# Longest time without valid setpoints while a release replaces another.
+WITHOUT_S = 2.0
 # A bound for waiting, never a measure.
 PATIENCE_S = 60.0
 # The first start compiles kernels.
@@ -110,20 +114,17 @@ class Service:
 
 @pytest.fixture(scope="module")
 def installed() -> Iterator[Service]:
-    """The unit, installed as its header says, enabled, and with machine zero taken."""
+    """The daemon, installed by `compd service install`, and with machine zero taken."""
     with tempfile.TemporaryDirectory(prefix="compd-opt-") as directory:
         read_only = {**install_compd(Path(directory)), ROOT / "systemd": UNITS, CONFIG: Path("/opt/config")}
         with booted(read_only) as container:
             # the interpreter may be linked with a library of its own
             container.path("/etc/ld.so.conf.d/python.conf").write_text("/opt/python/lib\n")
             container.run("ldconfig")
-            header = re.findall(r"(?m)^#   ((?:install|systemctl) .*)$", (ROOT / "systemd/compd.service").read_text())
-            assert len(header) == 3
-            for line in header[:-1]:
-                container.run("sh", "-ec", f"cd {UNITS}; {line}")
+            container.run("systemd-sysusers", str(UNITS / "compd.sysusers"))
             _simulate(container)
             try:
-                container.run("sh", "-ec", header[-1])
+                container.run("sh", "-ec", f"cd /; {COMPD}/bin/compd service install {MACHINE} --no-page")
                 zero = (f"{COMPD}/bin/compd", "zero", str(SOCKET))
                 # on a busy computer a simulated gauge is late now and then
                 wait_until(lambda: "taken" in container.run(*zero, check=False), "machine zero", PATIENCE_S)
@@ -326,12 +327,9 @@ print(json.dumps({"state": state, "answers": answers}))
 
 @pytest.fixture(scope="module")
 def installed_page(installed: Service) -> PageService:
-    """The page's unit, installed as its header says, enabled, with one token."""
+    """The page, installed beside the daemon, with one token."""
     container = installed.container
-    header = re.findall(r"(?m)^#   ((?:install|systemctl) .*)$", (ROOT / "systemd/compd-page.service").read_text())
-    assert len(header) == 4
-    for line in header:
-        container.run("sh", "-ec", f"cd {UNITS}; {line}")
+    container.run("sh", "-ec", f"cd /; {COMPD}/bin/compd service install {MACHINE}")
     added = container.run("sh", "-ec", f"cd /; {COMPD}/bin/compd page --tokens {TOKENS} --new-token operate:anna")
     installed.systemctl("restart", "compd-page")
     return PageService(installed, added.strip())
@@ -421,3 +419,46 @@ def test_the_pages_exposure_is_at_most_two(page: PageService) -> None:
     exposure = re.search(r"exposure level for compd-page.service: ([\d.]+)", last)
     assert exposure is not None, last
     assert float(exposure[1]) <= MAX_EXPOSURE
+
+
+@pytest.fixture
+def next_release(service: Service) -> Iterator[Path]:
+    """The program of another environment, as an upgrade has it; the first one runs again after the test."""
+    run = service.container.run
+    run("sh", "-ec", f"cp -a {COMPD} {NEXT} && sed -i s#{COMPD}/#{NEXT}/# {NEXT}/bin/compd")
+    yield NEXT / "bin" / "compd"
+    if str(NEXT) in service.shown("ExecStart"):
+        run(f"{COMPD}/bin/compd", "service", "back")
+    run("rm", "-r", str(NEXT))
+
+
+def test_another_release_takes_over_and_gives_back(service: Service, next_release: Path) -> None:
+    zero = service.zero()
+    upgraded = service.container.run(str(next_release), "service", "upgrade")
+    assert str(NEXT) in service.shown("ExecStart")
+    assert upgraded.count("ok, then ok") == 1
+    assert without_s(upgraded) <= WITHOUT_S
+    assert service.zero() == zero
+    back = service.container.run(str(next_release), "service", "back")
+    assert str(COMPD) in service.shown("ExecStart")
+    assert without_s(back) <= WITHOUT_S
+    report("another release", upgrade=without_s(upgraded), back=without_s(back))
+
+
+def test_a_release_that_does_not_start_gives_way_to_the_one_before(service: Service, next_release: Path) -> None:
+    """Its check of the configuration passes, and its daemon ends at once."""
+    broken = "import sys\nif sys.argv[1] == 'run':\n    sys.exit(1)\n"
+    program = service.container.path(next_release)
+    shebang, rest = program.read_text().split("\n", 1)
+    program.write_text(f"{shebang}\n{broken}{rest}")
+    with pytest.raises(AssertionError, match="did not become ok within"):
+        service.container.run(str(next_release), "service", "upgrade")
+    assert str(COMPD) in service.shown("ExecStart")
+    service.wait_for_ok()
+
+
+def without_s(words: str) -> float:
+    """The time without valid setpoints that `compd service` tells."""
+    found = re.search(r"([\d.]+) s without valid setpoints", words)
+    assert found is not None, words
+    return float(found[1])

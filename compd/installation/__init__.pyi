@@ -1,0 +1,7 @@
+from .install_steps import install_problems as install_problems
+from .install_steps import install_steps as install_steps
+from .replacement import Replacement as Replacement
+from .replacement import go_back as go_back
+from .replacement import upgrade as upgrade
+from .shipped_units import own_program as own_program
+from .step import Step as Step

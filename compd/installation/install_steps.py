@@ -1,0 +1,105 @@
+"""The steps that install the daemon, and its page, as services of systemd."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from compd.configuration import Configuration
+from compd.errors import Problem
+from compd.installation.shipped_units import program_problems, shipped_file
+from compd.installation.step import Step, installed_file
+
+MACHINE = Path("/etc/compd/machine.yaml")
+UNIT_DIRECTORY = Path("/etc/systemd/system")
+_TOKENS = Path("/etc/compd/page-tokens.yaml")
+# What the units give the daemon: RuntimeDirectory= and StateDirectory= of compd.service.
+_RUNTIME, _STATE = Path("/run/compd"), Path("/var/lib/compd")
+# The daemon as its unit runs it, for commands that are to see what it sees.
+_AS_THE_DAEMON = ("setpriv", "--reuid=compd", "--regid=compd", "--init-groups", "--reset-env", "--")
+_KERNELS = "NUMBA_CACHE_DIR=/var/cache/compd"
+DAEMON, PAGE = "compd", "compd-page"
+
+
+def unit_path(unit: str) -> Path:
+    """The file of a unit, "compd" or "compd-page", as it is installed."""
+    return UNIT_DIRECTORY / f"{unit}.service"
+
+
+def install_problems(configuration: Configuration, program: Path, page: bool) -> list[Problem]:
+    """Why a configuration cannot run as the installed service; every reason at once."""
+    problems = program_problems(program)
+    places = (
+        ("sockets.unix.path", Path(configuration.sockets.unix.path), _RUNTIME),
+        ("state.directory", Path(configuration.state.directory), _STATE),
+    )
+    for key, path, below in places:
+        if not path.is_relative_to(below):
+            problems.append(
+                Problem(
+                    where=f"{configuration.path}: {key}",
+                    what="the service may not write there",
+                    value=str(path),
+                    allowed=f"a path below {below}",
+                    next_step=f"correct it, or widen the unit with `systemctl edit {DAEMON}` and install it by hand",
+                )
+            )
+    if page and find_spec("starlette") is None:
+        problems.append(
+            Problem(
+                where="the page in the browser",
+                what="what it needs is not installed",
+                value="starlette",
+                next_step=f"{program.with_name('pip')} install 'compd[page]'; or leave the page out: --no-page",
+            )
+        )
+    return problems
+
+
+def install_steps(configuration: Configuration, program: Path, page: bool) -> list[Step]:
+    """The steps, in their order; each may be done again.
+
+    Parameters
+    ----------
+    configuration : of the machine; its file is copied to /etc/compd/machine.yaml.
+    program : the program ``compd`` that the services start.
+    page : whether the page in the browser is installed, too. A file of its tokens that is there is kept.
+    """
+    text = configuration.path.read_text(encoding="utf-8")
+    steps = [
+        installed_file("/etc/sysusers.d/compd.conf", shipped_file("compd.sysusers", program), "name the users"),
+        Step("make the users", ("systemd-sysusers",)),
+        installed_file(str(MACHINE), text, "the machine's configuration"),
+        Step(
+            "a directory for what is compiled",
+            ("install", "-d", "-m", "700", "-o", DAEMON, "-g", DAEMON, "/var/cache/compd"),
+        ),
+        check_step(program),
+        installed_file(
+            "/etc/udev/rules.d/70-compd.rules", shipped_file("compd.rules", program), "permit processors to stay awake"
+        ),
+        _unit_step(program, DAEMON),
+    ]
+    if page:
+        steps.append(_unit_step(program, PAGE))
+        if not _TOKENS.exists():
+            steps.append(installed_file(str(_TOKENS), "", "an empty file of tokens", "600", (PAGE, PAGE)))
+    units = (DAEMON, PAGE) if page else (DAEMON,)
+    return [
+        *steps,
+        Step("systemd reads the units", ("systemctl", "daemon-reload")),
+        Step("start now, and with the computer", ("systemctl", "enable", "--now", *units)),
+    ]
+
+
+def _unit_step(program: Path, unit: str) -> Step:
+    name = f"{unit}.service"
+    return installed_file(str(unit_path(unit)), shipped_file(name, program), f"the unit {name}")
+
+
+def check_step(program: Path) -> Step:
+    """The step that checks the installed configuration as the daemon's user, and compiles what the daemon needs."""
+    return Step(
+        "check the configuration as the daemon's user; kernels are compiled where there are none",
+        (*_AS_THE_DAEMON, "env", _KERNELS, str(program), "check", str(MACHINE)),
+    )

@@ -1,0 +1,178 @@
+"""Replace the release that runs by another one, and go back to the one before."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from compd.client import Message, connect
+from compd.clock import Clock, MonotonicClock
+from compd.errors import CompdError, DaemonError, Problem
+from compd.files import write_files
+from compd.installation.install_steps import DAEMON, PAGE, check_step, unit_path
+from compd.installation.shipped_units import program_problems, shipped_file
+from compd.installation.step import Step
+from compd.setpoint_states import State
+
+# Longest wait (s) for the state before: a start takes one or two seconds, and a correction may slew for more.
+PATIENCE_S = 30.0
+_TIMEOUT_S = 2.0
+_LOOK_EVERY_S = 0.02
+# Setpoints a second by which the time without valid ones is counted.
+_RATE_HZ = 50.0
+_SILENT = "no setpoints"
+
+
+@dataclass(frozen=True)
+class Replacement:
+    """How the machine came through.
+
+    before, after : states of its setpoints. without_s : longest time without a valid one, s.
+    """
+
+    before: str
+    after: str
+    without_s: float
+
+
+def upgrade(socket: str, program: Path, clock: Clock | None = None) -> Replacement:
+    """Replace the release that runs by the one of `program`.
+
+    The new release checks the configuration, and compiles what it needs, while the old one goes on. Then the units
+    start the new program, and those before are kept beside them. Where the setpoints were ok before and are not within
+    `PATIENCE_S`, the old release comes back.
+
+    Parameters
+    ----------
+    socket : the daemon's Unix socket.
+    program : the program ``compd`` of the new release.
+
+    Raises
+    ------
+    CompdError
+        Where nothing is installed, the new release refuses the configuration, a model would be lost with the restart,
+        or the machine did not become ok again; the release before runs then.
+    """
+    if problems := [*program_problems(program), *_restart_problems(socket)]:
+        raise CompdError(problems)
+    check_step(program).run()
+    new = {unit: shipped_file(f"{unit}.service", program) for unit in _installed_units()}
+    return _exchange(socket, new, clock or MonotonicClock())
+
+
+def go_back(socket: str, clock: Clock | None = None) -> Replacement:
+    """Exchange the release that runs with the one before it, which doing it again takes back.
+
+    Raises
+    ------
+    CompdError
+        Where there is none, a model would be lost with the restart, or the machine did not become ok again; the
+        release that ran runs then.
+    """
+    units = _installed_units()
+    if problems := [
+        *(
+            Problem(
+                where=str(_before(unit)), what="there is no release to go back to", next_step="compd service upgrade"
+            )
+            for unit in units
+            if not _before(unit).exists()
+        ),
+        *_restart_problems(socket),
+    ]:
+        raise CompdError(problems)
+    return _exchange(socket, {unit: _before(unit).read_text("utf-8") for unit in units}, clock or MonotonicClock())
+
+
+def _restart_problems(socket: str) -> list[Problem]:
+    """Why a restart would lose something."""
+    unit = unit_path(DAEMON)
+    if not unit.exists():
+        return [Problem(where=str(unit), what="there is no service", next_step="compd service install MACHINE.yaml")]
+    try:
+        with connect(socket, _TIMEOUT_S) as client:
+            model = client.model()
+    except DaemonError:
+        return []  # a daemon that does not run loses nothing
+    if model["kept"]:
+        return []
+    return [
+        Problem(
+            where="the model that runs",
+            what="is lost with a restart",
+            value=model["applied"].get("file", "no effects"),
+            next_step=model["kept_text"],
+        )
+    ]
+
+
+def _installed_units() -> tuple[str, ...]:
+    return tuple(unit for unit in (DAEMON, PAGE) if unit_path(unit).exists())
+
+
+def _before(unit: str) -> Path:
+    """Where the unit of the release before is kept; systemd reads no file of that suffix."""
+    return Path(f"{unit_path(unit)}.before")
+
+
+def _exchange(socket: str, new: Mapping[str, str], clock: Clock) -> Replacement:
+    old = {unit: unit_path(unit).read_text("utf-8") for unit in new}
+    _write(new, old)
+    came = _restart(socket, clock)
+    if came.before == State.OK and came.after != State.OK:
+        _write(old, new)
+        back = _restart(socket, clock, State.OK)
+        raise CompdError(
+            Problem(
+                where="the release that replaced the one before",
+                what=f"did not become ok within {PATIENCE_S:g} s",
+                value=came.after,
+                allowed="ok, as before",
+                next_step=f"the release before runs again ({back.after}); look at `journalctl --unit {DAEMON}`",
+            )
+        )
+    return came
+
+
+def _write(units: Mapping[str, str], before: Mapping[str, str]) -> None:
+    kept = {_before(unit): text for unit, text in before.items()}
+    write_files({unit_path(unit): text for unit, text in units.items()} | kept, 0o644)
+
+
+def _restart(socket: str, clock: Clock, wanted: str = "") -> Replacement:
+    """Restart, and watch until the state is `wanted`, or else the one before, or patience is over."""
+    setpoints = _setpoints(socket, clock)
+    before = next(setpoints)
+    Step("systemd reads the units", ("systemctl", "daemon-reload")).run()
+    # without waiting: a start that fails is tried again for ever
+    Step("start the other release", ("systemctl", "restart", "--no-block", *_installed_units())).run()
+    wanted = wanted or before.get("state", "")
+    state, has_ended, valid_s, without_s = _SILENT, not before, before.get("time_s", math.nan), 0.0
+    for setpoint in setpoints:
+        state = setpoint.get("state", _SILENT)
+        has_ended |= not setpoint
+        if setpoint.get("valid"):
+            # nan, where none was valid before, is never the larger one
+            without_s = max(without_s, setpoint["time_s"] - valid_s)
+            valid_s = setpoint["time_s"]
+        if has_ended and setpoint and wanted in ("", state):
+            break
+    return Replacement(before.get("state", _SILENT), state, without_s)
+
+
+def _setpoints(socket: str, clock: Clock) -> Iterator[Message]:
+    """Setpoints through a restart until patience is over; {} each time that nobody answers, or no longer."""
+    never, end_s = threading.Event(), clock.monotonic() + PATIENCE_S
+    while clock.monotonic() < end_s:
+        try:
+            with connect(socket, _TIMEOUT_S) as client:
+                for setpoint in client.watch(_RATE_HZ):
+                    yield setpoint
+                    if clock.monotonic() >= end_s:
+                        return
+        except DaemonError:
+            yield {}
+            clock.wait(never, _LOOK_EVERY_S)

@@ -1,0 +1,66 @@
+"""The files for systemd, udev and sysusers that come with compd, and the program that the units start."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from compd.errors import CompdError, Problem
+from compd.files import trust_problem
+
+# Directories in the installed package, and in a checkout.
+_PLACES = (Path(__file__).parents[1] / "shipped_systemd", Path(__file__).parents[2] / "systemd")
+# The program that the shipped units start.
+_SHIPPED_PROGRAM = "/opt/compd/bin/compd"
+# Directories that the units hide from the daemon: ProtectHome=yes and PrivateTmp=yes of systemd.exec(5).
+_HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
+
+
+def shipped_file(name: str, program: Path) -> str:
+    """A shipped file, such as ``compd.service``, whose commands start `program`.
+
+    Raises
+    ------
+    CompdError
+        Where the installation lacks it.
+    """
+    for place in _PLACES:
+        if (place / name).is_file():
+            return (place / name).read_text(encoding="utf-8").replace(_SHIPPED_PROGRAM, str(program))
+    raise CompdError(
+        Problem(where=str(_PLACES[0]), what="the shipped units are missing", value=name, next_step="reinstall compd")
+    )
+
+
+def own_program() -> Path:
+    """The program ``compd`` of the environment that runs this."""
+    return Path(sys.prefix) / "bin" / "compd"
+
+
+def program_problems(program: Path) -> list[Problem]:
+    """Why a service cannot start a program, or must not: it is not there, hidden from it, or others could change it."""
+    if not program.is_file():
+        return [_program_problem(program, "is not there", "make an environment in /opt, and install compd in it")]
+    hidden = [
+        _program_problem(
+            path,
+            "lies where services cannot see it",
+            "make the environment in /opt with the system's Python: python3 -m venv /opt/compd, then "
+            "/opt/compd/bin/pip install compd",
+        )
+        for path in (program, Path(os.path.realpath(program.with_name("python3"))))
+        if any(path.is_relative_to(directory) for directory in _HIDDEN)
+    ]
+    untrusted = trust_problem(program.resolve(), "the service's program", "program", {0})
+    return [*hidden, *([] if untrusted is None else [untrusted])]
+
+
+def _program_problem(path: Path, what: str, next_step: str) -> Problem:
+    return Problem(
+        where="the service's program",
+        what=what,
+        value=str(path),
+        allowed=f"a program outside {', '.join(_HIDDEN)}",
+        next_step=next_step,
+    )
