@@ -40,6 +40,24 @@ class NumberColumns:
     problems: ExportProblems
     _table: RawTable = field(repr=False)
 
+    @classmethod
+    def of(cls, table: RawTable) -> NumberColumns:
+        """Those of a table. Raises RecordingError where it has no rows of numbers."""
+        problems = ExportProblems(table.path)
+        names = table.header or ("",) * len(table.columns)
+        header = tuple(
+            name if name and names.count(name) == 1 else f"column {k}" for k, name in enumerate(names, start=1)
+        )
+        of_numbers = tuple(map(is_number_column, table.columns))
+        if not any(of_numbers) or not len(table.line):
+            problems.add(table.header_line, "has no rows of numbers", allowed="a column of numbers, and a row")
+        problems.check()
+        return cls(table.path, header, of_numbers, table.line, table.shape, table.assumed, problems, table)
+
+    def anew(self) -> NumberColumns:
+        """The same, without problems so far."""
+        return self.of(self._table)
+
     def values(self, column: int) -> FloatArray:
         """(N,) numbers of a column, nan for an empty cell; a problem is added for each cell that is no number."""
         return numbers(self._table.columns[column], self.line, self.header[column], self.problems)
@@ -69,14 +87,8 @@ def read_number_columns(path: Path, options: ReadOptions | None = None) -> Numbe
     Raises RecordingError where the file is no table, or has no rows of numbers.
     """
     table = read_table(path, options or ReadOptions())
-    problems = ExportProblems(path)
     if isinstance(table, InstrumentExport):
+        problems = ExportProblems(path)
         problems.add(0, "is no table of columns", allowed="a workbook, or text with a delimiter")
         raise RecordingError(problems.problems)
-    names = table.header or ("",) * len(table.columns)
-    header = tuple(name if name and names.count(name) == 1 else f"column {k}" for k, name in enumerate(names, start=1))
-    of_numbers = tuple(map(is_number_column, table.columns))
-    if not any(of_numbers) or not len(table.line):
-        problems.add(table.header_line, "has no rows of numbers", allowed="a column of numbers, and a row")
-    problems.check()
-    return NumberColumns(path, header, of_numbers, table.line, table.shape, table.assumed, problems, table)
+    return NumberColumns.of(table)

@@ -71,7 +71,7 @@ def machine_recording(out: Path) -> Path:
 
 @contextmanager
 def log_as_recording(
-    log: Path, out: Path, configuration: Configuration, options: LogOptions = LogOptions()
+    log: Path | NumberColumns, out: Path, configuration: Configuration, options: LogOptions = LogOptions()
 ) -> Iterator[MachineLog]:
     """Write a log as a recording: NAME.csv (`out`) and NAME.yaml, which go again where the block fails.
 
@@ -88,23 +88,35 @@ def log_as_recording(
         raise
 
 
-def read_machine_log(log: Path, options: LogOptions = LogOptions()) -> MachineLog:
-    """A log's columns as those of a recording, one row for each row of the log.
+def read_machine_log(log: Path | NumberColumns, options: LogOptions = LogOptions()) -> MachineLog:
+    """A log's columns as those of a recording, one row for each row of the log; from the file, or its table.
 
     Without a column of times the rows are places at rest in their order: `point` counts them.
     Raises RecordingError with every name that is not there, every unit that is missing or of another kind, times that
     do not rise, and angles of which nobody says in which order they turn.
     """
     try:
-        return _read(log, options)
+        return _read(read_number_columns(log, options.read) if isinstance(log, Path) else log.anew(), options)
     except RecordingError as error:
-        raise RecordingError([_of_log(problem) for problem in error.problems]) from error
+        raise RecordingError(problems_of_log(error.problems)) from error
 
 
-def _read(log: Path, options: LogOptions) -> MachineLog:
-    table = read_number_columns(log, options.read)
+def column_roles(table: NumberColumns, named: Sequence[str] = ()) -> list[str]:
+    """What each column is in a recording, "NAME" or "NAME:UNIT"; "-" for nothing. named : as of `LogOptions`."""
+    wanted = _wanted(table.anew(), named)
+    targets = (wanted.get(k, ("-", "")) for k in range(len(table.header)))
+    return [f"{name}:{unit}" if unit else name for name, unit in targets]
+
+
+def named_columns(table: NumberColumns, roles: Sequence[str]) -> tuple[str, ...]:
+    """The roles of all columns as `LogOptions` have them: those that no name of a column says."""
+    own = column_roles(table)
+    return tuple(f"{name}={role}" for name, role, said in zip(table.header, roles, own, strict=False) if role != said)
+
+
+def _read(table: NumberColumns, options: LogOptions) -> MachineLog:
     problems = table.problems
-    wanted = wanted_columns(table, options.named)
+    wanted = _wanted(table, options.named)
     if not wanted and not problems.problems:
         allowed = "scale_1_mm ..., or commanded_x_mm ..., under any name: " + _FORM
         problems.add(0, "no column is one of a recording", ", ".join(table.header), allowed)
@@ -139,7 +151,7 @@ def _read(log: Path, options: LogOptions) -> MachineLog:
     return MachineLog(columns, table.shape, taken, left_out)
 
 
-def wanted_columns(table: NumberColumns, named: Sequence[str]) -> dict[int, tuple[str, str]]:
+def _wanted(table: NumberColumns, named: Sequence[str]) -> dict[int, tuple[str, str]]:
     """Column of a recording, and unit ("" for that of the header), by the place in the log."""
     problems = table.problems
     wanted = {k: (name, "") for k, name in enumerate(table.header) if _OWN_NAME.fullmatch(name)}
@@ -220,7 +232,7 @@ def _header_unit(header: str) -> str:
     return unit_named(match["in"] or match["after"] or match["end"] or "") if match else ""
 
 
-def _of_log(problem: Problem) -> Problem:
-    """The problem with the options of the log in place of those of the export."""
-    texts = {key: _READ_OPTION.sub("--log-", getattr(problem, key)) for key in ("what", "allowed", "next_step")}
-    return replace(problem, **texts)
+def problems_of_log(problems: Sequence[Problem]) -> list[Problem]:
+    """Problems with the options of the log in place of those of the export."""
+    keys = ("what", "allowed", "next_step")
+    return [replace(one, **{key: _READ_OPTION.sub("--log-", getattr(one, key)) for key in keys}) for one in problems]
