@@ -48,6 +48,14 @@ ColumnsOption = Annotated[
 ]
 UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the lengths, if the file has none.")]
 AngleUnitOption = Annotated[str | None, typer.Option("--angle-unit", help="Unit of rx, ry, rz, if the file has none.")]
+AnglesOption = Annotated[
+    str | None,
+    typer.Option(
+        "--angles",
+        metavar="ORDER",
+        help="What rx, ry, rz are: vector; or the order of turning: xyz about fixed axes, XYZ about turned ones.",
+    ),
+]
 DecimalOption = Annotated[
     str | None, typer.Option("--decimal", help="The decimal mark, '.' or ',', if the file is ambiguous.")
 ]
@@ -79,6 +87,7 @@ def read_options(
     group: str | None,
     sheet: str | None,
     clock_set_back: bool = False,
+    angles: str | None = None,
 ) -> ReadOptions:
     """The options of the reader. Raises typer.BadParameter for an invalid decimal mark.
 
@@ -94,6 +103,7 @@ def read_options(
         names={role: name for role, name in names.items() if name is not None},
         unit=unit,
         angle_unit=angle_unit,
+        angles=angles,
         decimal=decimal,
         dates=dates.value if dates else None,
         rate_hz=rate_hz,

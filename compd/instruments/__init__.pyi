@@ -1,3 +1,5 @@
+from .angles import ANGLE_ORDERS as ANGLE_ORDERS
+from .angles import rotation_vectors as rotation_vectors
 from .axes import ATTITUDE_AXES as ATTITUDE_AXES
 from .axes import LENGTH_AXES as LENGTH_AXES
 from .axes import POSITION_AXES as POSITION_AXES
@@ -10,6 +12,7 @@ from .number_columns import NumberColumns as NumberColumns
 from .number_columns import read_number_columns as read_number_columns
 from .preview import ExportPreview as ExportPreview
 from .preview import preview_export as preview_export
+from .preview import preview_table as preview_table
 from .read import read_export as read_export
 from .read_limits import ReadLimits as ReadLimits
 from .samples import Samples as Samples

@@ -13,7 +13,7 @@ from compd.instruments.axes import ATTITUDE_AXES, LENGTH_AXES, POSITION_AXES
 from compd.instruments.cells import is_number_column, numbers
 from compd.instruments.export import ReadOptions
 from compd.instruments.export_problems import ExportProblems
-from compd.instruments.header_names import is_not_measured, split_unit, understand
+from compd.instruments.header_names import is_not_measured, split_unit, turn_axis, understand
 from compd.instruments.raw_table import RawTable
 from compd.instruments.time_stamps import is_clock, is_date, is_stamp
 from compd.units import unit_named
@@ -142,13 +142,15 @@ def _take_header(table: RawTable, options: ReadOptions, roles: Roles, problems: 
     if "name" not in by_role and "number" in by_role:
         by_role["name"] = by_role["number"]
     _settle_time(table, by_role)
+    if options.angles is not None and not named_axes:
+        _take_turns(table, by_role)
     if len(by_role.get("angle", [])) >= 3 and not named_axes:
         columns = [table.header[k] for k in by_role["angle"]] if table.header else []
         plain = _columns_option(table, {role: places[0] for role, places in by_role.items()})
         problems.ask(
             "columns are angles of which the meaning cannot be told",
             ", ".join(columns),
-            [f"--columns {plain} (without them)", "rx,ry,rz in their places for a rotation vector"],
+            [f"--columns {plain} (without them)", "rx,ry,rz in their places, with --angles for the order of turning"],
             table.header_line,
         )
     for role in ROLES:
@@ -166,6 +168,15 @@ def _take_header(table: RawTable, options: ReadOptions, roles: Roles, problems: 
             )
         elif places:
             roles.take(role, places[0], understood[places[0]].unit, "by its name")
+
+
+def _take_turns(table: RawTable, by_role: dict[str, list[int]]) -> None:
+    """Roll, pitch and yaw turn about x, y and z; of a, b and c no name says so."""
+    header = table.header or ()
+    turns = {turn_axis(header[k]): k for k in by_role.get("angle", [])}
+    if set(turns) == set(ATTITUDE_AXES) and len(by_role["angle"]) == len(turns):
+        del by_role["angle"]
+        by_role |= {axis: [k] for axis, k in turns.items()}
 
 
 def _settle_time(table: RawTable, by_role: dict[str, list[int]]) -> None:

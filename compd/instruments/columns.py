@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.instruments.angles import ANGLE_ORDERS, VECTOR, rotation_vectors
 from compd.instruments.axes import ATTITUDE_AXES
 from compd.instruments.cells import numbers
 from compd.instruments.column_roles import AXES, Roles, column_text, find_roles
@@ -58,10 +59,10 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     table = _of_group(table, roles, options, assumptions, problems)
     problems.check()
     axes = tuple(axis for axis in AXES if axis in roles.column)
-    time = _time(table, roles, options, problems)
-    if time is not None and options.clock_set_back:
-        time = _with_the_hour(time, table, problems)
+    time = read_time(table, roles, options, problems)
     values = _values(table, roles, axes, options, assumptions, problems)
+    if any(axis in ATTITUDE_AXES for axis in axes):
+        values = _as_rotation_vectors(table, roles, axes, values, options, assumptions, problems)
     problems.check()
     places = [k for k, axis in enumerate(axes) if axis not in ATTITUDE_AXES]
     cells = [table.columns[roles.column[axes[k]]] for k in places]
@@ -260,8 +261,48 @@ def _spans(axes: Sequence[str], raw: dict[str, FloatArray], wanted: str) -> str:
     return f"{axis} spans {span:.4g}: as inch {span * 25.4:.4g} mm, as m {span * 1e3:.4g} mm"
 
 
-def _time(table: RawTable, roles: Roles, options: ReadOptions, problems: ExportProblems) -> StampedTime | None:
-    """The times of the rows; None if they have none."""
+def _as_rotation_vectors(
+    table: RawTable,
+    roles: Roles,
+    axes: Sequence[str],
+    values: FloatArray,
+    options: ReadOptions,
+    assumptions: dict[str, str],
+    problems: ExportProblems,
+) -> FloatArray:
+    """The values (N, d) with the attitude as a rotation vector, as rx, ry, rz are where nobody says another order."""
+    turned = [k for k, axis in enumerate(axes) if axis in ATTITUDE_AXES]
+    order = options.angles
+    if order is None:
+        return values
+    if order not in ANGLE_ORDERS or len(turned) < len(ATTITUDE_AXES):
+        what = "is no order of turning" if order not in ANGLE_ORDERS else f"turns {len(turned)} angles"
+        problems.add(table.header_line, what, f"--angles {order}", ", ".join(ANGLE_ORDERS))
+        return values
+    for k in turned:
+        assumptions[axes[k]] += ", a rotation vector" if order == VECTOR else f", in the order {order}"
+    values[:, turned] = rotation_vectors(values[:, turned], order)
+    return values
+
+
+def read_time(
+    table: RawTable,
+    roles: Roles,
+    options: ReadOptions,
+    problems: ExportProblems,
+    unit_option: str = "--columns with time[{unit}] for {what}",
+) -> StampedTime | None:
+    """The times of the rows; None if they have none.
+
+    unit_option : how a person says the unit of times that are numbers.
+    """
+    time = _time(table, roles, options, problems, unit_option)
+    return _with_the_hour(time, table, problems) if time is not None and options.clock_set_back else time
+
+
+def _time(
+    table: RawTable, roles: Roles, options: ReadOptions, problems: ExportProblems, unit_option: str
+) -> StampedTime | None:
     column = roles.column.get("time")
     if column is None:
         if options.rate_hz is None:
@@ -277,7 +318,7 @@ def _time(table: RawTable, roles: Roles, options: ReadOptions, problems: ExportP
     cells = table.columns[column]
     first = next((cell for cell in cells if cell), "")
     if not is_stamp(first):
-        return _time_of_numbers(table, roles, cells, table.line, problems)
+        return _time_of_numbers(table, roles, cells, table.line, problems, unit_option)
     return read_stamps(
         _whole_stamps(table, roles, column), table.line, options.dates, column_text(table, column), problems
     )
@@ -326,7 +367,12 @@ def _is_doubtful(values: FloatArray, cells: Sequence[str]) -> bool:
 
 
 def _time_of_numbers(
-    table: RawTable, roles: Roles, cells: Sequence[str], line: IntArray, problems: ExportProblems
+    table: RawTable,
+    roles: Roles,
+    cells: Sequence[str],
+    line: IntArray,
+    problems: ExportProblems,
+    unit_option: str,
 ) -> StampedTime | None:
     """Times that are numbers: in the unit of the column, or else seconds where they have decimals."""
     what = column_text(table, roles.column["time"])
@@ -337,25 +383,24 @@ def _time_of_numbers(
     filled = values[~np.isnan(values)]
     if unit and factor is None:
         allowed = "s, ms, us, min, h, day"
-        problems.add(table.header_line, "is no unit of time", unit, allowed, "give --columns with time[s]")
+        problems.add(
+            table.header_line, "is no unit of time", unit, allowed, f"give {unit_option.format(unit='s', what=what)}"
+        )
         return None
     if not unit and np.all(filled == np.floor(filled)):
         problems.ask(
             "no unit of time in its name, and whole numbers",
             ", ".join(cells[:3]),
-            [f"--columns with time[{other}] for {what}" for other in ("s", "ms")],
+            [unit_option.format(unit=other, what=what) for other in ("s", "ms")],
             table.header_line or int(line[0]),
         )
         return None
     if not unit and _is_doubtful(filled, cells):
-        span = float(np.ptp(filled))
+        span_s = {other: float(np.ptp(filled)) * (unit_factor(other, "s") or 1.0) for other in ("day", "h", "min", "s")}
         problems.ask(
-            f"no unit of time in its name; in s, its {len(filled)} rows would span {span:.3g} s",
+            f"no unit of time in its name; in s, its {len(filled)} rows would span {span_s['s']:.3g} s",
             ", ".join(cells[:3]),
-            [
-                f"--columns with time[{other}] for {what} (they span {span * (unit_factor(other, 's') or 1.0):.3g} s)"
-                for other in ("day", "h", "min", "s")
-            ],
+            [f"{unit_option.format(unit=one, what=what)} (they span {s:.3g} s)" for one, s in span_s.items()],
             table.header_line or int(line[0]),
         )
         return None

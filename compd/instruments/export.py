@@ -21,6 +21,7 @@ class ReadOptions:
         for one that is not used.
     names : role -> a column's name in the header (`--time`, `--x`, ...).
     unit : of the lengths (`--unit`). angle_unit : of the attitude (`--angle-unit`). decimal : "." or "," (`--decimal`).
+    angles : what rx, ry, rz are, one of `ANGLE_ORDERS` (`--angles`).
     dates : "dmy", "mdy" or "ymd" (`--dates`). rate_hz : samples per second where rows have no time (`--rate-hz`).
     clock_set_back : from where the times fall on, they are an hour later than they say (`--clock-set-back`).
     group : which group of points (`--group`). sheet : of a workbook (`--sheet`).
@@ -32,6 +33,7 @@ class ReadOptions:
     names: Mapping[str, str] = field(default_factory=dict)
     unit: str | None = None
     angle_unit: str | None = None
+    angles: str | None = None
     decimal: str | None = None
     dates: str | None = None
     rate_hz: float | None = None

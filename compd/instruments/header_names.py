@@ -31,6 +31,7 @@ _WORDS = {
 _MEANING = {word: meaning for meaning, words in _WORDS.items() for word in words.split()}
 # Words that also count at the end of a name: "Tracker X", "raw time".
 _LAST = ("time", *POSITION_AXES, *ATTITUDE_AXES, "length")
+_TURNS = {"roll": "rx", "rollen": "rx", "pitch": "ry", "nicken": "ry", "yaw": "rz", "gieren": "rz"}
 _LINK = re.compile(r"link_?\d+")
 
 
@@ -62,6 +63,11 @@ def understand(name: str) -> HeaderName:
         return HeaderName(whole or last, unit)
     numbered = parts[-1].isdigit() and len(parts) > 1 and _MEANING.get(parts[-2]) == "length"
     return HeaderName("length" if numbered or _LINK.fullmatch("_".join(parts[-2:])) else "", unit)
+
+
+def turn_axis(name: str) -> str:
+    """rx, ry or rz of a column named roll, pitch or yaw, in English or German; "" of any other."""
+    return _TURNS.get(split_unit(name)[0].rpartition("_")[2], "")
 
 
 def is_not_measured(name: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from compd.instruments.export import InstrumentExport, ReadOptions
 from compd.instruments.export_problems import ExportProblems
 from compd.instruments.formats import instrument_formats
 from compd.instruments.instrument_format import BinaryFormat, InstrumentFormat
+from compd.instruments.raw_table import RawTable
 from compd.instruments.read import binary_format_of, read_table
 from compd.instruments.read_limits import ReadLimits
 from compd.instruments.text_file import decode_text, read_content
@@ -53,14 +54,9 @@ class ExportPreview:
 
 def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
     """Read an export as `read_export` does; what is wrong with it is beside what could be read."""
-    try:
-        table = read_table(path, options)
-    except RecordingError as error:
-        line, rows = _lines_at_top(path, options.limits)
-        sheets = _sheets(path, _recognised(path), options.limits)
-        return ExportPreview(None, line=line, rows=rows, sheets=sheets, problems=error.problems)
-    if isinstance(table, InstrumentExport):
-        return _of_samples(table)
+    preview, table = preview_table(path, options)
+    if table is None:
+        return preview
     roles = find_roles(table, options, ExportProblems(path))
     export, problems = None, tuple[Problem, ...]()
     try:
@@ -68,19 +64,41 @@ def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
     except RecordingError as error:
         problems = error.problems
     role_of = {column: role for role, column in roles.column.items()}
+    return replace(
+        preview,
+        export=export,
+        roles=[role_of.get(k, "-") for k in range(len(preview.roles))],
+        assumed=table.assumed if export is None else export.taken,
+        groups=list(dict.fromkeys(group_labels(table, roles) or ()))[:_MAX_GROUPS],
+        problems=problems,
+    )
+
+
+def preview_table(path: Path, options: ReadOptions) -> tuple[ExportPreview, RawTable | None]:
+    """The top of any table, no column taken for anything; and the whole table.
+
+    None in its place for a file that is no table of text, or that `problems` are about.
+    """
+    try:
+        table = read_table(path, options)
+    except RecordingError as error:
+        line, rows = _lines_at_top(path, options.limits)
+        sheets = _sheets(path, _recognised(path), options.limits)
+        return ExportPreview(None, line=line, rows=rows, sheets=sheets, problems=error.problems), None
+    if isinstance(table, InstrumentExport):
+        return _of_samples(table), None
     columns = table.columns[:_MAX_COLUMNS]
-    return ExportPreview(
-        export,
+    preview = ExportPreview(
+        None,
         shape=table.shape,
         line=table.line[:SHOWN_ROWS].tolist(),
         rows=_cut(zip(*(cells[:SHOWN_ROWS] for cells in columns), strict=True)),
         header=[name[:_CELL_WIDTH] for name in (table.header or ())[:_MAX_COLUMNS]],
-        roles=[role_of.get(k, "-") for k in range(len(columns))],
-        assumed=table.assumed if export is None else export.taken,
-        groups=list(dict.fromkeys(group_labels(table, roles) or ()))[:_MAX_GROUPS],
+        roles=["-"] * len(columns),
+        assumed=table.assumed,
         sheets=_sheets(path, instrument_formats()[table.shape], options.limits),
-        problems=problems,
     )
+    return preview, table
 
 
 def _of_samples(export: InstrumentExport) -> ExportPreview:

@@ -14,7 +14,7 @@ from datetime import date
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.instruments.export_problems import ExportProblems
+from compd.instruments.export_problems import ExportProblems, lines_text
 
 DATE_ORDERS = ("dmy", "mdy", "ymd")
 DAY_S = 86400.0
@@ -143,6 +143,24 @@ def set_back_at(time_s: FloatArray) -> int | None:
     if len(falls) != 1 or not -SET_BACK_S <= steps_s[falls[0]] <= _MAX_PAUSE_S - SET_BACK_S:
         return None
     return int(rows[falls[0] + 1])
+
+
+def check_rising(time_s: FloatArray, line: IntArray, next_step: str, problems: ExportProblems) -> bool:
+    """Whether times (N,), without nan, rise; else a problem or a question is added.  line : (N,)."""
+    not_rising = 1 + np.flatnonzero(np.diff(time_s) <= 0)
+    set_back = set_back_at(time_s)
+    if set_back is not None:
+        problems.ask(
+            "the clock was set back by an hour (end of summer time?)",
+            f"{-np.diff(time_s)[set_back - 1]:.3f} s earlier than the row above",
+            ["--clock-set-back (the rows from here on get an hour more)"],
+            int(line[set_back]),
+        )
+    elif len(not_rising):
+        lines = line[not_rising].tolist()
+        what = f"time does not rise ({lines_text(lines)})"
+        problems.add(lines[0], what, allowed="later than the row above", next_step=next_step)
+    return set_back is None and not len(not_rising)
 
 
 class _Parsed:

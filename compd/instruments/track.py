@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from compd.arrays import FloatArray
 from compd.instruments.axes import ATTITUDE_AXES
 from compd.instruments.export import InstrumentExport
-from compd.instruments.export_problems import ExportProblems, lines_text
-from compd.instruments.time_stamps import set_back_at
+from compd.instruments.export_problems import ExportProblems
+from compd.instruments.time_stamps import check_rising
 
 LENGTH = "length"
 # 1 / 0.6745: the standard deviation of a normal distribution over its median absolute deviation.
@@ -95,24 +95,9 @@ def track_of(export: InstrumentExport) -> Track:
         )
         problems.check()
     assert export.time_s is not None
-    not_rising = 1 + np.flatnonzero(np.diff(export.time_s) <= 0)
-    set_back = set_back_at(export.time_s)
-    if set_back is not None:
-        problems.ask(
-            "the clock was set back by an hour (end of summer time?)",
-            f"{-np.diff(export.time_s)[set_back - 1]:.3f} s earlier than the row above",
-            ["--clock-set-back (the rows from here on get an hour more)"],
-            int(export.line[set_back]),
-        )
-    elif len(not_rising):
-        lines = export.line[not_rising].tolist()
-        problems.add(
-            lines[0],
-            f"time does not rise ({lines_text(lines)})",
-            allowed="later than the row above",
-            next_step="choose one group of points with --group where there are several, or sort the rows",
-        )
-    elif (mixed := _mixed_rows(export.values)) is not None:
+    next_step = "choose one group of points with --group where there are several, or sort the rows"
+    rising = check_rising(export.time_s, export.line, next_step, problems)
+    if rising and (mixed := _mixed_rows(export.values)) is not None:
         problems.add(
             int(export.line[mixed[0]]),
             f"its rows are of two tracks in turn, up to line {export.line[mixed[1]]}",

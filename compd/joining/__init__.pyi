@@ -8,6 +8,12 @@ from .join import JoinOptions as JoinOptions
 from .join import choose_by as choose_by
 from .join import match_export as match_export
 from .join import unfit_option as unfit_option
+from .machine_log import LogOptions as LogOptions
+from .machine_log import column_roles as column_roles
 from .machine_log import is_machine_log as is_machine_log
-from .machine_log import write_log_recording as write_log_recording
+from .machine_log import log_as_recording as log_as_recording
+from .machine_log import machine_recording as machine_recording
+from .machine_log import named_columns as named_columns
+from .machine_log import problems_of_log as problems_of_log
+from .machine_log import read_machine_log as read_machine_log
 from .summary import summary_lines as summary_lines

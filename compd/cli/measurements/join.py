@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -9,13 +10,16 @@ from typing import Annotated
 import typer
 
 from compd.cli.export_options import (
+    AnglesOption,
     AngleUnitOption,
     ClockSetBackOption,
     ColumnsOption,
+    DateOrder,
     DatesOption,
     DecimalOption,
     GroupOption,
     RateOption,
+    Shape,
     ShapeOption,
     SheetOption,
     UnitOption,
@@ -67,6 +71,7 @@ def join(
     columns: ColumnsOption = None,
     unit: UnitOption = None,
     angle_unit: AngleUnitOption = None,
+    angles: AnglesOption = None,
     decimal: DecimalOption = None,
     dates: DatesOption = None,
     rate_hz: RateOption = None,
@@ -102,6 +107,17 @@ def join(
             "repeated.",
         ),
     ] = None,
+    log_as: Annotated[Shape | None, typer.Option(help="The log's format, as --as of the export.")] = None,
+    log_sheet: Annotated[str | None, typer.Option(help="The log's sheet, if it has several.")] = None,
+    log_decimal: Annotated[str | None, typer.Option(help="The log's decimal mark, if it is ambiguous.")] = None,
+    log_dates: Annotated[DateOrder | None, typer.Option(help="The log's order of dates, if it is ambiguous.")] = None,
+    log_angles: Annotated[
+        str | None,
+        typer.Option(metavar="ORDER", help="What the log's angles are, as --angles of the export."),
+    ] = None,
+    log_clock_set_back: Annotated[
+        bool, typer.Option("--log-clock-set-back", help="The log's times fall by an hour, as summer time ended.")
+    ] = False,
     plan: Annotated[
         Path | None, typer.Option(help="With --by name: the measured plan; its row k is the point P00k.")
     ] = None,
@@ -113,18 +129,23 @@ def join(
     from compd.joining import (
         Instrument,
         JoinOptions,
+        LogOptions,
         choose_by,
         is_machine_log,
+        log_as_recording,
+        machine_recording,
         match_export,
         summary_lines,
         unfit_option,
-        write_log_recording,
     )
     from compd.recording import write_recording
 
     roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
     read_as = read_options(
-        shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet, clock_set_back
+        shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet, clock_set_back, angles
+    )
+    log_read = read_options(
+        log_as, None, {}, None, None, log_decimal, log_dates, None, None, log_sheet, log_clock_set_back, log_angles
     )
     exported = read_export(export, read_as)
     echo_taken(export, exported.shape, exported.taken, exported.left_out)
@@ -133,15 +154,19 @@ def join(
     chosen = choose_by(options.by, exported)
     if option := unfit_option(chosen, options):
         raise typer.BadParameter(f"contradicts --by {chosen}", param_hint=option)
-    if log or is_machine_log(gauges):
-        if machine is None:
-            raise typer.BadParameter(f"{gauges} has no sidecar, so it is a machine's own log, which needs --machine")
-        recorded = out.with_name(f"{out.stem}-machine.csv")
-        write_log_recording(gauges, recorded, load_machine(machine), log or ())
-        typer.echo(f"{gauges}: the machine's own log, as a recording: {recorded}")
-        gauges = recorded
-    joined = match_export(gauges, exported, options)
-    write_recording(out, joined.columns, joined.sidecar)
+    with ExitStack() as written:
+        if log or is_machine_log(gauges):
+            if machine is None:
+                what = f"{gauges} has no sidecar, so it is a machine's own log, which needs --machine"
+                raise typer.BadParameter(what)
+            recorded = machine_recording(out)
+            as_said = LogOptions(tuple(log or ()), log_read)
+            read = written.enter_context(log_as_recording(gauges, recorded, load_machine(machine), as_said))
+            echo_taken(gauges, read.shape, read.taken, read.left_out)
+            typer.echo(f"{gauges}: the machine's own log, as a recording: {recorded}")
+            gauges = recorded
+        joined = match_export(gauges, exported, options)
+        write_recording(out, joined.columns, joined.sidecar)
     for line in summary_lines(joined):
         typer.echo(line)
     typer.echo(f"written: {out} and {out.with_suffix('.yaml')}")

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from compd.errors import CompdError, Problem
-from compd.instruments import ReadLimits, ReadOptions, instrument_formats
-from compd.joining import JOIN_BY, Instrument, JoinOptions
+from compd.instruments import ANGLE_ORDERS, ReadLimits, ReadOptions, instrument_formats
+from compd.joining import JOIN_BY, Instrument, JoinOptions, LogOptions
 
 Value = TypeVar("Value", str, float, int)
 
@@ -28,10 +28,15 @@ _FRAMES = ("instrument", "machine")
 
 @dataclass(frozen=True)
 class Choices:
-    """read : options of the export's reader. join : options for matching its rows with the gauges."""
+    """read : options of the export's reader. join : options for matching its rows with the gauges.
+    log : of the machine's own log, whose columns are named by `log_roles` in their order; None where a recording of
+        the gauges is joined.
+    """
 
     read: ReadOptions
     join: JoinOptions
+    log: LogOptions | None = None
+    log_roles: tuple[str, ...] = ()
 
     def command(self, gauges: Path, export: Path, out: Path) -> str:
         """The equivalent command line."""
@@ -42,6 +47,7 @@ class Choices:
             "--columns": ",".join(read.columns) or None,
             "--unit": read.unit,
             "--angle-unit": read.angle_unit,
+            "--angles": read.angles,
             "--decimal": read.decimal,
             "--dates": read.dates,
             "--rate-hz": read.rate_hz,
@@ -62,7 +68,22 @@ class Choices:
             if value is not None:
                 words += [option, repr(value) if isinstance(value, float) else str(value)]
         flags = {"--moving": join.moving, "--clock-set-back": read.clock_set_back}
-        return shlex.join([*words, *(flag for flag, is_set in flags.items() if is_set)])
+        words += [flag for flag, is_set in flags.items() if is_set]
+        return shlex.join([*words, *([] if self.log is None else _log_words(self.log))])
+
+
+def _log_words(log: LogOptions) -> list[str]:
+    read = log.read
+    options = {
+        "--log-as": read.shape,
+        "--log-sheet": read.sheet,
+        "--log-decimal": read.decimal,
+        "--log-dates": read.dates,
+        "--log-angles": read.angles,
+    }
+    words = [word for text in log.named for word in ("--log", text)]
+    words += [word for option, value in options.items() if value is not None for word in (option, value)]
+    return [*words, *["--log-clock-set-back"] * read.clock_set_back]
 
 
 def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | None) -> Choices:
@@ -84,19 +105,35 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
     def text(name: str, among: tuple[str, ...] = ()) -> str | None:
         return choice(name, str, ", ".join(among) or "a short text", among)
 
-    columns = keys.get("columns") or []
-    if (
-        not isinstance(columns, list)
-        or len(columns) > _MAX_COLUMNS
-        or not all(_is(role, str) and "," not in role for role in columns)
-    ):
-        problems.append(Problem(where="columns", what="is not understood", allowed="a role for each column"))
-        columns = []
+    def roles(name: str) -> tuple[str, ...]:
+        columns = keys.get(name) or []
+        if (
+            not isinstance(columns, list)
+            or len(columns) > _MAX_COLUMNS
+            or not all(_is(role, str) and "," not in role for role in columns)
+        ):
+            problems.append(Problem(where=name, what="is not understood", allowed="a role for each column"))
+            return ()
+        return tuple(columns)
+
+    log = None
+    if keys.get("log"):
+        log_read = ReadOptions(
+            shape=text("log_shape", tuple(instrument_formats())),
+            angles=text("log_angles", tuple(ANGLE_ORDERS)),
+            decimal=text("log_decimal", (".", ",")),
+            dates=text("log_dates", _DATES),
+            clock_set_back=keys.get("log_clock_set_back") is True,
+            sheet=text("log_sheet"),
+            limits=LIMITS,
+        )
+        log = LogOptions(read=log_read)
     read = ReadOptions(
         shape=text("shape", tuple(instrument_formats())),
-        columns=tuple(columns),
+        columns=roles("columns"),
         unit=text("unit"),
         angle_unit=text("angle_unit"),
+        angles=text("angles", tuple(ANGLE_ORDERS)),
         decimal=text("decimal", (".", ",")),
         dates=text("dates", _DATES),
         rate_hz=choice("rate_hz", float, "a number, Hz"),
@@ -121,9 +158,10 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
         machine=machine,
         plan=plan,
     )
+    log_roles = roles("log_columns")
     if problems:
         raise CompdError(problems)
-    return Choices(read, join)
+    return Choices(read, join, log, log_roles)
 
 
 def _is(value: Any, kind: type) -> bool:

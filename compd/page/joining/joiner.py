@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from tempfile import TemporaryDirectory
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from compd.arrays import FloatArray
+from compd.configuration import load_machine
 from compd.errors import CompdError, RecordingError
 from compd.files import file_stamp
 from compd.instruments import ExportPreview, InstrumentExport, ReadOptions, preview_export, track_of
@@ -17,11 +20,14 @@ from compd.joining import (
     RestJoin,
     agreement_curve,
     choose_by,
+    log_as_recording,
+    machine_recording,
     match_export,
     summary_lines,
 )
 from compd.page.joining.choices import Choices, read_choices
 from compd.page.joining.exports import Exports
+from compd.page.joining.log_table import LogPreview, log_contents, preview_log, with_named_columns, without_machine
 from compd.page.joining.named_files import missing, named
 from compd.page.recording_machine import machine_of
 from compd.page.recordings import NAME
@@ -86,31 +92,24 @@ def _numbers(values: FloatArray) -> list[float]:
 
 # Parsed files in memory: two persons may look at two, and change the roles of their columns.
 _KEPT = 4
+Preview = TypeVar("Preview")
 
 
-class _Read(NamedTuple):
-    """A file at a time of change, with reading options."""
+class FileReader(Generic[Preview]):
+    """Reads files by `read`; caches those requested last, each at its time of change, with its reading options."""
 
-    path: Path
-    stamp: tuple[int, int] | None
-    options: ReadOptions
-    preview: ExportPreview
+    def __init__(self, read: Callable[[Path, ReadOptions], Preview]) -> None:
+        self._read = read
+        self._kept: list[tuple[Path, tuple[int, int] | None, ReadOptions, Preview]] = []
 
-
-class ExportReader:
-    """Reads exports; caches those requested last."""
-
-    def __init__(self) -> None:
-        self._kept: list[_Read] = []
-
-    def read(self, path: Path, options: ReadOptions) -> ExportPreview:
-        """See `preview_export`."""
+    def read(self, path: Path, options: ReadOptions) -> Preview:
+        """What `read` gives of the file."""
         stamp = file_stamp(path)
-        for known in self._kept:
-            if (known.path, known.stamp, known.options) == (path, stamp, options):
-                return known.preview
-        preview = preview_export(path, options)
-        self._kept = [_Read(path, stamp, options, preview), *self._kept][:_KEPT]
+        for *known, preview in self._kept:
+            if known == [path, stamp, options]:
+                return preview
+        preview = self._read(path, options)
+        self._kept = [(path, stamp, options, preview), *self._kept][:_KEPT]
         return preview
 
 
@@ -143,9 +142,12 @@ def table_contents(preview: ExportPreview) -> dict[str, Any]:
 
 
 class _Join(NamedTuple):
-    """A browser's request with the files that it names. gauges, out : None before a choice."""
+    """A browser's request with the files that it names. gauges, out : None before a choice. log : table of the
+    machine's own log, where that is chosen in place of a recording; None where it is no table.
+    """
 
     gauges: Path | None
+    log: LogPreview | None
     export: Path
     out: Path | None
     choices: Choices
@@ -165,7 +167,15 @@ class Joiner:
         """recordings, exports : the directories. machine : the page's configuration."""
         self._directory, self._machine = recordings, machine
         self._exports = Exports(exports)
-        self._reader = ExportReader()
+        self._reader = FileReader(preview_export)
+        self._logs = FileReader(preview_log)
+
+    def log(self, keys: Mapping[str, Any]) -> dict[str, Any]:
+        """The preview of the machine's own log. Raises as `table`."""
+        path = self._brought(keys, "log")
+        choices = read_choices(keys, self._machine, None)
+        assert choices.log is not None
+        return log_contents(self._logs.read(path, choices.log.read), choices, self._machine)
 
     def table(self, keys: Mapping[str, Any]) -> dict[str, Any]:
         """The preview of an export. keys : the choices. Raises CompdError for a missing file or an invalid choice."""
@@ -176,38 +186,66 @@ class Joiner:
     def trial(self, keys: Mapping[str, Any]) -> dict[str, Any]:
         """See `tried`. Raises as `table`."""
         join = self._join(keys)
-        gauges, export = self._whole(join)
-        return tried(gauges, export, join.choices.join)
+        with TemporaryDirectory() as directory:
+            written = join._replace(out=Path(directory) / (join.out or Path("NAME.csv")).name)
+            with self._gauges(written) as gauges:
+                return tried(gauges, self._export(join), join.choices.join)
 
     def write(self, keys: Mapping[str, Any]) -> dict[str, Any]:
         """Write the new recording. Raises as `table`, and if the rows cannot be joined."""
         join = self._join(keys)
-        gauges, export = self._whole(join)
+        export = self._export(join)
         if join.out is None:
             raise missing("name", "the recording that is written needs a name")
-        joined = match_export(gauges, export, join.choices.join)
-        write_recording(join.out, joined.columns, joined.sidecar)
+        with self._gauges(join) as gauges:
+            joined = match_export(gauges, export, join.choices.join)
+            write_recording(join.out, joined.columns, joined.sidecar)
         return {"recording": join.out.stem, "path": str(join.out), "lines": summary_lines(joined)}
 
     def _join(self, keys: Mapping[str, Any]) -> _Join:
         """Raises CompdError for a missing file or an invalid choice."""
-        export = self._exports.path_of(str(keys.get("export", "")))
-        if export is None:
-            raise missing("export", "there is no such export", "choose one, or bring one from your computer")
+        export = self._brought(keys, "export")
         gauges, plan = (named(self._directory, keys, key) for key in ("recording", "plan"))
         name = str(keys.get("name") or "")
         if name and not NAME.fullmatch(name):
             raise missing("name", "a name has letters, digits, - and _, at most 64 of them")
-        needs_machine = gauges is not None and keys.get("by") in ("order", "name", "distance")
-        machine = machine_of(gauges, self._machine) if needs_machine and gauges is not None else None
         out = self._directory / f"{name}.csv" if name else None
-        return _Join(gauges, export, out, read_choices(keys, machine, plan))
+        if not keys.get("log"):
+            machine = None if gauges is None else machine_of(gauges, self._machine)
+            return _Join(gauges, None, export, out, read_choices(keys, machine, plan))
+        path, choices = self._brought(keys, "log"), read_choices(keys, self._machine, plan)
+        assert choices.log is not None
+        log = self._logs.read(path, choices.log.read)
+        return _Join(path, log, export, out, with_named_columns(choices, log))
 
-    def _whole(self, join: _Join) -> tuple[Path, InstrumentExport]:
-        """The recording and the export. Raises CompdError if one is missing or unreadable."""
-        if join.gauges is None:
-            raise missing("recording", "no recording of the gauges is chosen")
+    def _brought(self, keys: Mapping[str, Any], key: str) -> Path:
+        path = self._exports.path_of(str(keys.get(key, "")))
+        if path is None:
+            raise missing(key, f"there is no such {key}", "choose one, or bring one from your computer")
+        return path
+
+    def _export(self, join: _Join) -> InstrumentExport:
+        """The whole export. Raises RecordingError if it is unreadable."""
         preview = self._reader.read(join.export, join.choices.read)
         if preview.export is None:
             raise RecordingError(preview.problems)
-        return join.gauges, preview.export
+        return preview.export
+
+    @contextmanager
+    def _gauges(self, join: _Join) -> Iterator[Path]:
+        """The recording of the gauges; of the machine's own log the one written beside `out`. Raises CompdError if
+        one is missing or unreadable."""
+        if join.gauges is None:
+            raise missing("recording", "no recording of the gauges is chosen")
+        if join.log is None:
+            yield join.gauges
+            return
+        if join.log.table is None:
+            raise RecordingError(join.log.preview.problems)
+        if self._machine is None:
+            raise without_machine()
+        assert join.out is not None
+        assert join.choices.log is not None
+        recorded = machine_recording(join.out)
+        with log_as_recording(join.log.table, recorded, load_machine(self._machine), join.choices.log):
+            yield recorded

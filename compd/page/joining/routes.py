@@ -11,7 +11,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from compd.errors import CompdError, RecordingError
-from compd.instruments import instrument_formats
+from compd.instruments import ANGLE_ORDERS, instrument_formats
 from compd.page.joining.exports import MAX_BYTES, Exports
 from compd.page.joining.named_files import gauges_and_plans
 from compd.page.recordings import Recordings
@@ -75,6 +75,7 @@ class JoinRoutes:
             Route("/join/exports", self._bring, methods=["POST"]),
             *export_routes(self._exports),
             Route("/join/table", self._table, methods=["POST"]),
+            Route("/join/log", self._log, methods=["POST"]),
             Route("/join/trial", self._try, methods=["POST"]),
             Route("/join/recording", self._write, methods=["POST"]),
         ]
@@ -92,6 +93,7 @@ class JoinRoutes:
                 "gauges": gauges,
                 "plans": plans,
                 "exports": self._exports.listed(),
+                "angles": [[order, words] for order, words in ANGLE_ORDERS.items()],
                 "formats": [[declared.name, declared.title] for declared in instrument_formats().values()],
                 "may_write": may_change(request),
                 "most_bytes": MAX_BYTES,
@@ -112,6 +114,11 @@ class JoinRoutes:
     async def _table(self, request: Request) -> Response:
         keys = await keys_of(request)
         asked = self._joiners.free(str(keys.get("export"))).ask(f"{_JOINER}.table", keys, seconds=ANSWER_S)
+        return await _answered(while_asked(request, asked))
+
+    async def _log(self, request: Request) -> Response:
+        keys = await keys_of(request)
+        asked = self._joiners.free(str(keys.get("export"))).ask(f"{_JOINER}.log", keys, seconds=ANSWER_S)
         return await _answered(while_asked(request, asked))
 
     async def _try(self, request: Request) -> Response:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from compd.errors import RecordingError
 from tests.unit.instruments.reading import read, refused
 
 
@@ -185,3 +186,18 @@ def test_deviations_beside_a_position_are_not_asked_about(tmp_path: Path) -> Non
     rng = np.random.default_rng(1)
     rows = [",".join(f"{v:.4f}" for v in [*rng.uniform(-200, 200, 3), *rng.normal(0, 0.01, 3)]) for _ in range(12)]
     assert len(read(tmp_path, "\n".join(["X,Y,Z,dX,dY,dZ", *rows]) + "\n", unit="mm").values) == 12
+
+
+def test_an_attitude_in_angles_turns_in_the_order_that_is_said(tmp_path: Path) -> None:
+    """Roll, pitch and yaw are those about x, y and z; a quarter about x, then one about z: the cyclic permutation."""
+    header = "name,x_mm,y_mm,z_mm,Roll [deg],Pitch [deg],Yaw [deg]"
+    export = read(tmp_path, f"{header}\nP1,1,2,3,90,0,90\nP2,1,2,3,0,0,30\n", angles="xyz")
+    third = 2 * np.pi / 3 / np.sqrt(3)
+    assert export.values[:, 3:] == pytest.approx(np.array([[third] * 3, [0, 0, np.pi / 6]]))
+    assert "in the order xyz" in export.taken["rx"]
+    turned = read(tmp_path, f"{header}\nP1,1,2,3,90,0,90\n", angles="XYZ")
+    assert turned.values[0, 3:] == pytest.approx([third, -third, third])
+    with pytest.raises(RecordingError, match=r"no order of turning(.|\n)*value: --angles rpy"):
+        read(tmp_path, f"{header}\nP1,1,2,3,90,0,90\n", angles="rpy")
+    with pytest.raises(RecordingError, match=r"meaning cannot be told(.|\n)*--angles"):
+        read(tmp_path, f"{header}\nP1,1,2,3,90,0,90\n")

@@ -12,9 +12,9 @@ from typer.testing import CliRunner, Result
 
 from compd.cli.app import app
 from compd.comparison import open_recording
-from compd.configuration import load
 from compd.errors import RecordingError
-from compd.joining import write_log_recording
+from compd.instruments import ReadOptions
+from compd.joining import LogOptions, read_machine_log
 from compd.recording import read_recording
 from tests.support.built_machines import built, drawing, poses, targets
 
@@ -86,15 +86,106 @@ def test_what_a_log_does_not_say_is_asked(measured: tuple[Path, np.ndarray], tmp
     assert isinstance(done.exception, RecordingError)
     assert "no column is one of a recording" in str(done.exception)
     assert "Leg 1 [m]" in str(done.exception)
-    bare, mine = tmp_path / "bare.csv", load(directory / "6-ups.yaml")
+    bare = tmp_path / "bare.csv"
     bare.write_text("a,b\n1.5,2.5\n2.5,3.5\n", encoding="utf-8")
     with pytest.raises(RecordingError, match=r'column a: has no unit(.|\n)*--log "a=scale_1_mm:UNIT"'):
-        write_log_recording(bare, tmp_path / "out.csv", mine, ["a=scale_1_mm"])
+        read_machine_log(bare, LogOptions(("a=scale_1_mm",)))
     with pytest.raises(RecordingError, match=r"names no column of the log(.|\n)*allowed: a, b"):
-        write_log_recording(bare, tmp_path / "out.csv", mine, ["c=scale_1_mm:mm"])
+        read_machine_log(bare, LogOptions(("c=scale_1_mm:mm",)))
     with pytest.raises(RecordingError, match="is in s, which is no unit of scale_1_mm"):
-        write_log_recording(bare, tmp_path / "out.csv", mine, ["a=scale_1_mm:s"])
-    write_log_recording(bare, tmp_path / "out.csv", mine, ["a=commanded_rx_rad:deg", "b=commanded_x_mm:inch"])
-    text = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
-    assert text[0] == "point,commanded_rx_rad,commanded_x_mm"
-    assert [float(cell) for cell in text[1].split(",")] == pytest.approx([1, np.deg2rad(1.5), 63.5])
+        read_machine_log(bare, LogOptions(("a=scale_1_mm:s",)))
+
+
+def times_s(directory: Path, cells: list[str], named: str, **read: str) -> np.ndarray:
+    path = directory / "times.csv"
+    rows = "".join(f"{cell};{k},5\n" for k, cell in enumerate(cells))
+    path.write_text(f"When;X [mm]\n{rows}", encoding="utf-8")
+    log = read_machine_log(path, LogOptions((named, "X [mm]=commanded_x_mm"), ReadOptions(**read)))
+    assert log.columns["commanded_x_mm"] == pytest.approx(0.5 + np.arange(len(log.columns["time_s"])))
+    return log.columns["time_s"]
+
+
+def test_stamps_of_a_log_are_seconds(tmp_path: Path) -> None:
+    noon_s = 12 * 3600.0
+    stamps = ["2026-11-28T12:00:00.250", "2026-11-28T12:00:10.250", "2026-11-29T00:00:00.250"]
+    assert times_s(tmp_path, stamps, "When=time_s") == pytest.approx([noon_s + 0.25, noon_s + 10.25, 86400.25])
+    german = ["28.11.2026 12:00:03,5", "28.11.2026 12:00:07,5"]
+    assert times_s(tmp_path, german, "When=time_s") == pytest.approx([noon_s + 3.5, noon_s + 7.5])
+    days = ["46354,5", "46354,50011574074", "46354,6"]
+    assert times_s(tmp_path, days, "When=time_s:day")[1:] - noon_s == pytest.approx(
+        [46354 * 86400 + 10, 46354 * 86400 + 0.1 * 86400], abs=1e-3
+    )
+    # a row without a stamp is no row at another time
+    assert times_s(tmp_path, ["1,5", "2,5", ""], "When=time_s:s") == pytest.approx([1.5, 2.5])
+
+
+@pytest.mark.parametrize(
+    ("cells", "named", "asked"),
+    [
+        (["03/04/2026 12:00:00.5", "05/06/2026 12:00:00.5"], "When=time_s", "--log-dates dmy"),
+        (["100", "200"], "When=time_s", r'--log "When=time_s:s" or --log "When=time_s:ms"'),
+        (["46354,50001", "46354,50002"], "When=time_s", r'--log "When=time_s:day"'),
+        (["3,5", "3,1"], "When=time_s:s", "times.csv:3: time does not rise"),
+        (["28.11.2026 25:00:00.5", "28.11.2026 12:00:00.5"], "When=time_s", "times.csv:2"),
+        (["1,5", "2,5"], "When=time_s:mm", "no unit of time"),
+    ],
+)
+def test_times_that_cannot_be_told_are_asked_about(tmp_path: Path, cells: list[str], named: str, asked: str) -> None:
+    with pytest.raises(RecordingError, match=asked):
+        times_s(tmp_path, cells, named)
+
+
+ANGLES = ("A=commanded_rx_rad:deg", "B=commanded_ry_rad:deg", "C=commanded_rz_rad:deg")
+
+
+def turned(directory: Path, order: str | None, named: tuple[str, ...] = ANGLES) -> np.ndarray:
+    path = directory / "turned.csv"
+    path.write_text("A,B,C\n10.5,-20.5,30.5\n", encoding="utf-8")
+    columns = read_machine_log(path, LogOptions(named, ReadOptions(angles=order))).columns
+    return np.array([columns[f"commanded_r{axis}_rad"][0] for axis in "xyz"])
+
+
+def about(axis: str, angle_deg: float) -> np.ndarray:
+    """The matrix of a turn about one axis, written out."""
+    c, s = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
+    first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    matrix = np.eye(3)
+    matrix[first, first] = matrix[second, second] = c
+    matrix[first, second], matrix[second, first] = -s, s
+    return matrix
+
+
+def matrix_of(vector_rad: np.ndarray) -> np.ndarray:
+    """Rodrigues' formula."""
+    angle = float(np.linalg.norm(vector_rad))
+    x, y, z = vector_rad / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def test_angles_of_a_log_turn_in_the_order_that_is_said(tmp_path: Path) -> None:
+    rx, ry, rz = about("x", 10.5), about("y", -20.5), about("z", 30.5)
+    assert matrix_of(turned(tmp_path, "xyz")) == pytest.approx(rz @ ry @ rx)
+    assert matrix_of(turned(tmp_path, "XYZ")) == pytest.approx(rx @ ry @ rz)
+    assert matrix_of(turned(tmp_path, "ZYX")) == pytest.approx(rz @ ry @ rx)
+    assert matrix_of(turned(tmp_path, "ZXZ")) == pytest.approx(about("z", 10.5) @ about("x", -20.5) @ rz)
+    assert turned(tmp_path, "vector") == pytest.approx(np.deg2rad([10.5, -20.5, 30.5]))
+
+
+def test_the_order_of_turning_is_never_guessed(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"in which order its angles turn is not said(.|\n)*--log-angles xyz"):
+        turned(tmp_path, None)
+    with pytest.raises(RecordingError, match=r"no order of turning(.|\n)*value: rpy"):
+        turned(tmp_path, "rpy")
+    with pytest.raises(RecordingError, match="three angles, commanded_rz_rad is missing"):
+        turned(tmp_path, "xyz", ANGLES[:2])
+
+
+def test_a_join_that_fails_leaves_no_file(measured: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    directory, _ = measured
+    out = tmp_path / "out.csv"
+    named = [part for i in LEGS for part in ("--log", f"Leg {i} [m]=scale_{i}_mm")]
+    arguments = ["join", directory / "log.txt", directory / "points.csv", out, "--by", "time", *named]
+    failed = CliRunner().invoke(app, list(map(str, [*arguments, "--machine", directory / "6-ups.yaml"])))
+    assert failed.exit_code != 0
+    assert list(tmp_path.iterdir()) == []

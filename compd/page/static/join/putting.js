@@ -26,8 +26,8 @@ export class Putting {
     addEventListener("resize", () => this.draw());
   }
 
-  show({ table, choices, trial, sources }) {
-    this.button.disabled = !table?.points || !choices.recording;
+  show({ table, log, choices, trial, sources }) {
+    this.button.disabled = !table?.points || !(choices.recording || log?.points);
     if (sources) this.fields.plan.options(sources.plans.map((name) => [name, name]), "none: names are ids of the recording");
     if (table) this.offer(table, choices);
     if (trial === this.shown) return;

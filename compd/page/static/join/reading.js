@@ -1,5 +1,6 @@
 // Reading of the export: its first rows, the role of each column, and further options.
 import { element } from "../format.js";
+import { Columns } from "./columns.js";
 import { Check, Choice, Quantity } from "./fields.js";
 
 const ROLES = [["time", "time"], ["time[s]", "time, s"], ["time[ms]", "time, ms"], ["time[min]", "time, min"], ["time[h]", "time, h"], ["time[day]", "time, days"], ["date", "date"], ["x", "x"], ["y", "y"], ["z", "z"], ["rx", "rx"], ["ry", "ry"], ["rz", "rz"], ["length", "length"], ["name", "name"], ["group", "group"], ["collection", "collection"], ["-", "unused"]];
@@ -8,13 +9,14 @@ const ANGLES = ["rad", "mrad", "deg", "arcsec"];
 const each = (values) => values.map((value) => [value, value]);
 const bare = (role) => role.replace(/\[.*/, "");
 
-export class Reading {
-  constructor(wizard, { fields, problems, table, taken, note }) {
-    Object.assign(this, { wizard, problems, table, taken, note });
+export class Reading extends Columns {
+  constructor(wizard, { fields, ...parts }) {
+    super(wizard, parts, "columns", "");
     this.fields = {
       shape: new Choice(wizard, "shape", "Shape"),
       unit: new Choice(wizard, "unit", "Unit of lengths", each(LENGTHS)),
       angle_unit: new Choice(wizard, "angle_unit", "Unit of angles", each(ANGLES)),
+      angles: new Choice(wizard, "angles", "What the angles are"),
       decimal: new Choice(wizard, "decimal", "Decimal sign", [[".", "point"], [",", "comma"]]),
       dates: new Choice(wizard, "dates", "Order of dates", [["dmy", "day month year"], ["mdy", "month day year"], ["ymd", "year month day"]]),
       rate_hz: new Quantity(wizard, "rate_hz", "Rows in a second", "Hz"),
@@ -30,23 +32,22 @@ export class Reading {
     if (sources && !this.formats) {
       this.formats = sources.formats;
       this.fields.shape.options(this.formats, "detected");
+      this.fields.angles.options(sources.angles, "a rotation vector");
     }
     for (const field of Object.values(this.fields)) if (choices[field.key] == null && field.control !== document.activeElement) field.clear();
     this.guess.disabled = !choices.columns;
     if (table === this.shown) return;
     this.shown = table;
-    this.note.textContent = !table ? "choose an export" : table.points ? `${table.points} rows are read; the first ${table.rows.length} of the file are shown` : "not read yet: answer the questions";
-    this.problems.replaceChildren(...(table?.problems ?? []).map((problem) => element("p", { class: "problem" }, problem)));
-    this.showTaken(table);
-    this.showTable(table);
+    this.showWhole(table, "choose an export");
     if (!table) return;
-    const { shape, unit, angle_unit, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
+    const { shape, unit, angle_unit, angles, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
     const { assumed } = table;
     const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
     shape.automatic(`detected: ${this.formats.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
     unit.automatic(lengthUnit && !choices.unit ? `detected: ${lengthUnit[1]}` : "as the file says");
     angle_unit.offer(table.roles.some((role) => /^r[xyz]$/.test(role)));
     angle_unit.automatic("as the file says");
+    angles.offer(choices.angles != null || table.roles.some((role) => /^r[xyz]$/.test(role)) || table.problems.some((problem) => problem.includes("--angles")));
     decimal.automatic(assumed["decimal mark"] && !choices.decimal ? `detected: ${assumed["decimal mark"]}` : "detected");
     const order = /dates ([a-z]+-[a-z]+-[a-z]+)/.exec(assumed.time ?? "");
     dates.automatic(order && !choices.dates ? `detected: ${order[1].replaceAll("-", " ")}` : "detected");
@@ -58,34 +59,9 @@ export class Reading {
     sheet.options(each(table.sheets), "the one with numbers");
   }
 
-  showTaken(table) {
-    const left = Object.entries(table?.left_out ?? {}).map(([reason, count]) => [`${count} rows not used`, reason]);
-    this.taken.replaceChildren(...[...Object.entries(table?.assumed ?? {}), ...left].flatMap(([name, text]) => [element("dt", {}, name), element("dd", {}, text)]));
-  }
-
-  showTable(table) {
-    const focused = this.table.contains(document.activeElement) ? document.activeElement.id : "";
-    if (!table?.rows.length) return this.table.replaceChildren();
-    const roles = this.columns(table);
-    const above = roles.map((role, k) => element("th", { scope: "col" }, this.roleOf(role, k)));
-    const names = table.header.map((name) => element("th", { scope: "col" }, name));
-    const unused = (k) => (roles[k] === "-" ? "unused" : "");
-    const rows = table.rows.map((row, i) => element("tr", {}, element("td", { class: "line" }, String(table.line[i])), ...row.map((cell, k) => element("td", { class: unused(k) }, cell))));
-    const head = [above, names].filter((cells) => cells.length).map((cells, i) => element("tr", {}, element("th", { class: "line" }, i || !above.length ? "line" : "meaning"), ...cells));
-    this.table.replaceChildren(element("table", {}, element("thead", {}, ...head), element("tbody", {}, ...rows)));
-    if (focused) document.getElementById(focused)?.focus();
-  }
-
-  // The chosen or guessed role of each column.
-  columns(table) {
-    return this.wizard.choices.columns?.length === table.roles.length ? this.wizard.choices.columns : table.roles;
-  }
-
   roleOf(role, k) {
     const known = ROLES.some(([value]) => value === role) ? ROLES : [[role, role], ...ROLES];
-    const select = element("select", { id: `role-${k}`, "aria-label": `Meaning of column ${k + 1}` }, ...known.map(([value, text]) => element("option", { value, selected: value === role }, text)));
-    select.addEventListener("change", () => this.change(k, select.value));
-    return select;
+    return this.roleList(k, known, role);
   }
 
   // A role of another column is exchanged, since each is unique.

@@ -1,17 +1,24 @@
-// The recording of the gauges, and the export of the instrument: chosen from a list, or uploaded from this computer.
+// The recording of the gauges or the machine's own log, and the export of the instrument: chosen from a list, or
+// uploaded from this computer.
 import { element } from "../format.js";
 
 export class Sources {
-  constructor(recording, exported, file, note) {
-    Object.assign(this, { recording, exported, file, note, listed: null });
+  constructor(recording, log, exported, [file, logFile], note) {
+    Object.assign(this, { recording, log, exported, file, logFile, note, listed: null });
   }
 
   begin(wizard) {
-    this.recording.addEventListener("change", () => wizard.change({ recording: this.recording.value }));
+    this.recording.addEventListener("change", () => wizard.change({ recording: this.recording.value, ...(this.recording.value && { log: null }) }));
+    this.log.addEventListener("change", () => wizard.chooseLog(this.log.value));
     this.exported.addEventListener("change", () => wizard.choose(this.exported.value));
-    this.file.addEventListener("change", () => {
-      const [file] = this.file.files;
-      if (file) wizard.attempt(() => wizard.bring(file)).finally(() => (this.file.value = ""));
+    this.bring(wizard, this.file, (name) => wizard.choose(name));
+    this.bring(wizard, this.logFile, (name) => wizard.chooseLog(name));
+  }
+
+  bring(wizard, input, choose) {
+    input.addEventListener("change", () => {
+      const [file] = input.files;
+      if (file) wizard.attempt(async () => choose(await wizard.bring(file))).finally(() => (input.value = ""));
     });
   }
 
@@ -20,11 +27,13 @@ export class Sources {
       this.listed = sources;
       const options = (names, none) => [element("option", { value: "" }, names.length ? "choose …" : none), ...names.map((name) => element("option", { value: name }, name))];
       this.recording.replaceChildren(...options(sources.gauges, "there is none without a reference"));
+      this.log.replaceChildren(...options(sources.exports, "there is none yet"));
       this.exported.replaceChildren(...options(sources.exports, "there is none yet"));
-      this.file.disabled = !sources.may_write;
-      this.note.textContent = `Recordings without a reference in ${sources.directory}, exports in ${sources.directory}/exports. ${sources.may_write ? "Uploads are copied there." : "This browser is read-only: no uploads, no writing."}`;
+      for (const input of [this.file, this.logFile]) input.disabled = !sources.may_write;
+      this.note.textContent = `Recordings without a reference in ${sources.directory}, exports and logs in ${sources.directory}/exports. ${sources.may_write ? "Uploads are copied there." : "This browser is read-only: no uploads, no writing."}`;
     }
     this.recording.value = choices.recording ?? "";
+    this.log.value = choices.log ?? "";
     this.exported.value = choices.export ?? "";
   }
 }

@@ -6,10 +6,12 @@ import { Session } from "../session.js";
 // Reason of an abandoned request: the choices have changed.
 const REPLACED = new Error("replaced");
 
+const NO_LOG_CHOICES = { log_columns: null, log_shape: null, log_decimal: null, log_dates: null, log_angles: null, log_clock_set_back: null, log_sheet: null };
+
 export class Wizard extends Session {
   constructor(status) {
     super(status);
-    Object.assign(this, { panels: [], choices: {}, sources: null, table: null, command: "", trial: null, asked: 0, running: new Set() });
+    Object.assign(this, { panels: [], choices: {}, sources: null, log: null, table: null, command: "", trial: null, asked: 0, running: new Set() });
     this.cancelButton = element("button", { type: "button", id: "cancel", hidden: true, onclick: () => this.giveUp(new Error("It was cancelled.")) }, "Cancel");
     status.after(this.cancelButton);
   }
@@ -55,6 +57,14 @@ export class Wizard extends Session {
     const asked = ++this.asked;
     this.giveUp(REPLACED);
     this.show();
+    if (!this.choices.log) this.log = null;
+    else if (!this.log || Object.keys(choices).some((key) => key.startsWith("log"))) {
+      const log = await this.attempt(() => this.askPatiently("log"));
+      if (asked !== this.asked) return;
+      this.log = log ?? null;
+      this.show();
+      if (!log) return;
+    }
     if (!this.choices.export) return;
     const answer = await this.attempt(() => this.askPatiently("table"));
     if (asked !== this.asked) return; // the choices have changed meanwhile
@@ -78,7 +88,7 @@ export class Wizard extends Session {
     const answer = await response.json().catch(() => ({}));
     if (!response.ok) throw new Error(answer.reason ?? `${file.name} could not be uploaded`);
     await this.list();
-    await this.choose(answer.name);
+    return answer.name;
   }
 
   // Stored exports against their limits.
@@ -95,6 +105,7 @@ export class Wizard extends Session {
     if (!response.ok) throw new Error(answer.reason ?? `${name} could not be deleted`);
     Object.assign(this, { table: null, trial: null, command: "" });
     Object.assign(this.choices, { export: null, columns: null, group: null, sheet: null });
+    if (this.choices.log === name) Object.assign(this.choices, { log: null, ...NO_LOG_CHOICES });
     await this.list();
   }
 
@@ -102,6 +113,12 @@ export class Wizard extends Session {
   choose(name) {
     this.table = null;
     return this.change({ export: name, columns: null, group: null, sheet: null });
+  }
+
+  // Another log, in place of a recording of the gauges.
+  chooseLog(name) {
+    this.log = null;
+    return this.change({ log: name || null, ...(name && { recording: null }), ...NO_LOG_CHOICES });
   }
 
   show() {
