@@ -3,6 +3,8 @@ from .calibration import Calibration as Calibration
 from .calibration import GrossPose as GrossPose
 from .calibration import HeldCombination as HeldCombination
 from .calibration import PoseErrors as PoseErrors
+from .calibration import PredictionMap as PredictionMap
+from .calibration import PredictionSlice as PredictionSlice
 from .calibration import TriedBlock as TriedBlock
 from .calibration_job import calibrate as calibrate
 from .calibration_plan import CalibrationPlan as CalibrationPlan
@@ -21,3 +23,5 @@ from .pose_candidates import Box as Box
 from .pose_candidates import PoseCandidates as PoseCandidates
 from .pose_candidates import reachable as reachable
 from .pose_candidates import reachable_box as reachable_box
+from .pose_candidates import rows_at as rows_at
+from .prediction_map import prediction_map as prediction_map

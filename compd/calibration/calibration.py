@@ -113,6 +113,62 @@ class GrossPose(NamedTuple):
     error_mm: float
 
 
+class PredictionSlice(NamedTuple):
+    """The prediction's standard error on a grid of two coordinates, the others held.
+
+    across, up : names of the coordinates: "x", "y", "z", or "a", "b", "c" of turns about these.
+    held : the others that a target fixes, in words.
+    across_at : (A,) and up_at : (B,), mm of a place in {M}, rad of a turn since machine zero.
+    std_um, std_urad : (B, A), as those of `PredictionMap`; nan where the machine does not reach.
+    """
+
+    across: str
+    up: str
+    held: str
+    across_at: FloatArray
+    up_at: FloatArray
+    std_um: FloatArray
+    std_urad: FloatArray
+
+
+class PredictionMap(NamedTuple):
+    """How uncertain the calibrated machine's prediction is over the workspace, from the covariance of all numbers.
+
+    What is held at the drawing counts with its tolerance. The rigid motion of the whole machine that fits the tips of
+    the M measured poses best is left out, as an instrument's frame takes it, and of attitudes the turn that fits all.
+    Noise of a single measurement is not in it.
+
+    place_mm, turn_rad : (R, 3) poses spread evenly over what the machine reaches: tip in {M}, turn since machine zero.
+    std_um, std_urad : (R,) standard errors of the tip and of the attitude, in space: the root of the sum over x, y, z.
+    measured_mm, measured_rad : (M, 3) the poses that were measured.  measured_std_um, measured_std_urad : (M,) there.
+    slices : through the middle of the workspace.
+    """
+
+    place_mm: FloatArray
+    turn_rad: FloatArray
+    std_um: FloatArray
+    std_urad: FloatArray
+    measured_mm: FloatArray
+    measured_rad: FloatArray
+    measured_std_um: FloatArray
+    measured_std_urad: FloatArray
+    slices: tuple[PredictionSlice, ...]
+
+    @property
+    def words(self) -> str:
+        """Median, largest and where, in a sentence."""
+        worst = int(self.std_um.argmax())
+        x, y, z = self.place_mm[worst]
+        largest = f"{self.std_um[worst]:.3g} um at x {x:.0f}, y {y:.0f}, z {z:.0f} mm"
+        turn = np.degrees(np.linalg.norm(self.turn_rad[worst]))
+        turned = f", turned by {turn:.0f} deg" if turn > 0 else ""
+        return (
+            f"Standard error of the predicted tip over the workspace, in space: median "
+            f"{np.median(self.std_um):.3g} um, "
+            f"largest {largest}{turned}; at the measured poses {np.median(self.measured_std_um):.3g} um (median)."
+        )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """The machine as built, from its drawing and measured poses; P numbers of all blocks that were tried.
@@ -158,6 +214,8 @@ class Calibration:
         instrument.
     prior_scale : dict
         Block, and by which factor the tolerance was scaled to fit what the poses tell of it.
+    prediction : PredictionMap or None
+        How uncertain the prediction is over the workspace; None for a tool that stands on the plate.
     """
 
     machine: str
@@ -179,6 +237,7 @@ class Calibration:
     sigma_mm: FloatArray
     in_links: bool
     prior_scale: dict[str, float]
+    prediction: PredictionMap | None
 
     @property
     def verdict(self) -> str:
@@ -209,7 +268,7 @@ class Calibration:
                     "covariance": self.covariance.tolist(),
                     "blocks": [block._asdict() for block in self.blocks],
                     **{
-                        part: [_errors_json(errors) for errors in getattr(self, part)]
+                        part: [_plain(errors) for errors in getattr(self, part)]
                         for part in ("learned", "held_out", "sealed")
                     },
                     "held": [
@@ -225,6 +284,7 @@ class Calibration:
                     "left_over": self.left_over,
                     "diagnose_next": self.diagnose_next,
                     "prior_scale": self.prior_scale,
+                    "prediction": None if self.prediction is None else _prediction_json(self.prediction),
                 }
             )
         )
@@ -238,7 +298,18 @@ def summary_rows(errors: Sequence[PoseErrors]) -> list[tuple[str, float, float]]
     return [(one.what, one.before_rms_um, one.after_rms_um) for one in errors]
 
 
-def _errors_json(errors: PoseErrors) -> dict[str, Any]:
+def _prediction_json(prediction: PredictionMap) -> dict[str, Any]:
     return {
-        name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in errors._asdict().items()
+        "words": prediction.words,
+        "median_um": float(np.median(prediction.std_um)),
+        "largest_um": float(prediction.std_um.max()),
+        "largest_at_mm": prediction.place_mm[prediction.std_um.argmax()].tolist(),
+        **_plain(prediction),
+        "slices": [_plain(one) for one in prediction.slices],
+    }
+
+
+def _plain(values: PoseErrors | PredictionMap | PredictionSlice) -> dict[str, Any]:
+    return {
+        name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values._asdict().items()
     }

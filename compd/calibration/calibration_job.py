@@ -9,12 +9,13 @@ import numpy as np
 
 from compd.arrays import FloatArray, rms
 from compd.calibration.calibration import CalibratedNumber, Calibration, GrossPose, TriedBlock
-from compd.calibration.held_out import PARTS, Fold, folds
+from compd.calibration.held_out import FEWEST_ROWS, PARTS, Fold, folds
 from compd.calibration.identifiability import held_combinations, length_scale_is_told
 from compd.calibration.machine_fit import MachineFit, fit_machine, in_likelier_coordinates, registered_mm
 from compd.calibration.parameters import WORDS, Parameters, calibration_parameters
 from compd.calibration.pose_errors import errors_alone, errors_of_folds
 from compd.calibration.poses import MeasuredPoses, links_of_pose
+from compd.calibration.prediction_map import prediction_map
 from compd.calibration.selection import Selection, select_blocks
 from compd.calibration.untested import Untested, untested_blocks
 from compd.comparison import AlignedRecording, compare
@@ -79,6 +80,8 @@ def calibrate(
         for what, chosen in (("random poses", _once(parts)), ("regions", [one for one in parts if one.regions]))
         if chosen
     )
+    said("uncertainty over the workspace")
+    prediction = prediction_map(model, fit, whole)
     prior = whole.result.scale[parameters.block_of]
     noise_um, noise_urad = _noise_um(fit)
     registered = any(one.registration is not None for one in recordings)
@@ -114,6 +117,7 @@ def calibrate(
         sigma_mm=fit.sigma_mm[0],
         in_links=poses[0].to_links is not None,
         prior_scale={block.effect.id: float(whole.result.scale[b]) for b, block in enumerate(parameters.blocks)},
+        prediction=prediction,
     )
 
 
@@ -155,13 +159,13 @@ def _check_rows(poses: Sequence[MeasuredPoses]) -> None:
         if own < count + 6
     ]
     rows = sum(int(one.use.sum()) for one in poses)
-    if not problems and rows < 2 * PARTS:
+    if not problems and rows < FEWEST_ROWS:
         problems.append(
             Problem(
                 where=", ".join(str(one.aligned.recording.path) for one in poses),
                 what="has too few poses",
                 value=f"{rows} rows with a pose and every value",
-                allowed=f"{2 * PARTS} or more: of {PARTS} parts each is predicted from the others",
+                allowed=f"{FEWEST_ROWS} or more: of {PARTS} parts each is predicted from the others",
                 next_step="measure more poses: `compd plan --calibrate` chooses them",
             )
         )

@@ -10,7 +10,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.calibration.jacobian import pose_columns, without
+from compd.calibration.held_out import FEWEST_ROWS
+from compd.calibration.jacobian import pose_columns, rigid_columns, without
 from compd.calibration.parameters import Parameters, calibration_parameters
 from compd.calibration.pose_candidates import (
     Box,
@@ -21,6 +22,7 @@ from compd.calibration.pose_candidates import (
     reachable_box,
 )
 from compd.calibration.pose_design import Information, Observability, exchange, observability, told_directions
+from compd.errors import CompdError, Problem
 from compd.model import MachineModel
 from compd.model.effects import Observations
 from compd.parameter_ranges import StatedRange
@@ -128,7 +130,7 @@ class PoseStudy:
         zero_M_mm = model.zero.contact.tip_M_mm
         moved = pose_columns(model, judged, self._parameters)[:, :3]
         self._judged = without(
-            moved.reshape(-1, moved.shape[2]), _rigid(judged.tip_M_mm, zero_M_mm).reshape(-1, 6)
+            moved.reshape(-1, moved.shape[2]), rigid_columns(judged.tip_M_mm, zero_M_mm).reshape(-1, 6)
         ).reshape(moved.shape)
         self._before = None if before is None else self.information(before)
         everything = self.information(self.candidates.rows)
@@ -144,7 +146,7 @@ class PoseStudy:
         """What poses tell, over the noise."""
         columns = pose_columns(self.model, rows, self._parameters)
         tip = (
-            np.concatenate([columns[:, :3], _rigid(rows.tip_M_mm, self.model.zero.contact.tip_M_mm)], axis=2)
+            np.concatenate([columns[:, :3], rigid_columns(rows.tip_M_mm, self.model.zero.contact.tip_M_mm)], axis=2)
             * UM_PER_MM
             / self._noise.um
         )
@@ -162,7 +164,21 @@ class PoseStudy:
         return self.candidates.select(_short_way(self.candidates, chosen, self.model.zero.contact.tip_M_mm))
 
     def plan(self, count: int) -> CalibrationPlan:
-        """The same as a plan."""
+        """The same as a plan.
+
+        Raises CompdError where a calibration needs more poses than these and those measured before.
+        """
+        before = 0 if self._before is None else len(self._before.machine)
+        if count + before < FEWEST_ROWS:
+            raise CompdError(
+                Problem(
+                    where="plan",
+                    what="has fewer poses than a calibration needs",
+                    value=f"{count} poses" + (f" and {before} measured" if before else ""),
+                    allowed=f"{FEWEST_ROWS} or more in all",
+                    next_step="plan more poses, or give the recording of poses that are measured already",
+                )
+            )
         poses = self.planned(count)
         return CalibrationPlan(
             rows=tuple(
@@ -197,13 +213,6 @@ def _projected(parts: Sequence[Information]) -> FloatArray:
     """(n m, P) of poses that share one registration, which is projected out."""
     A = np.concatenate([part.machine.reshape(-1, part.machine.shape[2]) for part in parts])
     return without(A, np.concatenate([part.registration.reshape(-1, part.registration.shape[2]) for part in parts]))
-
-
-def _rigid(tip_M_mm: FloatArray, about_M_mm: FloatArray) -> FloatArray:
-    """(N, 3, 6) the tip by a displacement, mm, and by a rotation about axes of {M} through a place (3,), rad."""
-    lever = tip_M_mm - about_M_mm
-    turned = np.stack([np.cross(axis, lever) for axis in np.eye(3)], axis=2)
-    return np.concatenate([np.broadcast_to(np.eye(3), (len(lever), 3, 3)), turned], axis=2)
 
 
 def _short_way(candidates: PoseCandidates, chosen: IntArray, start_M_mm: FloatArray) -> IntArray:

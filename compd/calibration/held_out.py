@@ -19,6 +19,8 @@ from compd.calibration.prior_fit import Whitened, fit_with_prior, normal_equatio
 # Parts into which rows are dealt at random, and how often.
 PARTS, _DEALS = 5, 2
 _SEED = 40
+# Rows that a calibration needs: each part is predicted from the others, and has two.
+FEWEST_ROWS = 2 * PARTS
 # A direction in which poses lie within this share of the widest one has no regions.
 THIN_SHARE = 0.05
 # Rows beyond the registration's numbers that a recording needs among those learned from.

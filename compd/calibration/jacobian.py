@@ -98,6 +98,13 @@ def pose_columns(model: MachineModel, rows: Observations, parameters: Parameters
     return np.concatenate(columns, axis=2) * parameters.prior_std
 
 
+def rigid_columns(tip_M_mm: FloatArray, about_M_mm: FloatArray) -> FloatArray:
+    """(N, 3, 6) the tip by a displacement, mm, and by a rotation about axes of {M} through a place (3,), rad."""
+    lever = tip_M_mm - about_M_mm
+    turned = np.stack([np.cross(axis, lever) for axis in np.eye(3)], axis=2)
+    return np.concatenate([np.broadcast_to(np.eye(3), (len(lever), 3, 3)), turned], axis=2)
+
+
 def scaled_jacobian(
     columns: Sequence[FloatArray], registrations: Sequence[FloatArray], sigmas: Sequence[FloatArray]
 ) -> FloatArray:

@@ -46,10 +46,11 @@ class Box(NamedTuple):
 
 class PoseCandidates(NamedTuple):
     """N poses that can be reached. rows : with perfect gauges.  turn_rad : (N, 3) rotation vectors in {M} since machine
-    zero, 0 where a target fixes none."""
+    zero, 0 where a target fixes none.  asked : (N,) their places among the poses that were asked for."""
 
     rows: Observations
     turn_rad: FloatArray
+    asked: IntArray
 
     @property
     def tip_M_mm(self) -> FloatArray:
@@ -58,7 +59,7 @@ class PoseCandidates(NamedTuple):
 
     def select(self, index: IntArray) -> PoseCandidates:
         """Some of them."""
-        return PoseCandidates(self.rows.select(index), self.turn_rad[index])
+        return PoseCandidates(self.rows.select(index), self.turn_rad[index], self.asked[index])
 
 
 def reachable_box(model: MachineModel, stroke_mm: tuple[float, float] | None = None) -> Box:
@@ -146,7 +147,7 @@ def reachable(model: MachineModel, poses: FloatArray, stroke_mm: tuple[float, fl
     if stroke_mm is not None:
         extended = pose.link_length_mm[:, model.extended]
         good &= ((extended >= stroke_mm[0]) & (extended <= stroke_mm[1])).all(axis=1)
-    rows = _observed(model, actuator_mm[good] - zero.actuator_mm)
+    rows = rows_at(model, actuator_mm[good] - zero.actuator_mm)
     # a recording's poses are solved from machine zero: one that leads to another assembly from there is of no use
     off_mm = np.abs(rows.origin_M_mm - pose.origin_M_mm[good]).max(axis=1)
     solved = np.flatnonzero(off_mm < _SAME_MM)
@@ -154,7 +155,7 @@ def reachable(model: MachineModel, poses: FloatArray, stroke_mm: tuple[float, fl
         raise CompdError(
             Problem(where="plan", what="no pose within these limits can be reached", next_step="widen --workspace")
         )
-    return PoseCandidates(rows, turns[good]).select(solved)
+    return PoseCandidates(rows, turns[good], np.flatnonzero(good)).select(solved)
 
 
 def _stroke_mm(model: MachineModel) -> float:
@@ -179,7 +180,8 @@ def _at_zero(model: MachineModel) -> FloatArray:
     return np.concatenate([model.zero.contact.tip_M_mm, np.zeros(3)])
 
 
-def _observed(model: MachineModel, scale_mm: FloatArray) -> Observations:
+def rows_at(model: MachineModel, scale_mm: FloatArray) -> Observations:
+    """Rows with the scales (N, m) at these readings, all other gauges at zero."""
     count = len(scale_mm)
     joint_mm = np.zeros((count, model.joint_weights.shape[1]))
     assert model.constants is not None

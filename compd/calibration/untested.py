@@ -16,8 +16,9 @@ from compd.arrays import FloatArray, rms
 from compd.calibration.held_out import THIN_SHARE, principal_directions
 from compd.calibration.jacobian import pose_columns
 from compd.calibration.machine_fit import MachineFit
-from compd.model import MachineModel, observe
-from compd.model.kinematics import Mechanism, Movement, inverse_by_actuators
+from compd.calibration.pose_candidates import rows_at
+from compd.model import MachineModel
+from compd.model.kinematics import Mechanism, inverse_by_actuators
 from compd.rotation import compose, rotation_matrix, rotation_vector
 
 # How many times as much as at the poses a block may change the prediction elsewhere.
@@ -103,20 +104,7 @@ def _columns(model: MachineModel, fit: MachineFit, tips_M_mm: FloatArray, turns_
     tips_P_mm = np.broadcast_to(zero.contact.tip_P_mm, tips_M_mm.shape)
     guess_mm = np.broadcast_to(zero.actuator_mm, (len(tips_M_mm), model.scales)).copy()
     found = inverse_by_actuators(mechanism, model.actuators, tips_M_mm, tips_P_mm, wanted, guess_mm)
-    scale_mm = found.actuator_mm - zero.actuator_mm
-    count, joints = len(tips_M_mm), model.joint_weights.shape[1]
-    assert model.constants is not None
-    rows = observe(
-        model,
-        model.constants,
-        scale_mm=scale_mm,
-        joint_mm=np.zeros((count, joints)),
-        frame_mm=np.zeros((count, 0)),
-        quantities={},
-        time_s=np.arange(count, dtype=np.float64),
-        session_start=np.ones(count, dtype=bool),
-        movement=Movement(np.zeros_like(scale_mm), np.full_like(scale_mm, np.nan), np.full((count, joints), np.nan)),
-    )
+    rows = rows_at(model, found.actuator_mm - zero.actuator_mm)
     return pose_columns(model, rows, fit.parameters)[:, :3]
 
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from plotly.graph_objects import Bar, Figure, Scatter3d
+from plotly.graph_objects import Bar, Figure, Heatmap, Scatter, Scatter3d
 from plotly.subplots import make_subplots
 
 from compd.arrays import BoolArray, FloatArray, rms
-from compd.calibration import Calibration, PoseErrors
+from compd.calibration import Calibration, PoseErrors, PredictionMap
 from compd.display_unit import format_error
 from compd.report.figures import ARROW_SHARE, ARROWS
 from compd.report.page import COLOURS, Panel, style_figure, write_page
@@ -23,7 +23,8 @@ from compd.units import UM_PER_MM
 STATES = (("as drawn", COLOURS["worst"]), ("calibrated", COLOURS["best"]))
 LOOK = (
     "A number counts as needed where held-out poses are predicted better with its block; as held where these poses "
-    "tell it no better than the tolerance does. The standard error is that after the poses, the tolerance as prior."
+    "tell it less than twice as well as the tolerance does. The standard error is that after the poses, the "
+    "tolerance as prior."
 )
 
 
@@ -39,6 +40,7 @@ def write_calibration_page(path: Path, calibration: Calibration, built: str = ""
         ),
         *_arrows(judged),
         *_links(judged),
+        _prediction(calibration.prediction),
         Panel("Each number", LOOK, _numbers(calibration)),
         Panel(
             "Which numbers were needed",
@@ -148,6 +150,75 @@ def _links(parts: Sequence[PoseErrors]) -> Iterator[Panel]:
         figure.update_xaxes(title_text="link", type="category", row=1, col=column)
     style_figure(figure, "link", "error of length, um rms", 340).update_layout(margin={"t": 70}, legend={"y": 1.12})
     yield Panel("Errors of the links", "The errors of lengths that explain those of the poses, on one scale.", figure)
+
+
+def _prediction(prediction: PredictionMap | None) -> Panel:
+    """The standard error of the prediction: slices through the workspace, one scale of colours for each unit."""
+    name = "How uncertain the prediction is"
+    if prediction is None or not prediction.slices:
+        return Panel(name, "Not computed: the machine has no places of its own to plan.", NOT_RECORDED)
+    slices = prediction.slices
+    # an attitude that no target fixes follows from the place, and needs no map of its own
+    kinds = ["um", "urad"] if prediction.turn_rad.any() else ["um"]
+    figure = make_subplots(
+        len(kinds),
+        len(slices),
+        subplot_titles=[
+            f"{'tip' if kind == 'um' else 'attitude'}, {kind}" + (f"<br>at {one.held}" if one.held else "")
+            for kind in kinds
+            for one in slices
+        ],
+        horizontal_spacing=0.09,
+        vertical_spacing=0.22,
+    )
+    style_figure(figure, "", "", 60 + 370 * len(kinds)).update_annotations(font_size=13)
+    poses = np.concatenate([prediction.measured_mm, np.degrees(prediction.measured_rad)], axis=1)
+    poses = poses[thin(np.arange(len(poses)), ARROWS)]
+    for row, kind in enumerate(kinds, start=1):
+        for col, one in enumerate(slices, start=1):
+            sides = [_side(name, at) for name, at in ((one.across, one.across_at), (one.up, one.up_at))]
+            (across, across_title), (up, up_title) = sides
+            cells = Heatmap(
+                x=across,
+                y=up,
+                z=one.std_um if kind == "um" else one.std_urad,
+                coloraxis="coloraxis" if row == 1 else "coloraxis2",
+                hovertemplate=f"%{{z:.3g}} {kind} at %{{x:.4g}}, %{{y:.4g}}<extra></extra>",
+            )
+            dots = Scatter(
+                x=poses[:, "xyzabc".index(one.across)],
+                y=poses[:, "xyzabc".index(one.up)],
+                mode="markers",
+                name="measured poses, seen along the slice's normal",
+                showlegend=row == col == 1,
+                marker={"size": 5, "color": "white", "line": {"width": 1, "color": "black"}},
+                hoverinfo="skip",
+            )
+            figure.add_trace(cells, row=row, col=col)
+            figure.add_trace(dots, row=row, col=col)
+            figure.update_xaxes(title_text=across_title, title_standoff=4, row=row, col=col)
+            figure.update_yaxes(title_text=up_title, title_standoff=2, row=row, col=col)
+    scales = {
+        "coloraxis" if k == 0 else "coloraxis2": {
+            "colorscale": "Viridis",
+            "cmin": 0.0,
+            "colorbar": {"title": kind, "thickness": 14, "len": 0.9 / len(kinds), "y": 1 - (k + 0.5) / len(kinds)},
+        }
+        for k, kind in enumerate(kinds)
+    }
+    figure.update_layout(margin={"r": 80, "t": 100}, legend={"y": 1 + 80 / (370 * len(kinds))}, **scales)
+    text = (
+        f"{prediction.words} It follows from the covariance of all numbers; what is held counts with its tolerance. "
+        "Left out are the noise of a measurement and a motion of the whole machine. White: not reached."
+    )
+    return Panel(name, text, figure)
+
+
+def _side(name: str, at: FloatArray) -> tuple[FloatArray, str]:
+    """Values and title of an axis: mm of a place, degrees of a turn."""
+    if name in "xyz":
+        return at, f"{name}, mm"
+    return np.degrees(at), f"turn about {'xyz'['abc'.index(name)]}, deg"
 
 
 def _numbers(calibration: Calibration) -> PageTable:

@@ -136,6 +136,8 @@ def _print(console: Console, calibration: Calibration) -> None:
         remedies.setdefault(combination.remedy, []).append(combination.words)
     for remedy, words in remedies.items():
         console.print(f"  {'; '.join(words)}. To tell it: {remedy}.")
+    if calibration.prediction is not None:
+        console.print(calibration.prediction.words)
     for pose in calibration.gross:
         console.print(f"left out: {pose.recording} row {pose.row}, {pose.error_mm:.3g} mm off")
     if calibration.diagnose_next:

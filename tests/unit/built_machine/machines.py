@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from compd.model import MachineModel, effect_deltas, observe, predict, sum_deltas
-from compd.model.effects import FittedEffect, Observations
-from compd.model.kinematics import Movement
+from compd.calibration import rows_at
+from compd.model import MachineModel, effect_deltas, predict, sum_deltas
+from compd.model.effects import FittedEffect
 from compd.model.library import load_library
 
 # Largest of each unit: what a machine of printed parts may be off by.
@@ -35,24 +35,6 @@ def with_effects(model: MachineModel, seed: int) -> MachineModel:
     """The machine with joints, lengths and gains other than drawn."""
     ids = ("link_zero", "base_joint_position", "platform_joint_position", "scale_gain")
     return replace(model, effects=random_effects(model, ids, seed))
-
-
-def rows_at(model: MachineModel, scale_mm: NDArray[np.float64]) -> Observations:
-    """Rows with the scales (N, m) at these readings, all other gauges at zero."""
-    count = len(scale_mm)
-    joint_mm = np.zeros((count, model.joint_weights.shape[1]))
-    assert model.constants is not None
-    return observe(
-        model,
-        model.constants,
-        scale_mm=scale_mm,
-        joint_mm=joint_mm,
-        frame_mm=np.zeros((count, 9)),
-        quantities={},
-        time_s=np.arange(float(count)),
-        session_start=np.zeros(count, dtype=bool),
-        movement=Movement.unknown(scale_mm, joint_mm),
-    )
 
 
 def tips(model: MachineModel, scale_mm: NDArray[np.float64]) -> NDArray[np.float64]:

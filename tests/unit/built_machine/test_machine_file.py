@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from compd.built_machine import BuiltFiles, Provenance, built_geometry, write_built_machine
+from compd.calibration import rows_at
 from compd.configuration import Configuration, load, shipped_configuration
 from compd.documents import read_document
 from compd.errors import ConfigurationError
@@ -18,7 +19,7 @@ from compd.machine_kinds import KINDS, machine_text
 from compd.model import MachineModel, effect_deltas, predict, sum_deltas
 from compd.model.effects import FittedEffect
 from compd.model_file import read_model_file
-from tests.unit.built_machine.machines import random_effects, rows_at
+from tests.unit.built_machine.machines import random_effects
 
 Floats = NDArray[np.float64]
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+import compd
 from compd.calibration import Noise, PoseStudy, reachable
 from compd.calibration.pose_design import Information, exchange, observability
 from compd.cli.app import app
@@ -56,13 +57,18 @@ def test_the_simulated_machine_reaches_the_planned_poses(tmp_path: Path, kind: s
     path = written(tmp_path, kind)
     model, out = model_of(path), tmp_path / "plan.csv"
     study = PoseStudy(model, "position", Noise(5.0))
-    study.plan(6).write(out)
+    study.plan(10).write(out)
     mechanism = Mechanism(load(path).geometry)
     rows = read_plan(out, mechanism)
-    planned = study.planned(6)
+    planned = study.planned(10)
     for k, row in enumerate(rows):
         # the file has three decimals of a millimetre and six of a turn
         assert row.scale_mm == pytest.approx(planned.rows.scale_mm[k], abs=0.02)
+
+
+def test_fewer_poses_than_a_calibration_needs_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(CompdError, match=r"(?s)fewer poses than a calibration needs.*2 poses.*10 or more"):
+        compd.plan_calibration(written(tmp_path, "linear-delta"), 2, noise_um=5.0)
 
 
 def test_exchange_comes_near_the_best_of_all_sets() -> None:
@@ -120,7 +126,7 @@ def test_poses_keep_away_from_singularities(tmp_path: Path) -> None:
 
 def test_on_the_command_line_in_every_format(tmp_path: Path) -> None:
     machine = written(tmp_path, "6-ups")
-    arguments = ["plan", "--calibrate", "5", "--machine", str(machine), "--noise", "5"]
+    arguments = ["plan", "--calibrate", "10", "--machine", str(machine), "--noise", "5"]
     texts = {}
     for shape, options in {"plan": (), "sa": (), "csv": (), "gcode": ("--feed", "900")}.items():
         out = tmp_path / f"next.{shape}"
@@ -137,5 +143,5 @@ def test_on_the_command_line_in_every_format(tmp_path: Path) -> None:
     # A about x, then B about y, then C about z, of fixed axes
     turn = Rotation.from_euler("xyz", [words[axis] for axis in "ABC"], degrees=True)
     assert turn.as_rotvec() == pytest.approx([float(row[name]) for name in TURN_COLUMNS], abs=2e-6)
-    assert CliRunner().invoke(app, ["plan", "--calibrate", "5", "--machine", str(machine)]).exit_code == 2
+    assert CliRunner().invoke(app, ["plan", "--calibrate", "10", "--machine", str(machine)]).exit_code == 2
     assert CliRunner().invoke(app, ["plan", "--rivals", "a,b"]).exit_code == 2

@@ -1,0 +1,54 @@
+"""How uncertain a prediction is over the workspace, and how far it errs on machines that the simulation has built."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import compd
+from compd.arrays import rms
+from compd.calibration import PredictionMap
+from compd.machine_kinds import KINDS
+from tests.support.built_machines import REACH_MM, REACH_RAD, built, drawing, record, targets
+
+POSES = 40
+
+
+def learned_in_the_middle(kind: str, directory: Path) -> tuple[compd.Calibration, PredictionMap]:
+    """From positions in the middle half of the workspace, with a sealed recording of all of it."""
+    rng = np.random.default_rng([2, list(KINDS).index(kind)])
+    world = built(drawing(kind, directory), rng)
+    middle = ((place / 2, turn / 2) for place, turn in targets(world, rng))
+    learned = record(directory / "middle.csv", world, rng, POSES, wanted=middle, pose=False)
+    everywhere = record(directory / "all.csv", world, rng, 100, noise=0.0, pose=False)
+    result = compd.calibrate(compd.open_recording(learned), compd.open_recording(everywhere))
+    assert result.prediction is not None
+    return result, result.prediction
+
+
+@pytest.mark.parametrize("kind", ["6-ups", "3-prs", "linear-delta"])
+def test_the_error_elsewhere_is_as_large_as_said_and_grows_outside(kind: str, tmp_path: Path) -> None:
+    result, prediction = learned_in_the_middle(kind, tmp_path)
+    off_mm = np.abs(prediction.place_mm - prediction.measured_mm.mean(axis=0))
+    near = (off_mm < REACH_MM).all(axis=1) & (np.abs(prediction.turn_rad) < REACH_RAD).all(axis=1)
+    assert near.sum() > 5
+    error_um = 1e3 * rms(np.linalg.norm(result.sealed[0].after_mm, axis=1))
+    # one machine has about ten independent errors
+    assert 0.25 < error_um / rms(prediction.std_um[near]) < 2.0
+    assert np.median(prediction.std_um) > 1.5 * np.median(prediction.measured_std_um)
+
+
+def test_slices_cover_the_workspace_with_the_measured_poses(tmp_path: Path) -> None:
+    _, prediction = learned_in_the_middle("linear-delta", tmp_path)
+    assert [(one.across, one.up) for one in prediction.slices] == [("x", "y"), ("x", "z"), ("y", "z")]
+    for one in prediction.slices:
+        assert one.std_um.shape == one.std_urad.shape == (len(one.up_at), len(one.across_at))
+        known = np.isfinite(one.std_um)
+        assert known.mean() > 0.3
+        assert (one.std_um[known] > 0).all()
+        places_mm = prediction.measured_mm[:, "xyz".index(one.across)]
+        assert one.across_at[0] <= places_mm.min()
+        assert places_mm.max() <= one.across_at[-1]
+    assert f"largest {prediction.std_um.max():.3g} um" in prediction.words
