@@ -54,7 +54,7 @@ demo: $(STAMP)
 workbench: $(STAMP)
 	@mkdir -p out/workbench
 	@$(BIN)/compd campaign config/tripod-cmm.yaml --hidden 8 --out out/workbench/hidden.csv --overwrite
-	@$(BIN)/compd page --recordings out/workbench --models out/workbench
+	@$(BIN)/compd page --recordings out/workbench --models out/workbench --workbench hidden
 
 live: $(STAMP)
 	@$(BIN)/compd demo --live

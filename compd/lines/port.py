@@ -7,6 +7,7 @@ the system reports when a plug is pulled; after that a new port must be opened.
 from __future__ import annotations
 
 import os
+import re
 import select
 import socket
 import termios
@@ -26,6 +27,13 @@ PORT_FAULTS = (OSError, termios.error)
 MAX_BYTES = 4096  # of one read: far more than any reply
 # Polling interval (s) of ports without a file descriptor (rfc2217://, loop://), for which `select` cannot wait.
 SLICE_S = 5e-3
+
+
+def _why(error: Exception, port: str) -> str:
+    """The reason of an error of pyserial, which nests the system's text with its number and the port's name."""
+    text = re.sub(r"\[Errno -?\d+\] ", "", str(error))
+    text = text.removeprefix(f"could not open port {port}: ").removesuffix(f": {port!r}")
+    return text or type(error).__name__
 
 
 class Port(Protocol):
@@ -89,7 +97,7 @@ class SerialPort:
             control.prepare(self._port)
             self._port.open()
         except Exception as error:  # of a URL, it is anything that its handler or the network raises
-            raise LineFault(Quality.LINE_LOST, f"cannot open {port}: {error or type(error).__name__}") from error
+            raise LineFault(Quality.LINE_LOST, f"cannot open {port}: {_why(error, port)}") from error
         # Behind a URL the device server sets the baud rate, and the time of a character is unknown here.
         bits = 1 + data_bits + (parity != "N") + stop_bits
         self.character_s = bits / baud if is_device else 0.0

@@ -66,6 +66,8 @@ class DaemonLink:
     def _why(self, error: Exception) -> str:
         if isinstance(error, OSError) and not self.connected:
             return f"no daemon answers at {self.path}: {error.strerror or type(error).__name__}"
+        if isinstance(error, TimeoutError):
+            return f"it has said nothing for {SILENT_AFTER_S:g} s"
         return str(error) or type(error).__name__
 
     async def _serve(self) -> None:

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, urlencode, urlsplit
 
 from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect, HTTPConnection, Request
@@ -195,7 +195,7 @@ class Guard:
             if (connection := LimitedProtocol.of(request.scope)) is not None:
                 connection.note("wrong_token")
             return token_form("This token is not known here.") if by_form else PlainTextResponse(_NEEDS_TOKEN, 403)
-        response = RedirectResponse("/" if by_form else _own_path(path), 303)
+        response = RedirectResponse("/" if by_form else _same_address(request), 303)
         secure = self._is_secure(request)
         response.set_cookie(self._cookie, token_text, httponly=True, samesite="strict", secure=secure)
         return response
@@ -233,9 +233,12 @@ def _is_loaded_elsewhere(headers: Headers, looks: bool) -> bool:
     return not (looks and shown)
 
 
-def _own_path(path: str) -> str:
-    """The path to redirect a browser to; "/" for one that a browser might take for another server's address."""
-    return path if _OWN_PATH.fullmatch(path) else "/"
+def _same_address(request: Request) -> str:
+    """The address without its token, to redirect a browser to; "/" where that may be taken for another server's."""
+    if not _OWN_PATH.fullmatch(request.url.path):
+        return "/"
+    query = urlencode([(key, value) for key, value in request.query_params.multi_items() if key != "token"])
+    return f"{request.url.path}?{query}" if query else request.url.path
 
 
 def _with_headers(send: Send) -> Send:

@@ -76,6 +76,7 @@ class Server:
         """The ASGI application."""
         routes = [
             Route("/", self._index),
+            Route("/wall", self._wall),
             Route("/address.svg", self._address),
             Route("/live", self._live),
             Route("/history", self._history),
@@ -108,6 +109,9 @@ class Server:
 
     async def _index(self, request: Request) -> Response:
         return FileResponse(STATIC / "index.html")
+
+    async def _wall(self, request: Request) -> Response:
+        return FileResponse(STATIC / "wall.html")
 
     async def _address(self, request: Request) -> Response:
         """The address of this server, without a token, as a QR code for another device."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 from typing import Annotated
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 import typer
 
@@ -38,6 +38,9 @@ def page(
         ),
     ] = None,
     read_only: Annotated[bool, typer.Option("--read-only", help="Refuse orders from browsers.")] = False,
+    workbench: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Print the address that opens this recording in the workbench.")
+    ] = None,
     recordings: Annotated[Path, typer.Option(help="The directory of recordings.")] = Path("recordings"),
     models: Annotated[
         Path | None, typer.Option(help="The directory of model files to choose from; default: that of CONFIG.")
@@ -75,7 +78,9 @@ def page(
     hide_secrets_of_libraries()
 
     def started(reached: str) -> None:
-        typer.echo(f"open {reached}/?token={own if shown else 'YOUR-TOKEN'}")
+        token = own if shown else "YOUR-TOKEN"
+        view = "?" if workbench is None else f"workbench?recording={quote(workbench)}&"
+        typer.echo(f"open {reached}/{view}token={token}")
         if not alone:
             _print_qr_code(f"{reached}/")
         elif not shown:

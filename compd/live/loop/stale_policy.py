@@ -97,7 +97,7 @@ def usable_comparators(
     if settings.on_stale == "stop":
         return UsableComparators(None, ended, str(lost), now_s)
     if elapsed_s >= settings.hold_s:
-        reason = f"{lost}; {settings.on_stale} ended after {settings.hold_s:g} s"
+        reason = f"{settings.on_stale} ended after {settings.hold_s:g} s; {lost}"
         return UsableComparators(None, ended, reason, now_s)
     if settings.on_stale == "hold":
         return _held(last_good, f"{lost}; the last good set is held", expires_s, now_s)

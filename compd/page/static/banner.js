@@ -1,6 +1,8 @@
 // State and reason in words, on top of everything; outdated ones are grey.
 import { SILENT_S } from "./age.js";
 import { ago, isKnown, tipText } from "./format.js";
+import { nameOf } from "./orders.js";
+import { remedyOf } from "./remedy.js";
 import { appearance, stateName } from "./states.js";
 
 const at = (id) => document.getElementById(id);
@@ -38,6 +40,7 @@ export function showBanner(page, behind_s) {
   write("state", summary.name);
   write("reason", summary.reason);
   if (at("reason").title !== summary.reason) at("reason").title = summary.reason;
+  showRemedy(remedyOf(page, summary));
   const setpoint = summary.tone === "gone" ? null : page.live.setpoint;
   write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
   write("tip", setpoint?.valid ? tipText(setpoint.tip_M_mm, setpoint.u_tip_um) : "");
@@ -47,6 +50,15 @@ export function showBanner(page, behind_s) {
   const armed = own.filter((browser) => browser.armed_s > 0);
   write("connected", own.length ? `${own.length} looking${armed.length ? `, ${armed.map((b) => b.name).join(", ")} armed` : ""}` : "");
   const left_s = Math.max(0, (page.armed_until ?? 0) - performance.now() / 1000);
-  write("role", left_s ? `armed ${ago(left_s).replace(" min", "")}` : page.role === "operate" ? "looking" : "view only");
+  write("role", left_s ? `Orders: armed ${ago(left_s).replace(" min", "")}` : page.role === "operate" ? "Orders" : "Orders: view only");
   at("role").classList.toggle("armed", left_s > 0);
+}
+
+function showRemedy({ text, order, subject }) {
+  write("remedy", text);
+  const button = at("remedy-order");
+  button.hidden = !order;
+  if (!order) return;
+  Object.assign(button.dataset, { order, subject });
+  write("remedy-order", `${nameOf(order, subject)} …`);
 }

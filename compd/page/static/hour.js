@@ -1,22 +1,35 @@
-// The last hour: its states as a tape, and the displacement of the tip; a click goes to a moment and freezes the page.
+// The last hour: its states as a tape, and the displacement of the tip; a click or drag goes to a moment and freezes the page.
 import { element, ink, prepared } from "./format.js";
 import { NOT_KEPT, clock as exactly } from "./past.js";
 import { appearance, COLOURS, NAMES } from "./states.js";
+import { TimeWindow, gestures } from "./time_window.js";
 
 const HOUR_S = 3600;
 const MINUTE_S = 60;
-const HOW_TO = "Click to go there; ← → scrub, space stops and goes on.";
-const clock = (time_s) => new Date(time_s * 1000).toTimeString().slice(0, 5);
+const HOW_TO = "Click or drag on the tape to go to a moment.";
+const clock = (time_s, span_s = HOUR_S) => new Date(time_s * 1000).toTimeString().slice(0, span_s < 600 ? 8 : 5);
 const DRAW_EVERY_MS = 1000;
 // Height of states on the tape, as px from its edges: worse ones are higher, so that colour is not the only sign.
 const INSET = { good: 8, care: 4, bad: 0, gone: 12 };
 
 export class Hour {
   constructor(tape, place, scrub, links) {
-    Object.assign(this, { tape, place, scrub, links, columns: [], times: [], rows: [], chart: null, at_s: null, drawn_ms: 0, offset_s: 0 });
+    Object.assign(this, { tape, place, scrub, links, columns: [], times: [], rows: [], chart: null, at_s: null, drawn_ms: 0, window: new TimeWindow() });
     scrub.textContent = HOW_TO;
     tape.addEventListener("pointermove", (event) => this.name(this.timeAt(event.offsetX)));
-    tape.addEventListener("click", (event) => this.go(this.timeAt(event.offsetX)));
+    const go = (share) => this.go(this.window.timeAt(share));
+    gestures(tape, { click: go, drag: go, zoom: (factor, share) => this.zoom(factor, share) });
+  }
+
+  // share: of the width, that keeps its moment; without it, the shown moment or the newest does
+  zoom(factor, share) {
+    this.window.zoom(factor, share === undefined ? this.at_s ?? this.end_s : this.window.timeAt(share));
+    this.draw(true);
+  }
+
+  whole() {
+    this.window.whole();
+    this.draw(true);
   }
 
   // Fetch the past, and continue from there.
@@ -69,7 +82,7 @@ export class Hour {
   }
 
   timeAt(x) {
-    return this.end_s - HOUR_S * (1 - x / this.tape.clientWidth);
+    return this.window.timeAt(x / this.tape.clientWidth);
   }
 
   // Time and state under the pointer.
@@ -82,10 +95,12 @@ export class Hour {
   draw(now = false) {
     if (!now && (performance.now() - this.drawn_ms < DRAW_EVERY_MS || document.hidden)) return;
     this.drawn_ms = performance.now();
+    this.window.end_s = this.end_s;
     const { context, width, height } = prepared(this.tape);
     context.fillStyle = "#8c959f33";
     context.fillRect(0, 0, width, height);
-    const pixel = width / HOUR_S;
+    const pixel = width / this.window.span_s;
+    const x = (time_s) => width * this.window.shareOf(time_s);
     this.rows.forEach((row, k) => {
       const state = Number.isNaN(row[0]) ? null : NAMES[row[0]];
       const tone = state === null ? "gone" : appearance(state)[0];
@@ -93,11 +108,11 @@ export class Hour {
       // bad states are at least two pixels wide
       const wide = Math.max(pixel * 1.05, tone === "good" ? 0.5 : 2);
       const inset = INSET[tone];
-      context.fillRect(width - (this.end_s - this.times[k] + 1) * pixel, inset, wide, height - 2 * inset);
+      context.fillRect(x(this.times[k]) - pixel, inset, wide, height - 2 * inset);
     });
     if (this.at_s !== null) {
       context.fillStyle = ink("--ink");
-      context.fillRect(width - (this.end_s - this.at_s) * pixel - 1, 0, 2, height);
+      context.fillRect(x(this.at_s) - 1, 0, 2, height);
     }
     this.drawChart();
   }
@@ -113,10 +128,18 @@ export class Hour {
         height: 130,
         legend: { show: false },
         cursor: { drag: { x: false, y: false } },
-        scales: { x: { range: () => [this.end_s - HOUR_S, this.end_s] } },
-        axes: [{ ...axis, size: 24, values: (_, times) => times.map((time) => clock(time)) }, { ...axis, size: 44 }],
+        scales: { x: { range: () => [this.window.left, this.window.right] } },
+        axes: [{ ...axis, size: 24, values: (_, times) => times.map((time) => clock(time, this.window.span_s)) }, { ...axis, size: 44 }],
         series: [{}, ...[["x", () => ink("--line"), []], ["y", "#e69f00", [6, 3]], ["z", "#cc79a7", [2, 2]]].map(([label, stroke, dash]) => ({ label, stroke, dash, width: 1.5, points: { show: false }, spanGaps: false }))],
       }, data, this.place);
+      gestures(this.chart.over, {
+        click: (share) => this.go(this.window.timeAt(share)),
+        drag: (_, by) => {
+          this.window.pan(-by * this.window.span_s);
+          this.draw(true);
+        },
+        zoom: (factor, share) => this.zoom(factor, share),
+      });
       this.place.append(element("p", { class: "note" }, "tip displacement, µm: x blue, y orange dashed, z purple dotted"));
       new ResizeObserver(() => this.chart.setSize({ width: this.place.clientWidth, height: 130 })).observe(this.place);
     } else this.chart.setData(data);
@@ -144,6 +167,7 @@ export class Hour {
     const newest_s = Math.max(this.end_s, event?.unix_s ?? 0);
     this.at_s = Math.min(Math.max(time_s, this.times[0]), newest_s);
     this.scrub.textContent = `${exactly(this.at_s)} is shown: the last minute is kept by tenths of a second, the hour by seconds. ${NOT_KEPT}`;
+    this.window.reveal(this.at_s);
     document.dispatchEvent(new CustomEvent("freeze", { detail: { at_s: this.at_s, event } }));
     this.draw(true);
   }
@@ -154,6 +178,7 @@ export class Hour {
 
   follow() {
     this.at_s = null;
+    this.window.right_s = null;
     this.scrub.textContent = HOW_TO;
     this.draw(true);
   }

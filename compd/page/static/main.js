@@ -79,7 +79,8 @@ export function freeze(frozen, at_s, event) {
   if (frozen && !page.frozen) at("loop-note").textContent = `As it was when the page was frozen, ${clock(Date.now() / 1000)}. ${NOT_KEPT}`;
   page.frozen = frozen;
   page.blank = false;
-  at("frozen").hidden = at("loop-note").hidden = !frozen;
+  at("frozen").hidden = at("loop-note").hidden = at("thaw").hidden = !frozen;
+  at("freeze").hidden = at("live-moment").hidden = frozen;
   document.body.toggleAttribute("data-frozen", frozen);
   past.leave();
   if (!frozen) hour.follow();
@@ -89,8 +90,8 @@ export function freeze(frozen, at_s, event) {
 
 // the banner stays in sight, whatever is drawn over the page
 new ResizeObserver(() => document.documentElement.style.setProperty("--top", `${at("top").offsetHeight}px`)).observe(at("top"));
-at("thaw").addEventListener("click", () => freeze(false));
 at("role").addEventListener("click", () => drawer.toggle());
+at("remedy-order").addEventListener("click", ({ currentTarget: { dataset } }) => drawer.ask(dataset.order, dataset.subject));
 document.addEventListener("freeze", (event) => freeze(true, event.detail.at_s, event.detail.event));
 bindKeys({ page, machine, hour, drawer, freeze });
 listen(page, age, { machine: begin, live: take, slow: takeSlow });

@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
 
 def test_who_may_look_only_can_order_nothing_and_the_end_of_the_daemon_is_seen(chromium):
     with served("--read-only") as page, opened(chromium, page) as tab:
-        until(tab, "document.getElementById('role').textContent === 'view only'")
+        until(tab, "document.getElementById('role').textContent === 'Orders: view only'")
         tab.keyboard.press("o")
         until(tab, "document.getElementById('arm').disabled")
         answer = tab.evaluate(

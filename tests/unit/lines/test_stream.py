@@ -259,6 +259,13 @@ def test_pulling_the_plug_loses_the_line_in_every_call(pty: tuple[int, str]) -> 
     line.close()
 
 
+def test_a_port_that_is_not_there_is_named_once(tmp_path) -> None:
+    name = str(tmp_path / "ttyUSB7")
+    with pytest.raises(LineFault) as caught:
+        SerialPort(name, 9600, "8N1", False, TIMEOUT_S)
+    assert str(caught.value).endswith(f"cannot open {name}: No such file or directory")
+
+
 def test_a_write_to_a_pulled_plug_loses_the_line(pty: tuple[int, str]) -> None:
     master, name = pty
     port = SerialPort(name, 9600, "8N1", False, TIMEOUT_S)

@@ -36,6 +36,13 @@ def test_the_token_in_the_address_becomes_a_cookie_and_leaves_the_address(client
     assert client.get("/").text == who
 
 
+def test_what_else_is_in_the_address_stays_there(client):
+    asked = {"recording": "a b&c", "token": "anna's"}
+    answer = client.get("/workbench", params=asked, follow_redirects=False)
+    assert answer.headers["location"] == "/workbench?recording=a+b%26c"
+    assert client.get("//evil.example/", params=asked, follow_redirects=False).headers["location"] == "/"
+
+
 @pytest.mark.parametrize("params", [{}, {"token": ""}, {"token": "another"}])
 def test_without_a_token_there_is_nothing_but_what_to_do(client, params):
     answer = client.get("/", params=params)

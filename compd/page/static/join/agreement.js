@@ -4,6 +4,8 @@ import { Axes } from "./axes.js";
 
 // Share of the width for the enlarged surroundings of the best offset.
 const NEAR = 0.35;
+// Agreement by which the curve is visibly above the next best.
+const HIGHER = 0.02;
 
 export class AgreementPicture {
   constructor(canvas) {
@@ -25,7 +27,16 @@ export class AgreementPicture {
     this.curve(near, offset_s, agreement);
     this.mark(near, peak, "--good", "");
     const next = next_best ? `; the next best, ${next_best[1].toFixed(4)}, at ${next_best[0].toFixed(2)} s` : "; there is no other";
-    return `Best agreement ${peak[1] === null ? "not known" : peak[1].toFixed(4)} at an offset of ${peak[0].toFixed(3)} s${next}. 1: the scales explain all of the instrument's motion.`;
+    const higher = this.uncounted({ offset_s, agreement, window_s, peak, next_best });
+    return `Best agreement ${peak[1] === null ? "not known" : peak[1].toFixed(4)} at an offset of ${peak[0].toFixed(3)} s${next}. 1: the scales explain all of the instrument's motion.${higher}`;
+  }
+
+  // Why the curve is higher than the next best somewhere else.
+  uncounted({ offset_s, agreement, window_s, peak, next_best }) {
+    const least = (next_best?.[1] ?? 0) + HIGHER;
+    const [value, at] = agreement.reduce((best, value, k) => (value > best[0] && Math.abs(offset_s[k] - peak[0]) > window_s ? [value, offset_s[k]] : best), [least, null]);
+    if (at === null) return "";
+    return ` The curve reaches ${value.toFixed(2)} at ${at.toFixed(1)} s, which does not count: an offset counts where at least half of the shorter of the two overlaps, and both move at the same times.`;
   }
 
   // nan for too little overlap; below 0 there is no agreement.

@@ -59,7 +59,7 @@ export class Card {
   show(command) {
     const { card } = this;
     const variant = card.variants[0];
-    const button = (text, act, id) => element("button", { type: "button", id, onclick: act }, text);
+    const button = (text, act, id, title) => element("button", { type: "button", id, title, onclick: act }, text);
     this.left_out = element("p", { class: "note", id: "left-out" });
     this.signature = new Signature();
     this.proposal = new Proposal();
@@ -71,7 +71,7 @@ export class Card {
       element("p", { class: "equation" }, card.equation),
       ...Object.entries(card.symbols).map(([symbol, meaning]) => element("p", { class: "note" }, `${symbol}: ${meaning}`)),
       ...(variant
-        ? [...this.sliders.map(({ row }) => row), ...constants, this.left_out, element("div", { class: "row" }, button("Fit (0)", () => this.fit(), "fit"), button("Add (a) …", () => this.add(), "add")), new CommandLine(command).row]
+        ? [...this.sliders.map(({ row }) => row), ...constants, this.left_out, element("div", { class: "row" }, button("Fit", () => this.fit(), "fit", "Sliders to the fit (key 0)"), button("Add …", () => this.add(), "add", "Shows first what would change (key a)")), new CommandLine(command).row]
         : [element("p", { class: "note" }, `Not testable on this recording: ${card.why_not}`)]),
       this.proposal.place,
       ...this.rivals(),

@@ -21,7 +21,7 @@ export class Diagnosis {
     this.page = element("p", { class: "note", id: "diagnosis-page" });
     this.text = element("pre", { class: "verdict", tabindex: 0 });
     this.whole = element("details", {}, element("summary", {}, "As the terminal prints it"), copyButton(this.text, "Copy this text"), this.text);
-    place.replaceChildren(element("div", { class: "row" }, this.button), this.command.row, this.stages, this.state, this.behind, this.outcome, this.page, this.whole);
+    place.replaceChildren(this.command.row, this.stages, this.state, this.behind, this.outcome, this.page, this.whole);
     this.clear();
   }
 
@@ -45,6 +45,7 @@ export class Diagnosis {
     this.bench.attempt(async () => {
       await this.bench.post("diagnosis", this.running ? { cancel: true } : {});
       await this.look();
+      this.stages.scrollIntoView({ block: "nearest" });
     });
   }
 

@@ -7,6 +7,15 @@ const plain = (name) => name.replaceAll("_", " ");
 // Units within a text.
 const units = (text) => String(text).replace(/(^|[\s/(])u(m|rad)\b/g, "$1µ$2").replaceAll("+-", "±").replaceAll("->", "→").replaceAll("degC", "°C");
 
+// Advice names the buttons of this page for the commands of the terminal; the commands may be wrapped.
+const BUTTONS = [
+  [/compd\s+effect\s+add\s+(\S+)\s+--recording\s+\S+\s+--model\s+FILE/g, "press “Add …” at $1 below"],
+  [/\(compd\s+effect\s+add\)/g, "(“Add …” below)"],
+  [/compd\s+compare\s+OTHER\.csv\s+--model\s+FILE/g, "choose it above, with this model file, and press “Open”"],
+  [/compd\s+plan\s+\S+\s+--rivals\s+\S+\s+says\s+what\s+tells\s+them\s+apart/g, "press “Plan the measurement that tells them apart” below"],
+];
+const advice = (text) => BUTTONS.reduce((told, [command, press]) => told.replace(command, press), text);
+
 // act: actions of the buttons, {choose(effect), add(effect), plan(effects), formula(formula)}; none, no button.
 export function evidence(diagnosis, act) {
   const { effects, follows, formulas, constant, gross, tried, without_gain, untested, next } = diagnosis;
@@ -76,5 +85,5 @@ export function summaryLines(verdict, lines) {
     else if (entries.length) entries.at(-1)[1] += `\n${line.trim()}`;
   }
   const word = element("b", { class: "word", "data-verdict": verdict }, plain(verdict));
-  return element("div", { class: "summary-lines" }, element("p", { class: "heading" }, word, " ", units(heading.slice(heading.indexOf(":") + 2))), element("dl", { class: "facts" }, ...entries.flatMap(pair)));
+  return element("div", { class: "summary-lines" }, element("p", { class: "heading" }, word, " ", units(heading.slice(heading.indexOf(":") + 2))), element("dl", { class: "facts" }, ...entries.flatMap(([name, text]) => pair([name, advice(text)]))));
 }

@@ -34,11 +34,15 @@ const diagnosis = new Diagnosis(at("diagnosis"), {
     card.add();
   },
 });
+// always in sight, while its findings are below the picture
+at("do-diagnose").append(diagnosis.button);
 const formula = new Formula(at("formula"), card, effects);
 const plan = new Plan(at("plan"));
 const ledger = new Ledger(at("ledger"));
 const exclusions = new Exclusions(at("exclusions"), selection);
-bench.panels = [strip, picture, exclusions, card, ledger, diagnosis, effects, formula, plan, new LiveModel(at("live-model"))];
+// what to do first, until it is done
+const firstSteps = { begin: ({ summary }) => (at("first-steps").hidden = summary.ledger.length > 0) };
+bench.panels = [firstSteps, strip, picture, exclusions, card, ledger, diagnosis, effects, formula, plan, new LiveModel(at("live-model"))];
 bindKeys({ bench, picture, selection, exclusions, card, effects, ledger, diagnosis });
 
 const open = () => bench.attempt(() => bench.open(at("recording").value, at("model").value.trim(), [...document.querySelectorAll("#libraries input:checked")].map(({ value }) => value)));

@@ -14,11 +14,12 @@ export class NumberSlider {
     const step = 10 ** Math.floor(Math.log10((high - low) / STEPS));
     // from a multiple of the step on, so that round numbers can be chosen
     const [first, last] = [Math.floor(low / step) * step, Math.ceil(high / step) * step];
-    const share = (theta) => `${(100 * (theta - first)) / (last - first)}%`;
+    // a wide error ends at the slider's end
+    const percent = (theta) => Math.min(100, Math.max(0, (100 * (theta - first)) / (last - first)));
     const part = (name, from, to) => {
       const made = element("i", { class: name });
-      made.style.left = share(from);
-      if (to !== undefined) made.style.width = `${(100 * (to - from)) / (last - first)}%`;
+      made.style.left = `${percent(from)}%`;
+      if (to !== undefined) made.style.width = `${percent(to) - percent(from)}%`;
       return made;
     };
     const error = fit.standard_error ?? 0;
@@ -51,7 +52,7 @@ export class NumberSlider {
   text(theta) {
     const { reciprocal, unit } = this.number;
     if (!reciprocal) return `${digits(theta)} ${micro(unit)}`;
-    return theta === 0 ? `∞ ${micro(unit)}` : `${digits(1 / theta)} ${micro(unit)}`;
+    return theta === 0 ? "rigid" : `${digits(1 / theta)} ${micro(unit)}`;
   }
 }
 

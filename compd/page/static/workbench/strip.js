@@ -37,7 +37,7 @@ export class Strip {
       big(rms, `error now, ${used} of ${rows} rows`, "now"),
       big(this.left_out_rms, "on rows left out", "held"),
       big(tried_rms, tried_rms === null ? "nothing is tried" : "tried, not kept", "tried"),
-      big(floor, floor_known ? "noise alone" : "noise is not known"),
+      big(floor, floor_known ? "noise alone" : floor === null ? "noise not known" : "noise, estimated: none is declared"),
     );
     const part = (name, value) => {
       const made = element("i", { class: name });
