@@ -1,5 +1,7 @@
 // Many small marks at once: written as pixels of one buffer, ten times faster than one call of the canvas for each.
 const SIZE_PX = 2.5;
+// More arrows are drawn without smooth edges, which nobody sees among so many.
+const MOST_SMOOTH = 1500;
 
 export class Pixels {
   constructor() {
@@ -24,15 +26,19 @@ export class Pixels {
   // Draw arrows in the context's fillStyle and lineWidth: a dot at the place, and a line to the end. ends: x and y of
   // each end, relative to its mark
   arrows(context, marks, ends, shown) {
+    const count = marks.length / 2;
+    const draw = count > MOST_SMOOTH ? plainLine : smoothLine;
     this.written(context, ({ pixels, width, height, ratio, colour }) => {
       const thick = Math.max(1, Math.round(context.lineWidth * ratio));
-      for (let k = 0; k < marks.length / 2; k++) {
+      for (let k = 0; k < count; k++) {
         if (!shown(k)) continue;
-        const [x, y] = [marks[2 * k] * ratio, marks[2 * k + 1] * ratio];
-        for (let side = 0; side < thick; side++) line(pixels, width, height, colour, x, y, ends[2 * k] * ratio, ends[2 * k + 1] * ratio, side - (thick - 1) / 2);
-        const [left, top] = [Math.round(x - thick), Math.round(y - thick)];
+        const x = marks[2 * k] * ratio;
+        const y = marks[2 * k + 1] * ratio;
+        for (let side = 0; side < thick; side++) draw(pixels, width, height, colour, x, y, ends[2 * k] * ratio, ends[2 * k + 1] * ratio, side - (thick - 1) / 2);
+        const left = Math.round(x - thick);
+        const top = Math.round(y - thick);
         if (!(left >= 0 && top >= 0 && left + 2 * thick <= width && top + 2 * thick <= height)) continue;
-        for (let row = top; row < top + 2 * thick; row++) pixels.fill(colour, row * width + left, row * width + left + 2 * thick);
+        for (let row = top; row < top + 2 * thick; row++) for (let column = left; column < left + 2 * thick; column++) pixels[row * width + column] = colour;
       }
     });
   }
@@ -71,9 +77,25 @@ export class Pixels {
   }
 }
 
+// A line of whole pixels from (x, y) by (along, up), moved sideways.
+function plainLine(pixels, width, height, colour, x, y, along, up, sideways) {
+  const steep = Math.abs(up) > Math.abs(along);
+  const begin = steep ? y : x;
+  const length = steep ? up : along;
+  if (!(Math.abs(length) < Infinity)) return;
+  const slope = length ? (steep ? along : up) / length : 0;
+  const step = steep ? width : 1;
+  const beside = steep ? 1 : width;
+  const across = steep ? width : height;
+  const from = Math.max(0, Math.round(Math.min(begin, begin + length)));
+  const to = Math.min(steep ? height : width, Math.round(Math.max(begin, begin + length)) + 1);
+  let at = (steep ? x : y) + sideways + (from - begin) * slope + 0.5;
+  for (let place = from * step; place < to * step; place += step, at += slope) if (at >= 0 && at < across) pixels[place + (at | 0) * beside] = colour;
+}
+
 // A smooth line from (x, y) by (along, up), moved sideways (Wu 1991): of the two pixels beside it each gets its share of
 // the opacity.
-function line(pixels, width, height, colour, x, y, along, up, sideways) {
+function smoothLine(pixels, width, height, colour, x, y, along, up, sideways) {
   const steep = Math.abs(up) > Math.abs(along);
   const [begin, other, length, rise] = steep ? [y, x, up, along] : [x, y, along, up];
   if (!(Math.abs(length) < Infinity)) return;

@@ -43,7 +43,9 @@ export class SpaceView {
     const [[xx, xy], [yx, yy], [zx, zy]] = this.unit;
     const marks = new Float32Array((2 * vectors.length) / 3);
     for (let row = 0; row < marks.length / 2; row++) {
-      const [x, y, z] = [times * vectors[3 * row], times * vectors[3 * row + 1], times * vectors[3 * row + 2]];
+      const x = times * vectors[3 * row];
+      const y = times * vectors[3 * row + 1];
+      const z = times * vectors[3 * row + 2];
       marks[2 * row] = x0 + x * xx + y * yx + z * zx;
       marks[2 * row + 1] = y0 + x * xy + y * yy + z * zy;
     }
