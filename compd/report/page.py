@@ -44,6 +44,8 @@ _PLOTLY_CONFIG = {
 # Marks of a page of compd in its head: the generator; up to 0.2 the style of the text.
 _PAGE_MARKS = (b'<meta name="generator" content="compd">', b'body { font: 16px/1.5 system-ui, "Segoe UI"')
 
+# Colour of lines that are white in a dark theme, where the page's script changes it.
+INK = "black"
 # Plotly's template of every figure; in a dark theme the page's script replaces it.
 TEMPLATE = "plotly_white"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 # A unit that stands alone or in a quotient, no part of a name such as tip_x_um, of an option or of a path.
-_MICRO = re.compile(r"(?<![\w.-])u(m|rad|in)\b(?![.=(])")
+_MICRO = re.compile(r"(?<![\w.-])u(m|rad|in)\b(?!\.\w|[=(])")
 _CELSIUS = re.compile(r"(?<![\w.-])degC\b")
 
 
