@@ -13,7 +13,7 @@ from rich.table import Table as TerminalTable
 
 from compd.arrays import rms
 from compd.demo.session import KINDS, DemoSession
-from compd.report import COLOURS, PageTable, Panel, style_figure, write_page
+from compd.report import AXIS_COLOURS, COLOURS, PageTable, Panel, style_figure, write_page
 from compd.units import UM_PER_MM
 
 LABELS = {"none": "no compensation", "joints": "joints only", "full": "joints and frame"}
@@ -173,13 +173,13 @@ def _frame(session: DemoSession) -> Figure:
         if "frame" in message
     ]
     start_s = displacements[0][0] if displacements else 0.0
-    for axis, colour in zip(range(3), ("worst", "plain", "best"), strict=True):
+    for axis, name in enumerate(AXIS_COLOURS):
         figure.add_scatter(
             x=[time_s - start_s for time_s, _ in displacements],
             y=[displacement_mm[axis] * UM_PER_MM for _, displacement_mm in displacements],
-            name="xyz"[axis],
+            name=name,
             mode="lines",
-            line={"color": COLOURS[colour]},
+            line={"color": AXIS_COLOURS[name]},
         )
     return style_figure(figure, "time since the start, s", "displacement of {B}, um")
 

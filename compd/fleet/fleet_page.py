@@ -51,7 +51,8 @@ def write_fleet_page(path: Path, results: Sequence[RecordingResult], criteria: F
     commands = ", ".join(sorted({f"compd fleet {result.command}" for result in results}))
     models = sorted({result.model for result in results if result.model})
     footer = f"By {commands}; models: {', '.join(models) or 'none'}."
-    write_page(path, f"A fleet of {len(overview.machines)} machines", verdict, panels, footer)
+    count = len(overview.machines)
+    write_page(path, f"A fleet of {count} {'machine' if count == 1 else 'machines'}", verdict, panels, footer)
 
 
 def _matrix_caption(overview: Overview) -> str:

@@ -152,7 +152,7 @@ class Overview:
                 [
                     machine,
                     str(len(results)),
-                    ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()),
+                    ", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in verdicts.most_common()),
                     _median_text(results, "rms_before_um"),
                     _median_text(results, "rms_after_um"),
                     _median_text(results, "noise_floor_um"),

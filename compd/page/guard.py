@@ -55,7 +55,7 @@ class WrongTokens:
 # Path of the form's target.
 FORM_PATH = "/token"
 # Static files of the form, served without a token.
-FORM_FILES = ("/static/page.css", "/static/token.css", "/static/icon.svg")
+FORM_FILES = ("/static/page.css", "/static/axes.css", "/static/token.css", "/static/icon.svg")
 # Most bytes of the form; a token has 32 characters.
 MAX_FORM_BYTES = 512
 _PAGE = Path(__file__).parent / "static" / "token.html"

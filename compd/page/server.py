@@ -35,6 +35,7 @@ from compd.page.recordings import Recordings
 from compd.page.requests import LOOKS_ONLY, asked_by, keys_of, may_change, note_change, refused
 from compd.page.workbench.routes import WorkbenchRoutes
 from compd.page.workers.workers import Workers
+from compd.report import AXES_CSS
 
 STATIC = Path(__file__).parent / "static"
 # Longest burst (s): an hour at 1 kHz takes some gigabytes.
@@ -91,6 +92,7 @@ class Server:
             Route("/recordings/{name}", self._download),
             *self._workbench.routes(),
             *self._join.routes(),
+            Route("/static/axes.css", self._axes),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
         return Starlette(routes=routes, lifespan=self._lifespan, middleware=[Middleware(Logbook)])
@@ -106,6 +108,9 @@ class Server:
         self._workers.end()
         await _ended(tasks)
         await self._recordings.stop()
+
+    async def _axes(self, request: Request) -> Response:
+        return FileResponse(AXES_CSS)
 
     async def _index(self, request: Request) -> Response:
         return FileResponse(STATIC / "index.html")

@@ -1,3 +1,5 @@
+from .axis_colours import AXES_CSS as AXES_CSS
+from .axis_colours import AXIS_COLOURS as AXIS_COLOURS
 from .calibration_page import write_calibration_page as write_calibration_page
 from .comparison_page import name_of as name_of
 from .comparison_page import no_trend_text as no_trend_text
@@ -10,6 +12,7 @@ from .evidence_json import evidence as evidence
 from .ledger_page import LEDGER_HEAD as LEDGER_HEAD
 from .ledger_page import ledger_rows as ledger_rows
 from .ledger_page import write_ledger_page as write_ledger_page
+from .machine_drawing import machine_lines as machine_lines
 from .machine_drawing import machine_svg as machine_svg
 from .page import COLOURS as COLOURS
 from .page import Panel as Panel

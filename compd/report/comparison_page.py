@@ -20,7 +20,7 @@ from compd.report.figures import (
     plot_residual_vectors,
     plot_workspace_map,
 )
-from compd.report.page import Panel, style_figure, write_page
+from compd.report.page import INK, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
 from compd.report.small_multiples import SERIES_COLOURS, plot_residual_against
 from compd.text import number_text
@@ -43,7 +43,7 @@ def plot_envelope(comparison: StreamedComparison) -> Figure:
         for values, line, fill in (
             (envelope.largest, {"width": 0.5, "color": colour}, None),
             (envelope.smallest, {"width": 0.5, "color": colour}, "tonexty"),
-            (envelope.mean, {"width": 1.5, "color": "black"}, None),
+            (envelope.mean, {"width": 1.5, "color": INK}, None),
         ):
             trace = Scatter(x=x, y=values[:, k].astype(np.float32), mode="lines", line=line, fill=fill)
             figure.add_trace(trace, row=k + 1, col=1)

@@ -66,7 +66,7 @@ def plot_time(diagnosis: Diagnosis, fall: ErrorFall) -> Figure:
         figure.update_yaxes(title_text=f"error in {label}, {fall.unit}", range=span, row=k + 1, col=1)
     for finding in [finding for finding in diagnosis.depends_on if finding.is_change]:
         moment = float(np.interp(finding.time_s, recording.time_s, x))
-        figure.add_vline(moment, line={"dash": "dash", "color": "black"})
+        figure.add_vline(moment, line={"dash": "dash", "color": COLOURS["quiet"]})
         text = change_text(finding, diagnosis)
         figure.add_annotation(x=moment, y=1, yref="paper", yanchor="bottom", text=text, showarrow=False)
     return figure.update_xaxes(title_text="time, h" if recording.has_time else "row", row=len(labels), col=1)

@@ -20,10 +20,9 @@ from compd.report.effect_signature import (
     Signature,
     compute_signature,
 )
+from compd.report.axis_colours import AXIS_COLOURS
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
-
-AXIS_COLOURS = {"x": COLOURS["worst"], "y": COLOURS["best"], "z": COLOURS["plain"]}
 
 
 def write_effect_page(path: Path, effect: Effect, configuration: Configuration) -> None:

@@ -9,7 +9,7 @@ from plotly.subplots import make_subplots
 from compd.arrays import FloatArray, rms
 from compd.comparison import Comparison
 from compd.display_unit import format_error, in_place_unit, place_unit
-from compd.report.page import COLOURS, style_figure
+from compd.report.page import COLOURS, INK, style_figure
 from compd.report.page_table import PageTable
 from compd.report.small_multiples import NOT_RECORDED, SERIES_COLOURS, add_dots_and_means, thin
 from compd.units import UM_PER_MM
@@ -95,6 +95,7 @@ def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, f
             },
         )
     )
+    _add_scale_bar(figure, np.nanmin(path, axis=0), axes[0], float(size_um.max()), enlarged, unit)
     style_figure(figure, "", "", 600)
     figure.update_layout(
         scene={
@@ -104,6 +105,33 @@ def plot_residual_vectors(comparison: Comparison) -> tuple[Figure | PageTable, f
         margin={"l": 0, "r": 0, "t": 10, "b": 0},
     )
     return figure, enlarged
+
+
+def _add_scale_bar(
+    figure: Figure, corner: FloatArray, axis: int, longest_um: float, enlarged: float, unit: str
+) -> None:
+    """A bar of 1, 2 or 5 times a power of ten, at most as long as the longest arrow, from a corner along an axis.
+
+    corner : (3,) in the unit of places.
+    """
+    if longest_um <= 0:
+        return
+    power = 10.0 ** np.floor(np.log10(longest_um))
+    length_um = max(step * power for step in (1, 2, 5) if step * power <= longest_um)
+    end = corner.copy()
+    end[axis] += in_place_unit(np.array(length_um / UM_PER_MM * enlarged), unit)
+    (x0, y0, z0), (x1, y1, z1) = corner.tolist(), end.tolist()
+    figure.add_scatter3d(
+        x=[x0, x1],
+        y=[y0, y1],
+        z=[z0, z1],
+        mode="lines+text",
+        text=["", f"{length_um:g} {unit}"],
+        textposition="top center",
+        line={"width": 6, "color": INK},
+        hoverinfo="skip",
+        showlegend=False,
+    )
 
 
 def plot_histogram(comparison: Comparison) -> Figure:

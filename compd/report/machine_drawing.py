@@ -1,4 +1,4 @@
-"""A machine at machine zero, drawn as SVG: from above, from the front, and in space."""
+"""A machine at machine zero, drawn as SVG: from above, from the front, and in space; or as lines for a browser."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.model import MachineModel
 from compd.model.kinematics import ACTUATOR_KINDS
+from compd.report.axis_colours import AXIS_COLOURS
 from compd.rotation import to_outer
 
 PANEL_PX, MARGIN_PX, TITLE_PX = 380, 46, 40
@@ -23,7 +24,6 @@ VIEWS = {
     ),
 }
 COLOURS = {"rod": "#1f5fa8", "base": "#444444", "platform": "#b3541e", "actuator": "#2d8a4e", "hinge": "#8a2d7c"}
-AXES = {"x": "#c0392b", "y": "#27803c", "z": "#2456b8"}
 
 
 def machine_svg(model: MachineModel, name: str) -> str:
@@ -44,6 +44,21 @@ def machine_svg(model: MachineModel, name: str) -> str:
         f'viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12">\n'
         '<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(body) + "\n</svg>\n"
     )
+
+
+def machine_lines(model: MachineModel) -> list[dict[str, object]]:
+    """Lines of a machine at machine zero, as plain data: `part`, `points` ((P, 3) mm in {M}) and whether `closed`."""
+    parts = _Parts(model)
+    rods = [np.array(ends) for ends in zip(parts.base, parts.platform, strict=True)]
+    lines = [
+        *(("actuator", line, False) for line in (*parts.circles, *parts.rails, *parts.cranks)),
+        ("base", _round(parts.base), True),
+        ("platform", _round(parts.platform), True),
+        *(("rod", rod, False) for rod in rods),
+        *(("hinge", hinge, False) for hinge in parts.hinges),
+        ("tool", np.array([parts.origin, parts.tip]), False),
+    ]
+    return [{"part": part, "points": points.round(4).tolist(), "closed": closed} for part, points, closed in lines]
 
 
 class _Parts:
@@ -131,9 +146,9 @@ def _axes(view: FloatArray, left_px: int) -> list[str]:
         right, up = size * (view @ unit)
         if math.hypot(right, up) > 1.0:
             body.append(
-                f'<line x1="{x0}" y1="{y0}" x2="{x0 + right:.1f}" y2="{y0 - up:.1f}" stroke="{AXES[name]}" '
+                f'<line x1="{x0}" y1="{y0}" x2="{x0 + right:.1f}" y2="{y0 - up:.1f}" stroke="{AXIS_COLOURS[name]}" '
                 f'stroke-width="2"/><text x="{x0 + 1.35 * right:.1f}" y="{y0 - 1.35 * up + 4:.1f}" '
-                f'text-anchor="middle" fill="{AXES[name]}">{name}</text>'
+                f'text-anchor="middle" fill="{AXIS_COLOURS[name]}">{name}</text>'
             )
     return body
 

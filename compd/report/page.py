@@ -9,21 +9,26 @@ filled by `write_page`. Example::
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from html import escape
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 from plotly.graph_objects import Figure
+from plotly.io import templates, to_html
 from plotly.offline import get_plotlyjs
 
 from compd.files import check_directory, check_replaceable
 from compd.release import __version__
 from compd.report.page_table import PageTable
+from compd.text import typeset
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito, 2008), in a fixed order of meaning.
 COLOURS = {"worst": "#d55e00", "middle": "#e69f00", "best": "#009e73", "plain": "#0072b2", "quiet": "#8a8f98"}
@@ -38,6 +43,11 @@ _PLOTLY_CONFIG = {
 
 # Marks of a page of compd in its head: the generator; up to 0.2 the style of the text.
 _PAGE_MARKS = (b'<meta name="generator" content="compd">', b'body { font: 16px/1.5 system-ui, "Segoe UI"')
+
+# Colour of lines that are white in a dark theme, where the page's script changes it.
+INK = "black"
+# Plotly's template of every figure; in a dark theme the page's script replaces it.
+TEMPLATE = "plotly_white"
 
 # Name of plotly's script where pages share it.
 SHARED_SCRIPT = "plotly.min.js"
@@ -87,7 +97,7 @@ def write_page(
         path.with_name(SHARED_SCRIPT).write_text(get_plotlyjs(), encoding="utf-8")
     page = _template().render(
         title=title,
-        verdict=verdict.html if isinstance(verdict, PageText) else verdict,
+        verdict=PageText(typeset(verdict.text)).html if isinstance(verdict, PageText) else typeset(verdict),
         verdict_is_lines=isinstance(verdict, PageText),
         panels=[
             {
@@ -100,6 +110,7 @@ def write_page(
             for number, panel in enumerate(panels)
         ],
         footer=f"{footer} Written on {datetime.now(UTC):%Y-%m-%d} by compd {__version__}.".strip(),
+        figure_grounds=_figure_grounds() if has_figure else "",
         shared_script=SHARED_SCRIPT if shared_script and has_figure else "",
         plotly_script=get_plotlyjs() if has_figure and not shared_script else "",
     )
@@ -109,7 +120,7 @@ def write_page(
 def style_figure(figure: Figure, x: str, y: str, height_px: int = 340) -> Figure:
     """The figure in the common style: axis titles with units, quiet grid, legend on top."""
     figure.update_layout(
-        template="plotly_white",
+        template=TEMPLATE,
         height=height_px,
         margin={"l": 70, "r": 20, "t": 30, "b": 50},
         font={"family": "system-ui, DejaVu Sans, sans-serif", "size": 13},
@@ -121,6 +132,13 @@ def style_figure(figure: Figure, x: str, y: str, height_px: int = 340) -> Figure
 
 
 @cache
+def _figure_grounds() -> str:
+    """The templates of figures for a light and a dark theme, as JSON for the page's script."""
+    grounds = {"light": templates[TEMPLATE], "dark": templates["plotly_dark"]}
+    return json.dumps({name: template.to_plotly_json() for name, template in grounds.items()})
+
+
+@cache
 def _template() -> Template:
     environment = Environment(
         loader=PackageLoader("compd.report"),
@@ -129,16 +147,32 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["typeset"] = typeset
     return environment.get_template("page.html")
 
 
 def _figure_html(figure: Figure, number: int) -> str:
     """The figure as an element of its own; plotly's script is in the page's head."""
     return str(
-        figure.to_html(
+        to_html(
+            _typeset(figure.to_dict()),
             full_html=False,
             include_plotlyjs=False,
             div_id=f"figure-{number}",
             config=_PLOTLY_CONFIG,
+            validate=False,
         )
     )
+
+
+def _typeset(part: Any) -> Any:
+    """A figure's parts with every text as people read it; numbers, which may be coded as text, stay."""
+    if isinstance(part, str):
+        return typeset(part)
+    if isinstance(part, Mapping):
+        return {key: value if key == "bdata" else _typeset(value) for key, value in part.items()}
+    if isinstance(part, list | tuple):
+        return [_typeset(value) for value in part]
+    if isinstance(part, np.ndarray) and part.dtype == object:
+        return [_typeset(value) for value in part]
+    return part

@@ -10,6 +10,7 @@ from plotly.subplots import make_subplots
 
 from compd.arrays import FloatArray, IntArray
 from compd.comparison import Comparison, Covariate
+from compd.report.axis_colours import AXIS_COLOURS
 from compd.report.page import COLOURS, style_figure
 from compd.report.page_table import PageTable
 
@@ -18,7 +19,8 @@ DOTS = 500
 FEW_DOTS = 200
 BINS = 12
 COLUMNS = 3
-SERIES_COLOURS = (COLOURS["worst"], COLOURS["best"], COLOURS["plain"], COLOURS["middle"], "#cc79a7", "#56b4e9")
+# Of coordinates, the first three x, y and z.
+SERIES_COLOURS = (*AXIS_COLOURS.values(), COLOURS["middle"], "#cc79a7", "#56b4e9")
 NOT_RECORDED = PageTable(("",), [("not recorded, or it never changed",)])
 
 

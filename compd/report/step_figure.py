@@ -14,7 +14,7 @@ from compd.diagnosis import ErrorFall
 from compd.model.effects import FittedEffect
 from compd.report.driver import Driver, find_driver
 from compd.report.error_part import ErrorContribution, error_contribution
-from compd.report.page import style_figure
+from compd.report.page import INK, style_figure
 from compd.report.small_multiples import DOTS, SERIES_COLOURS, add_dots_and_means, class_means, dot_style, thin
 
 # Most drawn series, those with the largest effect.
@@ -55,7 +55,7 @@ def plot_step(
         _add_series(figure, row, part, k, driver, fall)
         figure.update_yaxes(title_text=f"error of {part.series[k]}, {fall.unit}", row=row, col=1)
     curves = any(driver.one_line and not _is_discrete(driver, part) for driver in drivers)
-    caption = HOW_TO_READ + (", the black line is what it does with its fitted numbers" if curves else "")
+    caption = HOW_TO_READ + (", the line in black or white is what it does with its fitted numbers" if curves else "")
     if fall.noise_known:
         caption += "; the grey band is the noise, one standard deviation either way"
     if len(shown) < len(part.series):
@@ -80,7 +80,7 @@ def _add_series(figure: Figure, row: int, part: ErrorContribution, k: int, drive
             figure.add_hrect(-fall.noise, fall.noise, fillcolor="#8a8f98", opacity=0.18, line_width=0, row=row, col=col)
     if driver.one_line and not discrete:
         x, y, _ = class_means(driver.values[used], part.part[used, k], min(CURVE_CLASSES, len(used)))
-        line = {"color": "black", "width": 1.5}
+        line = {"color": INK, "width": 1.5}
         figure.add_trace(Scatter(x=x, y=y, mode="lines", line=line, hoverinfo="skip"), row=row, col=1)
     figure.update_yaxes(range=_span(part.before[used, k], fall), row=row)
 

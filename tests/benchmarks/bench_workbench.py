@@ -1,12 +1,13 @@
 """What the workbench in the browser costs, by rows: `python -m tests.benchmarks.bench_workbench`.
 
-Side by side in one run, for recordings of 600, 5,000 and 100,000 rows: how long it takes until a recording is open and
+Side by side in one run, for recordings of 600 to 100,000 rows: how long it takes until a recording is open and
 its effects are ranked, what the script and the frame take when a slider moves, in each kind of picture, how long a dry
 run takes, and the memory of the page's process.
 """
 
 from __future__ import annotations
 
+import statistics
 import sys
 import time
 from pathlib import Path
@@ -17,7 +18,7 @@ from tests.benchmarks.figures import quiet, show
 from tests.support.live_page import CHROMIUM, browser, page_process, until
 from tests.support.measured import gauges, hidden, record
 
-ROWS = (600, 5_000, 100_000)
+ROWS = (600, 5_000, 30_000, 100_000)
 PICTURES = ("3D", "map xy", "target", "time")
 WITHIN_S = 300.0
 _RANKED = "document.querySelectorAll('.effect').length > 5"
@@ -42,6 +43,18 @@ _FRAME_MS = f"""async () => {{
     await new Promise((done) => requestAnimationFrame(done));
     times.push(performance.now() - begin);
   }}
+  return times;
+}}"""
+
+# Each picture drawn in turn, so that other work of the computer falls on all alike.
+_DRAWN_MS = f"""(kinds) => {{
+  const times = kinds.map(() => []);
+  for (let k = 0; k < {_MOVES}; k++) kinds.forEach((kind, place) => {{
+    bench.picture.kind = kind;
+    const begin = performance.now();
+    bench.picture.draw();
+    times[place].push(performance.now() - begin);
+  }});
   return times;
 }}"""
 
@@ -89,6 +102,8 @@ def measured(rows: int) -> list[str]:
             for picture in PICTURES:
                 tab.locator("[role=tab]", has_text=picture).click()
                 figures += [_quantiles(tab.evaluate(_SCRIPT_MS)), _quantiles(tab.evaluate(_FRAME_MS))]
+            arrows, dots = (statistics.median(times_ms) for times_ms in tab.evaluate(_DRAWN_MS, ["map xy", "target"]))
+            figures.append(f"{arrows:.1f} / {dots:.1f} ms, {arrows / dots:.2f}")
             tab.locator("#add").click()
             figures.append(f"{_timed_s(lambda: tab.wait_for_selector('#confirm', timeout=1e3 * WITHIN_S)):.1f} s")
             return [*figures, f"{peak_memory_mb(pid):.0f} MB"]
@@ -103,7 +118,7 @@ def main() -> None:
     names = ["open", "effects ranked, after that"]
     for picture in PICTURES:
         names += [f"slider, {picture}: script, ms (median / 95 %)", f"slider, {picture}: to the next frame, ms"]
-    names += ["dry run of adding an effect", "largest memory of the page's process"]
+    names += ["arrows / dots of a picture, drawn in turn, and their ratio", "dry run of adding an effect", "largest memory of the page's process"]
     show("the workbench by rows", ["", *(f"{rows:,} rows" for rows in ROWS)], list(zip(names, *columns, strict=True)))
 
 

@@ -130,7 +130,7 @@ export class Hour {
         cursor: { drag: { x: false, y: false } },
         scales: { x: { range: () => [this.window.left, this.window.right] } },
         axes: [{ ...axis, size: 24, values: (_, times) => times.map((time) => clock(time, this.window.span_s)) }, { ...axis, size: 44 }],
-        series: [{}, ...[["x", () => ink("--line"), []], ["y", "#e69f00", [6, 3]], ["z", "#cc79a7", [2, 2]]].map(([label, stroke, dash]) => ({ label, stroke, dash, width: 1.5, points: { show: false }, spanGaps: false }))],
+        series: [{}, ...[["x", []], ["y", [6, 3]], ["z", [2, 2]]].map(([label, dash]) => ({ label, stroke: () => ink(`--${label}`), dash, width: 1.5, points: { show: false }, spanGaps: false }))],
       }, data, this.place);
       gestures(this.chart.over, {
         click: (share) => this.go(this.window.timeAt(share)),
@@ -140,7 +140,7 @@ export class Hour {
         },
         zoom: (factor, share) => this.zoom(factor, share),
       });
-      this.place.append(element("p", { class: "note" }, "tip displacement, µm: x blue, y orange dashed, z purple dotted"));
+      this.place.append(element("p", { class: "note" }, "tip displacement, µm: x orange, y green dashed, z blue dotted"));
       new ResizeObserver(() => this.chart.setSize({ width: this.place.clientWidth, height: 130 })).observe(this.place);
     } else this.chart.setData(data);
   }

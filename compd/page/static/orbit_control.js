@@ -47,6 +47,7 @@ export class Turn {
       return [width / 2 + scale * right, height / 2 - scale * (ci * z + si * away)];
     };
     project.radius = radius;
+    project.px_per_mm = scale;
     return project;
   }
 }

@@ -16,7 +16,9 @@ from compd.configuration import Machine
 from compd.model_file import ModelFile, read_model_file
 from compd.page.packed import packed
 from compd.plugins import NO_CODE
-from compd.text import nan_to_null
+from compd.report import machine_lines
+from compd.text import nan_to_null, typeset
+from compd.units import unit_of
 
 # Approximate limit of rows in pictures; numbers always use all rows.
 MAX_PICTURED = 5000
@@ -112,15 +114,31 @@ class OpenedRecording:
         session = np.zeros(len(state)) if recording.session is None else recording.session
         arrays = {
             "row": recording.row.astype(np.float64),
-            "time_s": recording.time_s,
+            "time_s": recording.elapsed_s,
             "place_mm": self.places_mm,
             "residual": comparison.residual_um,
             "state": state,
             "session": session.astype(np.float64),
             **{f"quantity {name}": values for name, values in aligned.rows.quantities.items()},
         }
-        header = {"labels": aligned.labels, "unit": aligned.unit, "states": ROW_STATES, "rows": len(state)}
+        header = {
+            "labels": aligned.labels,
+            "unit": aligned.unit,
+            "units": [aligned.unit_of(label) for label in aligned.labels],
+            "time_title": "time since the first row, s" if recording.has_time else "row in order",
+            "quantity_titles": {f"quantity {name}": _axis_title(name) for name in aligned.rows.quantities},
+            "machine": [] if aligned.model is None else machine_lines(aligned.model),
+            "states": ROW_STATES,
+            "rows": len(state),
+        }
         return packed(header, {name: values[chosen] for name, values in arrays.items()})
+
+
+def _axis_title(quantity: str) -> str:
+    """Name and unit of a measured quantity: "force_z_N" is "force z, N"."""
+    unit = unit_of(quantity)
+    name = quantity.removesuffix(f"_{unit}").replace("_", " ") if unit else quantity
+    return f"{name}, {typeset(unit)}" if unit not in ("", "1") else name
 
 
 def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) -> OpenedRecording:

@@ -42,7 +42,7 @@ def test_a_browser_without_a_token_gets_the_form_and_what_it_is_made_of_and_noth
         assert answer.status_code == 403
         assert '<label for="token">' in answer.text
         assert "<script" not in answer.text
-    for path in ("/static/page.css", "/static/token.css", "/static/icon.svg"):
+    for path in ("/static/page.css", "/static/axes.css", "/static/token.css", "/static/icon.svg"):
         assert client.get(path).status_code == 200
     for path in ("/", "/static/main.js", "/static/join/join.css", "/recordings", "/live", "/address.svg"):
         answer = client.get(path, headers={"Accept": "*/*"})

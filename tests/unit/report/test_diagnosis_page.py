@@ -21,6 +21,7 @@ from compd.report.diagnosis_page import plot_time, write_diagnosis_page
 from compd.report.falling_error import NAME_WIDTH, plot_falling_error
 from compd.report.small_multiples import axis_title, axis_unit
 from compd.report.step_figure import plot_step
+from compd.text import typeset
 from tests.support.diagnoses import (
     FRAME,
     Noise,
@@ -65,7 +66,8 @@ def page_of(made: Diagnosis, tmp_path: Path) -> str:
 def test_the_page_begins_with_the_lines_of_the_terminal(tmp_path: Path) -> None:
     page = page_of(described(), tmp_path)
     first = page.partition("<pre")[2].partition("</pre>")[0]
-    assert first.replace("&gt;", ">").split(">", 1)[1].split("\n") == summary_lines(described())
+    lines = [typeset(line) for line in summary_lines(described())]
+    assert first.replace("&gt;", ">").split(">", 1)[1].split("\n") == lines
 
 
 def test_formulas_pasted_from_the_source_are_a_file_of_effects(tmp_path: Path) -> None:

@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 from plotly.graph_objects import Figure
 
+from compd.page.server import STATIC
 from compd.release import __version__
-from compd.report.page import SHARED_SCRIPT, Panel, write_page
+from compd.report import AXIS_COLOURS, SERIES_COLOURS
+from compd.report.page import SHARED_SCRIPT, PageText, Panel, write_page
 from compd.report.page_table import PageTable
 
 NASTY = '<script>alert("1 & 2")</script>'
@@ -94,3 +96,25 @@ def test_no_figure_offers_to_upload_itself(outline: Outline) -> None:
 
 def test_only_columns_of_numbers_are_aligned_on_the_right(outline: Outline) -> None:
     assert outline.numeric == ["th", "td", "td"]
+
+
+def test_texts_and_figures_say_micrometres(tmp_path: Path) -> None:
+    figure = Figure().add_scatter(x=[1.0, 2.0], y=[3.0, 4.0], name="x, um", hovertemplate="%{y} um<extra></extra>")
+    table = PageTable(("a, um",), [("0.3 um of tip_x_um",)])
+    panels = [Panel("Residual, um", "In um.", table), Panel("Figure", "", figure)]
+    write_page(tmp_path / "page.html", "Title", "0.3 um", panels, "", shared_script=True)
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert not re.search(r"(?<![\w_])um\b", text.partition("<h1>")[2])
+    assert "0.3 µm of tip_x_um" in text
+
+
+def test_lines_to_be_copied_stay(tmp_path: Path) -> None:
+    write_page(tmp_path / "page.html", "Title", "", [Panel("Formula", "", PageText("unit: um"))], "")
+    assert "<pre>unit: um</pre>" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_x_y_and_z_have_the_colours_of_the_page_server() -> None:
+    rules = (STATIC / "page.css").read_text(encoding="utf-8")
+    assert '@import url("axes.css")' in rules
+    assert not re.search(r"--[xyz]:", rules)
+    assert SERIES_COLOURS[:3] == tuple(AXIS_COLOURS[axis] for axis in "xyz")

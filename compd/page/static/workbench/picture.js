@@ -2,6 +2,7 @@
 import { element, ink, prepared } from "../format.js";
 import { Turn } from "../orbit_control.js";
 import { AgainstView } from "./against_view.js";
+import { Hover } from "./hover.js";
 import { Lasso } from "./lasso.js";
 import { SpaceView, mapped } from "./space_view.js";
 import { TargetView } from "./target_view.js";
@@ -16,6 +17,7 @@ export class Picture {
     const draw = () => this.draw();
     this.lasso = new Lasso(canvas, { wanted: (event) => event.button === 0 && (event.shiftKey || this.kind !== "3D"), draw, around: (contains) => this.pick(contains) });
     this.turn = new Turn(canvas, draw);
+    this.hover = new Hover(canvas, () => this.rows && { rows: this.rows, residual: this.shown, marks: this.marks, used: (row) => this.used(row) });
     selection.listen(draw);
     canvas.addEventListener("keydown", (event) => this.key(event));
     against.addEventListener("change", () => against.value && this.choose(against.value));
@@ -32,8 +34,8 @@ export class Picture {
     const map = (name, across, up) => ({ [`map ${name}`]: new SpaceView(mapped(across, up), "Draw around rows to choose them.", name) });
     this.views = {
       ...(rows.labels.length === 3 ? { "3D": turned, ...map("xy", 0, 1), ...map("xz", 0, 2), ...map("yz", 1, 2), target: new TargetView() } : {}),
-      time: new AgainstView("time_s", "time, s"),
-      ...Object.fromEntries(quantities.map((name) => [name.slice(9), new AgainstView(name, name.slice(9))])),
+      time: new AgainstView("time_s", rows.time_title),
+      ...Object.fromEntries(quantities.map((name) => [name.slice(9), new AgainstView(name, rows.quantity_titles[name])])),
     };
     this.tabbed = Object.keys(this.views).length - quantities.length;
     this.largest = 0;
@@ -46,9 +48,20 @@ export class Picture {
   choose(kind) {
     this.kind = kind;
     const kinds = Object.keys(this.views);
-    this.tabs.replaceChildren(...kinds.slice(0, this.tabbed).map((name) => element("button", { type: "button", role: "tab", "aria-selected": String(name === kind), onclick: () => this.choose(name) }, name)));
+    this.tabs.replaceChildren(...kinds.slice(0, this.tabbed).map((name) => element("button", { type: "button", role: "tab", "aria-selected": String(name === kind), onclick: () => this.choose(name) }, name)), ...this.machineSwitch(kind));
     this.against.replaceChildren(element("option", { value: "" }, "against …"), ...kinds.slice(this.tabbed).map((name) => element("option", { value: name, selected: name === kind }, name)));
     this.draw();
+  }
+
+  // Whether the machine stands around the arrows, which are larger without it.
+  machineSwitch(kind) {
+    const view = this.views[kind];
+    if (kind !== "3D" || !this.rows.machine.length) return [];
+    const change = ({ target }) => {
+      view.machine = target.checked;
+      this.draw();
+    };
+    return [element("label", { class: "machine-switch" }, element("input", { type: "checkbox", checked: view.machine, onchange: change }), " machine")];
   }
 
   // The next kind of picture, or the one before.
@@ -84,9 +97,10 @@ export class Picture {
     context.font = "12px system-ui";
     view.layout(rows, this.largest, width, height);
     view.frame(context, rows, width, height);
+    this.marks = view.marks(rows, this.shown);
     const paint = (residual, colour, shown) => {
-      context.strokeStyle = context.fillStyle = colour;
-      view.paint(context, rows, residual, view.marks(rows, residual), shown);
+      context.fillStyle = colour;
+      view.paint(context, rows, residual, residual === this.shown ? this.marks : view.marks(rows, residual), shown);
     };
     const used = (row) => this.used(row);
     if (left) paint(rows.residual, BEFORE, used);

@@ -2,6 +2,9 @@
 import { element, ink, micro, prepared } from "../format.js";
 import { SpaceView, mapped } from "./space_view.js";
 
+// Around the map, without numbers.
+const MARGIN = { left: 8, right: 8, top: 8, bottom: 8 };
+
 export class Signature {
   constructor() {
     this.canvas = element("canvas", { class: "signature", role: "img" });
@@ -19,9 +22,9 @@ export class Signature {
     let largest = 0;
     moved.forEach((value, k) => used(Math.floor(k / 3)) && (largest = Math.max(largest, Math.abs(value))));
     const { context, width, height } = prepared(this.canvas);
-    const view = new SpaceView(mapped(0, 2), "");
+    const view = new SpaceView(mapped(0, 2, MARGIN), "", "xz");
     view.layout(rows, largest, width, height);
-    context.strokeStyle = ink("--soft");
+    context.fillStyle = ink("--soft");
     view.paint(context, rows, moved, view.marks(rows), used);
     const text = `its signature from the front, numbers at the end of their plausible ranges: up to ${largest.toFixed(1)} ${micro(rows.unit)}`;
     this.canvas.setAttribute("aria-label", text);

@@ -1,14 +1,18 @@
 // The residual in x and y as shots at a target; the rings stay fixed during a trial.
 import { ink, micro } from "../format.js";
-import { Dots } from "./dots.js";
+import { Pixels } from "./pixels.js";
+import { label, stroke, ticks } from "./ticks.js";
+
+const MARGIN_PX = 40;
+const MOST_RINGS = 4;
 
 export class TargetView {
   constructor() {
-    this.dots = new Dots();
+    this.pixels = new Pixels();
   }
 
   layout(rows, largest, width, height) {
-    Object.assign(this, { radius: Math.min(width, height) / 2 - 24, x: width / 2, y: height / 2, largest: largest || 1 });
+    Object.assign(this, { radius: Math.min(width, height) / 2 - MARGIN_PX, x: width / 2, y: height / 2, largest: largest || 1 });
     this.note = `x to the right, y up, ${micro(rows.unit)}; the rings stay as they are while you try. Draw around points to choose rows.`;
   }
 
@@ -23,17 +27,24 @@ export class TargetView {
   }
 
   paint(context, rows, residual, marks, shown) {
-    this.dots.paint(context, marks, shown);
+    this.pixels.dots(context, marks, shown);
   }
 
-  frame(context) {
-    context.strokeStyle = ink("--rule");
-    context.fillStyle = ink("--soft");
-    for (const share of [0.25, 0.5, 0.75, 1]) {
+  frame(context, rows) {
+    const { x, y, radius } = this;
+    stroke(context, "--x", x - radius, y, x + radius, y);
+    stroke(context, "--y", x, y - radius, x, y + radius);
+    label(context);
+    for (const [value, text] of ticks(0, this.largest, MOST_RINGS).slice(1)) {
+      const ring = (value / this.largest) * radius;
+      context.strokeStyle = ink("--rule");
       context.beginPath();
-      context.arc(this.x, this.y, share * this.radius, 0, 7);
+      context.arc(x, y, ring, 0, 7);
       context.stroke();
-      context.fillText((share * this.largest).toFixed(2), this.x + 4, this.y - share * this.radius + 12);
+      context.fillText(`${text} ${micro(rows.unit)}`, x + 4, y - ring + 12);
     }
+    context.fillStyle = ink("--ink");
+    context.fillText(`x, ${micro(rows.unit)}`, x + radius + 6, y + 4);
+    context.fillText(`y, ${micro(rows.unit)}`, x - 14, y - radius - 8);
   }
 }
