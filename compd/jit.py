@@ -7,13 +7,17 @@ import hashlib
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache, wraps
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
 from numba import boolean, float64, guvectorize, int64, njit, types
 from numba.core import config as numba_config
+from numba.core.caching import CacheImpl
+
+from compd.kernel_target import choose_target, compiler_name
 
 Kernel: TypeAlias = Callable[..., Any]
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
@@ -22,6 +26,9 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 _guvectorize: Any = guvectorize
 _njit: Any = njit
 _config: Any = numba_config
+_CacheImpl: Any = CacheImpl
+
+_NOT_KEPT = "at every start, as NUMBA_CACHE_DIR cannot be written"
 
 # The types of a kernel's arguments: () and (n) are both one-dimensional inside, as gufuncs want outputs.
 SCALAR = float64
@@ -39,31 +46,41 @@ COUNT = int64
 FLAG = boolean
 
 
+# Where an installation has kernels that were compiled when it was built, below this directory.
+BUILT = "compiled_kernels"
+
+choose_target()
+
+
+def kernel_sources() -> list[Path]:
+    """The sources of all kernels and helpers: beside this file, below model/, and in two packages of live/."""
+    here = Path(__file__).parent
+    files = [here.glob("*.py"), (here / "model").rglob("*.py")]
+    files += [(here / "live" / package).glob("*.py") for package in ("machine", "memory")]
+    marks = (b"@helper", b"kernel(", b"@loop", b"structure(", b"_LIMIT = ")
+    return [file for file in sorted(chain.from_iterable(files)) if any(mark in file.read_bytes() for mark in marks)]
+
+
 @cache
 def kernel_digest() -> str:
     """Hash of the sources of all kernels and helpers, hexadecimal."""
-    here = Path(__file__).parent  # kernels and helpers are beside this file, and anywhere below model/
-    files = [*sorted(here.glob("*.py")), *sorted((here / "model").rglob("*.py"))]
-    texts = [file.read_bytes() for file in files]
-    compiled = [
-        text
-        for text in texts
-        if any(mark in text for mark in (b"@helper", b"kernel(", b"@loop", b"structure(", b"_LIMIT = "))
-    ]
-    return hashlib.sha256(b"".join(compiled)).hexdigest()[:12]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in kernel_sources())).hexdigest()[:12]
+
+
+def _directory_name() -> str:
+    return f"kernels-{kernel_digest()}-{compiler_name()}"
 
 
 def _cache_directory() -> str:
     """Where compiled code is kept; "" where nothing can be written: then every start compiles anew, in seconds.
 
-    numba knows compiled code as outdated by the kernel's own file alone. The digest makes a change in a helper or a
-    limit count as well: no machine runs last version's kernels.
+    Its name says from which sources the code was compiled, with what, and for what.
     """
     here = Path(__file__).parent
     user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "compd"
     places = [Path(_config.CACHE_DIR)] if _config.CACHE_DIR else [here / "__pycache__", user]
     for place in filter(Path.is_absolute, places):
-        directory = place / f"kernels-{kernel_digest()}"
+        directory = place / _directory_name()
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError:
@@ -76,33 +93,86 @@ def _cache_directory() -> str:
 CACHE_DIRECTORY = _cache_directory()
 
 
-@contextmanager
-def _kept() -> Iterator[None]:
-    """Within, numba keeps what it compiles in our directory; outside, where it always does.
+class KernelLocator:
+    """Tells numba's cache where the code of a function is, by names and contents: neither by paths nor by times.
 
-    One process at a time: numba stores a kernel and its wrapper one after the other, and a kernel of one process with
-    the wrapper of another crashes whoever loads them.
+    So it fits wherever the installation is copied to.
     """
-    if not CACHE_DIRECTORY:
-        yield
+
+    def __init__(self, directory: Path, function: Callable[..., Any]):
+        self._code, self._path = function.__code__, directory / function.__module__
+        name = f"{Path(self._code.co_filename).stem}.{function.__qualname__}".replace("<", "").replace(">", "")
+        self.index = self._path / f"{name}-{self._code.co_firstlineno}.py{sys.version_info[0]}{sys.version_info[1]}.nbi"
+
+    def from_function(self, function: Callable[..., Any], file: str) -> KernelLocator:
+        """numba asks so for a locator: this one, of the only function that is compiled meanwhile."""
+        return self
+
+    def get_cache_path(self) -> str:
+        """The directory of the function's module."""
+        return str(self._path)
+
+    def get_source_stamp(self) -> tuple[str, str]:
+        """What must be the same: all kernels and helpers, and the function's own file, which may be somebody else's."""
+        return kernel_digest(), hashlib.sha256(Path(self._code.co_filename).read_bytes()).hexdigest()
+
+    def get_disambiguator(self) -> str:
+        """What distinguishes functions of the same name in a file: their lines."""
+        return str(self._code.co_firstlineno)
+
+    def ensure_cache_path(self) -> None:
+        """Called before something is written."""
+        self._path.mkdir(parents=True, exist_ok=True)
+
+
+@contextmanager
+def _kept(function: Callable[..., Any]) -> Iterator[bool]:
+    """Within, numba takes the code of `function` from the installation or our directory, and keeps it there.
+
+    Gives whether it is kept at all. One process at a time compiles: numba stores a kernel and its wrapper one after the
+    other, and a kernel of one process with the wrapper of another crashes whoever loads them.
+    """
+    built = KernelLocator(Path(__file__).parent / BUILT / _directory_name(), function)
+    if built.index.is_file():
+        with _located(built):
+            yield True
         return
-    before = _config.CACHE_DIR
+    if not CACHE_DIRECTORY:
+        with _said(function):
+            yield False
+        return
     with (Path(CACHE_DIRECTORY) / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        _config.CACHE_DIR = CACHE_DIRECTORY
-        try:
-            yield
-        finally:
-            _config.CACHE_DIR = before
+        locator = KernelLocator(Path(CACHE_DIRECTORY), function)
+        with _located(locator), nullcontext() if locator.index.is_file() else _said(function):
+            yield True
+
+
+@contextmanager
+def _located(locator: KernelLocator) -> Iterator[None]:
+    before = _CacheImpl._locator_classes
+    _CacheImpl._locator_classes = [locator]
+    try:
+        yield
+    finally:
+        _CacheImpl._locator_classes = before
+
+
+@cache
+def _say_once() -> None:
+    """One line where nobody watches a terminal, as in a log."""
+    where = f"kept in {CACHE_DIRECTORY}" if CACHE_DIRECTORY else _NOT_KEPT
+    print(f"compd compiles kernels (1 to 2 min): none fit {compiler_name()}; {where}", file=sys.stderr, flush=True)
 
 
 @contextmanager
 def _said(function: Callable[..., Any]) -> Iterator[None]:
-    """Within, a line on the terminal that waits says that a kernel is compiled; none where the kernel is kept."""
-    if not sys.stderr.isatty() or _is_kept(function):
+    """Within, a line says that kernels are compiled; on a terminal it names this one, and is gone at the end."""
+    if not sys.stderr.isatty():
+        _say_once()
         yield
         return
-    how_often = "once, 1 to 2 min" if CACHE_DIRECTORY else "at every start, as NUMBA_CACHE_DIR cannot be written"
+    how_often = "once, 1 to 2 min" if CACHE_DIRECTORY else _NOT_KEPT
     text = f"compd compiles kernels ({how_often}): {function.__name__}"
     # overwritten by the next, and gone at the end; a line of 80 characters, since one that wraps would stay
     print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
@@ -110,12 +180,6 @@ def _said(function: Callable[..., Any]) -> Iterator[None]:
         yield
     finally:
         print("\r\033[K", end="", file=sys.stderr, flush=True)
-
-
-def _is_kept(function: Callable[..., Any]) -> bool:
-    """Whether numba has an index of the compiled code, which it names by module, function and line."""
-    name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-{function.__code__.co_firstlineno}"
-    return bool(CACHE_DIRECTORY) and any(Path(CACHE_DIRECTORY).glob(f"*/{name}.*.nbi"))
 
 
 def helper(function: FunctionT) -> FunctionT:
@@ -135,8 +199,8 @@ def kernel(arguments: list[Any], layout: str) -> Callable[[Callable[..., None]],
 
     def compile_(function: Callable[..., None]) -> Kernel:
         function = getattr(function, "py_func", function)
-        with _said(function), _kept():
-            compiled = _guvectorize([tuple(arguments)], layout, nopython=True, cache=bool(CACHE_DIRECTORY))(function)
+        with _kept(function) as kept:
+            compiled = _guvectorize([tuple(arguments)], layout, nopython=True, cache=kept)(function)
         return cast(Kernel, compiled.ufunc)  # the plain NumPy ufunc: numba's wrapper costs 0.4 us a call
 
     return compile_
@@ -160,8 +224,8 @@ def loop(arguments: list[Any]) -> Callable[[FunctionT], FunctionT]:
     """
 
     def compile_(function: FunctionT) -> FunctionT:
-        with _said(function), _kept():
-            compiled = njit([tuple(arguments)], error_model="numpy", cache=bool(CACHE_DIRECTORY))(function)
+        with _kept(function) as kept:
+            compiled = njit([tuple(arguments)], error_model="numpy", cache=kept)(function)
         if any(isinstance(argument, types.BaseTuple) for argument in arguments):
             return cast(FunctionT, _unchecked(function, compiled))
         return cast(FunctionT, compiled)

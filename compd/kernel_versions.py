@@ -6,12 +6,12 @@ import hashlib
 from collections.abc import Mapping
 from functools import cache
 
-import llvmlite
 import llvmlite.binding
 import numba
 import numpy as np
 
 from compd.jit import kernel_digest
+from compd.kernel_target import llvm_version, target_name
 from compd.release import __version__
 
 
@@ -20,15 +20,16 @@ def kernel_versions() -> Mapping[str, str]:
     """What the last bits of a result follow from, by name.
 
     kernels : hash of the source of the compiled kernels. numba, llvm, numpy : releases. processor : its name at LLVM,
-    and a hash of the instructions that it has.
+    and a hash of the instructions that it has. target : what the kernels are compiled for.
     """
     features = llvmlite.binding.get_host_cpu_features().flatten()
     return {
         "kernels": kernel_digest(),
         "numba": numba.__version__,
-        "llvm": ".".join(map(str, llvmlite.binding.llvm_version_info)),
+        "llvm": llvm_version(),
         "numpy": np.__version__,
         "processor": f"{llvmlite.binding.get_host_cpu_name()}-{hashlib.sha256(features.encode()).hexdigest()[:8]}",
+        "target": target_name(),
     }
 
 

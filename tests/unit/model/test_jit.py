@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import re
 import shutil
 import subprocess
 import sys
@@ -14,6 +15,9 @@ from pathlib import Path
 import pytest
 
 from compd import jit
+from compd.compile_kernels import kernel_modules
+from compd.kernel_target import LEVELS
+from tests.support.paths import ROOT
 
 
 @pytest.fixture
@@ -68,6 +72,60 @@ def test_a_directory_that_the_person_names_is_the_only_one(
     monkeypatch.setattr(jit._config, "CACHE_DIR", str(tmp_path / "named"))
     assert Path(jit._cache_directory()).parent == tmp_path / "named"
     assert str(tmp_path / "named") == jit._config.CACHE_DIR
+
+
+def test_every_module_with_a_kernel_is_among_those_compiled_when_a_wheel_is_built() -> None:
+    kernel = re.compile(r"^(@loop|@kernel|@helper|\w+ = kernel)\(?", re.MULTILINE)
+    files = [path.relative_to(ROOT) for path in (ROOT / "compd").rglob("*.py") if kernel.search(path.read_text())]
+    modules = {".".join(path.with_suffix("").parts).removesuffix(".__init__") for path in files}
+    assert len(modules) > 20
+    assert modules <= set(kernel_modules())
+
+
+_COMPUTE = """
+import sys
+import numpy as np
+from compd.rotation import compose, rotation_matrix, rotation_vector
+random = np.random.default_rng(1)
+R = rotation_matrix(random.normal(size=(1000, 3)))
+sys.stdout.buffer.write(R.tobytes() + rotation_vector(R).tobytes() + compose(R, R[::-1]).tobytes())
+"""
+
+
+def _computed(installation: Path, **environment: str) -> tuple[bytes, str]:
+    """What the rotations' kernels give in a new process of the installation, and what it says."""
+    inherited = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
+    done = subprocess.run(
+        [sys.executable, "-c", _COMPUTE],
+        env={**inherited, "PYTHONPATH": str(installation), **environment},
+        cwd=installation,
+        capture_output=True,
+        check=True,
+    )
+    return done.stdout, done.stderr.decode()
+
+
+@pytest.mark.parametrize("level", [*LEVELS])
+def test_built_kernels_run_elsewhere_and_give_what_a_new_compilation_gives(tmp_path: Path, level: str) -> None:
+    target = {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": ""}
+    here, there = tmp_path / "here", tmp_path / "there"
+    for place in (here, there):
+        shutil.copytree(ROOT / "compd", place / "compd", ignore=shutil.ignore_patterns("__pycache__"))
+    # times differ: they are those of the copies
+    for file in there.rglob("*.py"):
+        os.utime(file, (1e9, 1e9))
+    compiled, said = _computed(here, NUMBA_CACHE_DIR=str(there / "compd" / jit.BUILT), **target)
+    assert said.count("\n") == 1
+    assert re.match(rf"compd compiles kernels \(1 to 2 min\): none fit py.*-numba.*-llvm.*-{level}; kept in ", said)
+    unwritable = tmp_path / "file"
+    unwritable.write_text("")
+    assert _computed(there, NUMBA_CACHE_DIR=str(unwritable), **target) == (compiled, "")
+    # another change of the sources: nothing fits, and that is said
+    changed = there / "compd" / "linear.py"
+    changed.write_text(changed.read_text() + "# changed\n")
+    again, said = _computed(there, NUMBA_CACHE_DIR=str(tmp_path / "fresh"), **target)
+    assert again == compiled
+    assert said.startswith("compd compiles kernels")
 
 
 @pytest.mark.long

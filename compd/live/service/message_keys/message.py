@@ -40,7 +40,7 @@ class VersionKeys(SentMessage):
     computed_by: dict[str, str] | None = Field(
         default=None,
         description="what the last bits of a setpoint follow from, by name: `kernels` (hash of their source), `numba`, "
-        "`llvm`, `numpy`, `processor`; none of daemons up to 0.2.0",
+        "`llvm`, `numpy`, `processor`, `target` (what the kernels are compiled for); none of daemons up to 0.2.0",
     )
 
 
