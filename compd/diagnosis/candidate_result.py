@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.special import erfc
 
 from compd.diagnosis.candidates.plausibility import estimate_parameters, is_undetermined
 from compd.diagnosis.findings import CandidateResult, DiagnosisStep, ParameterEstimate, Status
 from compd.diagnosis.search.problem import DiagnosisProblem
 from compd.diagnosis.search.subset_losses import Subset, SubsetLosses
 from compd.diagnosis.undetermined import undetermined_text
-from compd.text import chance_text, number_text
+from compd.text import chance_text, estimate_text, number_text
 
 
 def candidate_results(
@@ -68,7 +69,8 @@ def _result_alone(
     theta, covariance = losses.estimates(subset.members)[0]
     links = problem.aligned.rows.links
     parameters = tuple(estimate_parameters(candidate.effect, links, theta, covariance, problem.criteria))
-    fraction = explained_fraction(losses.baseline, subset.cv_loss, 1.0 if problem.floor_known else 0.0)
+    floor = 1.0 if problem.floor_known else 0.0
+    fraction = explained_fraction(losses.baseline, subset.cv_loss, floor)
     rms_um = problem.unit_um * float(np.sqrt(max(subset.cv_loss, 0.0)))
     gain = losses.log_loss(losses.baseline) - losses.log_loss(subset.cv_loss)
     unit = problem.aligned.unit
@@ -77,10 +79,15 @@ def _result_alone(
         status, why = "explains", named
     elif gain >= losses.price(member) and (implausible := [p for p in parameters if not p.plausible]):
         status, why = "partial", f"only with implausible numbers: {_values(implausible[:3])}"
+    elif gain < losses.price(member) and (sure := _surest(losses, parameters)):
+        status, own_um = "too_small", problem.unit_um * float(np.sqrt(max(losses.baseline - subset.cv_loss, 0.0)))
+        why = f"{sure} from nought; it does {number_text(own_um, unit)}, too little for a name"
     elif is_undetermined(candidate.limits, np.sqrt(np.diag(covariance))):
         status, why = "not_testable", "its numbers stay less certain than their plausible ranges are wide"
         if combination := undetermined_text(problem, losses, member):
             why += f": {combination}"
+    elif gain < losses.price(member) and problem.is_at_floor(losses.baseline):
+        status, why = "no_gain", "only noise is left for it to explain"
     elif gain < losses.price(member):
         status, why = "no_gain", f"takes {100 * max(fraction, 0.0):.0f} % of the error away: not worth a name"
     elif steps:
@@ -88,8 +95,28 @@ def _result_alone(
     else:
         chance = f"noise alone does this {chance_text(p_value)}" if p_value > 0 else "that may be chance"
         others = "others or descriptions do better" if len(losses.candidates) > 1 and losses.describes else chance
-        status, why = "partial", f"leaves {number_text(rms_um, unit)}: {others}"
+        reason = "" if np.isnan(p_value) and others == chance else f": {others}"
+        status, why = "partial", f"leaves {number_text(rms_um, unit)}{reason}"
+    if status in ("no_gain", "too_small") and problem.is_at_floor(losses.baseline):
+        fraction = float("nan")
     return CandidateResult(candidate.name, status, why, rms_um, fraction, p_value, parameters)
+
+
+def _surest(losses: SubsetLosses, parameters: Sequence[ParameterEstimate]) -> str:
+    """The plausible parameter that is farthest from nought in standard errors; "" if noise makes one as far.
+
+    Each parameter of each candidate had its chance, whence the level is divided by their number (Bonferroni).
+    """
+    surest = max(parameters, key=_sigmas)
+    sigmas = _sigmas(surest)
+    tried = sum(values.shape[-1] for values in losses.values)
+    if not surest.plausible or tried * float(erfc(sigmas / np.sqrt(2.0))) > losses.criteria.p_value:
+        return ""
+    return f"{surest.name} = {estimate_text(surest.value, surest.std, surest.unit)}, {sigmas:.0f} standard errors"
+
+
+def _sigmas(parameter: ParameterEstimate) -> float:
+    return abs(parameter.value) / parameter.std if parameter.std > 0 else 0.0
 
 
 def _reason_of_explaining(name: str, separated_by: str, steps: Sequence[DiagnosisStep]) -> str | None:

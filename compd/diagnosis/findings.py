@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from compd.model.effects import Effect, FittedEffect, Parameter
 
-Status = Literal["explains", "partial", "no_gain", "not_testable"]
+Status = Literal["explains", "partial", "too_small", "no_gain", "not_testable"]
 
 
 @dataclass(frozen=True)
@@ -236,13 +236,15 @@ class CandidateResult:
     effect : str
         Its id.
     status : str
-        ``"explains"``, ``"partial"``, ``"no_gain"`` or ``"not_testable"``.
+        ``"explains"``, ``"partial"``, ``"too_small"``, ``"no_gain"`` or ``"not_testable"``. ``"too_small"``: its
+        numbers are surely not nought, and what it takes of the error is less than an effect has to take.
     why : str
         The reason for the status, in words.
     heldout_rms_um : float
         Error on rows that were left out, with the effect alone, um per coordinate.
     explained_fraction : float
-        Share of what is above the noise floor that it explains alone, 0 to 1.
+        Share of what is above the noise floor that it explains alone, 0 to 1; nan where the error is at the floor
+        already and the effect takes too little for a name: a share of noise means nothing.
     p_value : float
         Probability of so high a score by noise alone, corrected for all effects that were tried.
     parameters : tuple of ParameterEstimate

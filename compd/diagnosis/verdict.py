@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 Verdict = Literal["adequate", "identified", "likely", "ambiguous", "partial", "unexplained", "not_testable"]
 # Version of the words and keys of `Diagnosis.as_json`: 2 has the word `partial` and the key `constant`, 3 `likely`, 4
-# `probability`.
-VERDICT_VERSION = 4
+# `probability`, 5 the status `too_small`.
+VERDICT_VERSION = 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,6 +111,28 @@ class Diagnosis:
         """
         return self.probability_from.value
 
+    def doubt_of(self, effect: str) -> str:
+        """Why the recording does not support an effect, in the words of the verdict.
+
+        ``""`` where the effect is named, nothing does as well in its place, and the named set is probable enough.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        """
+        said = f"{self.verdict.replace('_', ' ')}: {self.summary}"
+        step = next((step for step in self.steps if step.effect.id == effect), None)
+        if step is None:
+            rival_of = [step.effect.id for step in self.steps if effect in [rival.name for rival in step.rivals]]
+            place = f"these rows cannot tell {effect} from {rival_of[0]}" if rival_of else f"{effect} is not named"
+            return f"{place}. {said}"
+        if step.rivals:
+            return f"these rows cannot tell {effect} from {step.rivals[0].name}. {said}"
+        if not all(parameter.plausible for parameter in step.parameters):
+            return f"{effect} needs an implausible number. {said}"
+        return "" if self.probability_from.confirms else f"{effect} may be something else. {said}"
+
     def to_dataframe(self) -> pd.DataFrame:
         """One row per effect of the library, as a pandas data frame.
 
@@ -119,7 +141,8 @@ class Diagnosis:
         pandas.DataFrame
             `effect`, its id; `found`, true where the diagnosis names it; `status`; `explained_fraction`, 0 to 1, and
             `heldout_rms_um`, um per coordinate, on rows that were left out, with the effect alone; `p_value`; `why`,
-            the reason for the status in words. nan where an effect could not be tried.
+            the reason for the status in words. nan where an effect could not be tried; also as the share where only
+            noise is left to explain.
 
         Raises
         ------

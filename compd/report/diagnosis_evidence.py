@@ -181,7 +181,7 @@ def candidates_table(diagnosis: Diagnosis, fall: ErrorFall) -> PageTable:
             result.why,
         )
         for result in diagnosis.candidates
-        if result.status in ("explains", "partial")
+        if result.status in ("explains", "partial", "too_small")
     ]
     return PageTable(("effect", "status", "explains", f"left, {fall.unit}", "why"), rows)
 

@@ -32,7 +32,7 @@ def evidence(diagnosis: Diagnosis) -> dict[str, Any]:
     plain: dict[str, Any] = nan_to_null(
         {
             "verdict": diagnosis.verdict,
-            "lines": summary_lines(diagnosis),
+            "lines": summary_lines(diagnosis, on_page=True),
             "effects": [_effect(number, diagnosis, fall) for number in range(len(diagnosis.steps))],
             "follows": _table(findings_table(diagnosis, fall)),
             "formulas": _formulas(diagnosis),

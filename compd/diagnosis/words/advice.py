@@ -21,8 +21,8 @@ NO_WORDS = FormulaDeclaration.model_fields["separated_by"].default
 MEASURE_TWICE = "measure one point twice (two rows with the same number in a `visit` column)"
 
 
-def advice(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
-    """Clauses, the most urgent first."""
+def advice(diagnosis: Diagnosis, fall: ErrorFall, on_page: bool = False) -> list[str]:
+    """Clauses, the most urgent first.  on_page : by the buttons of the page, not by command lines."""
     if any(fault.consequence == "mend the column" for fault in diagnosis.after.faults):
         return ["mend the column first, then diagnose again: all numbers here rest on it"]
     clauses = [] if fall.noise_known else [MEASURE_TWICE]
@@ -30,17 +30,17 @@ def advice(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
     clauses += [f"find out what changed from {moment}" for moment in changes[:1]]
     match diagnosis.verdict:
         case "identified" | "likely":
-            return [*clauses, *_how_to_add(diagnosis)]
+            return [*clauses, *_how_to_add(diagnosis, on_page)]
         case "ambiguous":
             still = "change nothing on the machine yet: what mends one does not mend its rival"
-            return [*clauses, still, *_how_to_tell(diagnosis)]
+            return [*clauses, still, *_how_to_tell(diagnosis, on_page)]
         case "partial":
             return [
                 *clauses,
                 *_what_to_state(diagnosis),
-                *_how_to_tell(diagnosis),
+                *_how_to_tell(diagnosis, on_page),
                 *_what_to_measure(diagnosis),
-                *_what_may_be_added(diagnosis),
+                *_what_may_be_added(diagnosis, on_page),
             ]
         case "adequate":
             constant = diagnosis.constant
@@ -67,27 +67,30 @@ def _what_to_state(diagnosis: Diagnosis) -> list[str]:
     return [f"if that can be, state it: {key}--range {asked.effect}.{asked.parameter.name}=LOW..HIGH"]
 
 
-def _how_to_add(diagnosis: Diagnosis) -> list[str]:
-    """The commands that add what was found, and try it elsewhere."""
+def _how_to_add(diagnosis: Diagnosis, on_page: bool) -> list[str]:
+    """The buttons or commands that add what was found, and try it elsewhere."""
     ids = [step.effect.id for step in diagnosis.steps]
     recording = diagnosis.before.aligned.recording.path.name
     first = ["measure on another day first"] if thermal_in_one_session(diagnosis) else []
+    if on_page:
+        return [*first, "add it: Add … below", "try it on another day's recording: open that with this model"]
     more = f", then {join_words(ids[1:])}" if len(ids) > 1 else ""
     add = f"add it: compd effect add {ids[0]} --recording {recording} --model FILE{more}"
     return [*first, add, "try it on another day's recording: compd compare OTHER.csv --model FILE"]
 
 
-def _what_may_be_added(diagnosis: Diagnosis) -> list[str]:
+def _what_may_be_added(diagnosis: Diagnosis, on_page: bool) -> list[str]:
     """Shares of the error may be corrected too, but for those that are something else in disguise."""
     doubtful = [step.effect.id for step in diagnosis.steps if not all(number.plausible for number in step.parameters)]
     if doubtful:
         return [f"do not add {join_words(doubtful)}: something else looks like it"]
     if any(step.rivals for step in diagnosis.steps):
         return []
-    return ["what was found may be added (compd effect add): it lowers the error, the rest stays"]
+    how = "Add … below" if on_page else "compd effect add"
+    return [f"what was found may be added ({how}): it lowers the error, the rest stays"]
 
 
-def _how_to_tell(diagnosis: Diagnosis) -> list[str]:
+def _how_to_tell(diagnosis: Diagnosis, on_page: bool) -> list[str]:
     """What tells the effects that have rivals from these: planned rows, else words."""
     first = next((step for step in diagnosis.steps if step.rivals), None)
     if first is None:
@@ -97,6 +100,8 @@ def _how_to_tell(diagnosis: Diagnosis) -> list[str]:
     words = next(iter(_in_words(diagnosis)), first.effect.separated_by)
     if words != NO_WORDS:
         return [f"to tell {first.effect.id}: {words}"]
+    if on_page:
+        return ["Plan the measurement that tells them apart says what to measure"]
     recording = diagnosis.before.aligned.recording.path.name
     names = ",".join([first.effect.id, *(rival.name for rival in first.rivals)])
     return [f"compd plan {recording} --rivals {names} says what tells them apart"]

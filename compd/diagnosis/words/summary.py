@@ -43,7 +43,9 @@ def _verdict(diagnosis: Diagnosis) -> str:
         case "adequate" if fall.noise_known:
             but = " but for a constant" if diagnosis.constant else ""
             own, nothing = number_text(fall.noise, fall.unit), f"Nothing is missing{shown_by(diagnosis)}{but}"
-            return f"{nothing}: the error of {before} is the measurement's own noise ({own})."
+            if diagnosis.before.at_floor:
+                return f"{nothing}: the error of {before} is the measurement's own noise ({own})."
+            return f"{nothing} that could be named: the error of {before} is so little above the noise ({own})."
         case "identified":
             them = "it" if len(diagnosis.steps) == 1 else "them"
             return f"What is missing is {names}: with {them} the error of {before} falls to {after}, {noise}."

@@ -50,8 +50,10 @@ WITH_LIMITS, CONTRADICTED = 2, 3
 CROWDED = 8
 
 
-def summary_lines(diagnosis: Diagnosis) -> list[str]:
+def summary_lines(diagnosis: Diagnosis, on_page: bool = False) -> list[str]:
     """The verdict in at most 12 lines of at most 80 columns.
+
+    on_page : advise by the buttons of the page, not by command lines.
 
     A heading, then lines with labels; a label that has nothing to say is left out. What has no room is in the evidence.
     """
@@ -71,7 +73,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         LabelledText("Sure", tuple(_sure(diagnosis))),
         LabelledText("Or else", tuple(_or_else(diagnosis))),
         LabelledText("Besides", tuple(_constant(diagnosis, fall))),
-        LabelledText("Next", tuple(advice(diagnosis, fall))),
+        LabelledText("Next", tuple(advice(diagnosis, fall, on_page))),
     ]
     others = [text for text in others if text.clauses]
     if len(others) >= CROWDED:

@@ -77,6 +77,13 @@ class Candidates:
         )
         return summary
 
+    @property
+    def is_noise(self) -> bool:
+        """Whether the error is at the noise floor, and no effect alone takes enough of it for a name."""
+        results = candidate_results(self.problem, self.losses, (), {})
+        may_be_named = any(result.status in ("explains", "partial") for result in results)
+        return self.problem.is_at_floor(self.losses.baseline) and not may_be_named
+
     def _rms(self, loss: float) -> float:
         """The error per coordinate at a loss, um."""
         return self.problem.unit_um * float(np.sqrt(max(loss, 0.0)))

@@ -11,7 +11,7 @@ from compd.errors import Problem, StateError
 from compd.model.effects import Effect
 from compd.model_changes import refit_model, remove_effect, undo_step
 from compd.model_file import EffectNumber, ModelFile, read_stored, write_stored
-from compd.page.workbench.opened_recording import OpenedRecording, model_of
+from compd.page.workbench.opened_recording import OpenedRecording, fall, model_of
 from compd.text import nan_to_null
 
 
@@ -55,7 +55,7 @@ def step_summary(before: OpenedRecording, after: OpenedRecording) -> dict[str, A
     old = {(number.effect, number.parameter): number.value for number in before.model.numbers()}
     summary: dict[str, Any] = nan_to_null(
         {
-            "rms": [before.comparison.rms_um, after.comparison.rms_um],
+            **fall(before.comparison, after.comparison),
             "floor_ratio": [before.comparison.floor_ratio, after.comparison.floor_ratio],
             "unit": after.aligned.unit,
             "verdict": after.comparison.verdict,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from compd.api import open_whole_or_sample
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray, IntArray, rms
 from compd.comparison import AlignedRecording, Comparison, compare
 from compd.configuration import Machine
 from compd.model_file import ModelFile, read_model_file
@@ -33,6 +33,7 @@ class OpenedRecording:
 
     path, model_path : of the recording and of the model file, which need not be there yet.
     aligned : its rows; of a recording that is too long for the memory a sample of its `recorded_rows`.
+    start : the comparison without any effect, from which the error falls.
     """
 
     path: Path
@@ -40,10 +41,13 @@ class OpenedRecording:
     aligned: AlignedRecording
     recorded_rows: int
     model: ModelFile
+    start: Comparison
 
     @cached_property
     def comparison(self) -> Comparison:
         """The comparison of the recording with the present model."""
+        if not self.model.fitted:
+            return self.start
         return compare(self.aligned, self.model.fitted, self.model.covariance)
 
     @cached_property
@@ -72,6 +76,7 @@ class OpenedRecording:
             "rows": len(self.aligned.rows),
             "recorded_rows": self.recorded_rows,
             "rms": comparison.rms_um,
+            "fall": fall(self.start, comparison),
             "floor": comparison.floor.um,
             "floor_known": comparison.floor.known,
             "floor_how": comparison.floor.how,
@@ -117,6 +122,8 @@ class OpenedRecording:
             "time_s": recording.elapsed_s,
             "place_mm": self.places_mm,
             "residual": comparison.residual_um,
+            "start": self.start.residual_um,
+            "start_used": self.start.used.astype(np.float64),
             "state": state,
             "session": session.astype(np.float64),
             **{f"quantity {name}": values for name, values in aligned.rows.quantities.items()},
@@ -141,6 +148,21 @@ def _axis_title(quantity: str) -> str:
     return f"{name}, {typeset(unit)}" if unit not in ("", "1") else name
 
 
+def fall(before: Comparison, after: Comparison) -> dict[str, Any]:
+    """The error of two states of the same recording, on the rows that count in both.
+
+    `rms` : before and after, um per coordinate.  `rows` : how many count in both.
+    `differ` : in words which rows count in one state alone; "" where both have the same.
+    """
+    both, lengths = before.used & after.used, before.aligned.lengths
+    lost, won = int((before.used & ~after.used).sum()), int((after.used & ~before.used).sum())
+    texts = [f"{lost} that counted before are left out after"] * bool(lost)
+    texts += [f"{won} that were left out before count after"] * bool(won)
+    differ = f"of the {both.sum()} rows that count in both; {' and '.join(texts)}" if texts else ""
+    errors_um = [rms(state.residual_um[both][:, lengths]) for state in (before, after)]
+    return {"rms": errors_um, "rows": int(both.sum()), "differ": differ}
+
+
 def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) -> OpenedRecording:
     """Open a recording and the model of its machine; a missing model file gives a new model.
 
@@ -148,7 +170,8 @@ def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) 
     Raises CompdError with every problem of either.
     """
     aligned, recorded_rows = open_whole_or_sample(path, machine)
-    return OpenedRecording(path, model_path, aligned, recorded_rows, model_of(model_path, aligned))
+    model = model_of(model_path, aligned)
+    return OpenedRecording(path, model_path, aligned, recorded_rows, model, compare(aligned, ()))
 
 
 def model_of(path: Path | None, aligned: AlignedRecording) -> ModelFile:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from compd.configuration import Machine
+from compd.diagnosis import Diagnosis, diagnose
 from compd.errors import CompdError, Problem, RecordingError, StateError
 from compd.files import file_stamp, write_files
 from compd.live.machine import ModelText
@@ -144,6 +145,7 @@ class Workbench:
         ]
         self.candidates = Candidates(self.opened.comparison, every)
         self.drafts = Drafts(self.opened.comparison, self.candidates)
+        self._diagnoses: dict[str, Diagnosis] = {}
 
     def use_libraries(self, libraries: Sequence[str]) -> None:
         """Also try the effects of these files, as with `--effects`. Raises CompdError for a faulty one."""
@@ -191,14 +193,36 @@ class Workbench:
         return self.opened.rows(all_rows=all_rows)
 
     def effects(self) -> dict[str, Any]:
-        """See `Candidates.summary`; `own` says which effects are not of the library."""
+        """See `Candidates.summary`; `own` says which effects are not of the library.
+
+        `noise` : the verdict in words where only noise is left; else "".
+        """
         summary = self.candidates.summary()
+        verdict = self._diagnosis("") if self.candidates.is_noise else None
         return {
             **summary,
+            "noise": verdict.summary if verdict is not None and verdict.verdict == "adequate" else "",
             "effects": [
                 {**effect, "own": effect["effect"] in self.sources.own.effects} for effect in summary["effects"]
             ],
         }
+
+    def _diagnosis(self, draft: str) -> Diagnosis:
+        """The diagnosis of the present rows and model, made once.  draft : an effect beside the others; "" for none."""
+        if draft not in self._diagnoses:
+            library = {**self.candidates.library}
+            if draft:
+                candidates, _ = self.drafts.find(draft)
+                library |= candidates.library
+            model = self.opened.model
+            effects = list(library.values())
+            self._diagnoses[draft] = diagnose(self.opened.aligned, model.fitted, model.covariance, effects)
+        return self._diagnoses[draft]
+
+    def _doubt_of(self, name: str) -> str:
+        """See `Diagnosis.doubt_of`.  name : as of `card`."""
+        candidates, effect = self.drafts.find(name)
+        return self._diagnosis("" if candidates is self.candidates else name).doubt_of(effect)
 
     def card(self, name: str) -> dict[str, Any]:
         """See `Candidates.card`; `named` is how a command line names the effect. name : an id, or that of a draft.
@@ -221,10 +245,20 @@ class Workbench:
         return self.trial(name, variant).pack(self.opened.pictured, {"revision": self.revision})
 
     def propose(self, kind: str, effect: str) -> dict[str, Any]:
-        """Preview of a step; no file is written. Raises CompdError for an impossible step."""
-        after = proposed(self.opened, kind, effect, {**self.candidates.library, **self.drafts.effects})
-        self._proposal = (kind, effect, after)
-        return step_summary(self.opened, after)
+        """Preview of a step; no file is written. Raises CompdError for an impossible step.
+
+        `warning` : why the rows do not support the effect that would be added, in the words of the verdict; else "".
+        """
+        after = self._proposed(kind, effect)
+        doubt = self._doubt_of(effect) if kind == "add" else ""
+        return {**step_summary(self.opened, after), "warning": doubt}
+
+    def _proposed(self, kind: str, effect: str) -> OpenedRecording:
+        """The recording after a step, which is fitted once."""
+        if self._proposal is None or self._proposal[:2] != (kind, effect):
+            after = proposed(self.opened, kind, effect, {**self.candidates.library, **self.drafts.effects})
+            self._proposal = (kind, effect, after)
+        return self._proposal[2]
 
     def make(self, kind: str, effect: str, revision: int) -> dict[str, Any]:
         """Make the proposed step, and write the model file; return the summary.
@@ -232,10 +266,7 @@ class Workbench:
         revision : that of which the browser knows. Raises StateError if somebody else was quicker.
         """
         self._check(revision)
-        if self._proposal is None or self._proposal[:2] != (kind, effect):
-            self.propose(kind, effect)
-        assert self._proposal is not None
-        after = self._proposal[2]
+        after = self._proposed(kind, effect)
         write(after)
         self._read = self._stamps()
         self._set(after)

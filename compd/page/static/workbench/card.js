@@ -12,11 +12,12 @@ const words = (effect) => effect.replaceAll("_", " ");
 export class Card {
   // plan: called with the effects that a measurement is to distinguish
   constructor(place, plan = null) {
-    Object.assign(this, { place, plan, theta: [], card: null, variant: 0 });
+    Object.assign(this, { place, plan, theta: [], card: null, variant: 0, last: null });
   }
 
   begin(bench) {
     this.bench = bench;
+    this.last = this.card && { asked: this.card.asked, theta: this.theta, variant: this.variant };
     this.card = null;
     this.place.replaceChildren(element("h2", {}, "Effect"), element("p", { class: "note" }, "Choose an effect on the left: its sliders come here, and the residual follows them."));
   }
@@ -30,10 +31,21 @@ export class Card {
       Object.assign(this, { card, variant: 0, theta: card.numbers.map(() => 0), trials: new Map() });
       this.show(bench.summary.commands.add.replace("EFFECT", () => card.named));
       if (!card.variants.length) return;
-      await this.turnTo(0);
+      await this.restore();
       // the other choices of its constants, so that they follow the slider, too
       for (let k = 1; k < card.variants.length && this.card === card; k++) await this.trial(k);
     });
+  }
+
+  // The numbers that were set before other rows or another model were shown; else all are nought.
+  async restore() {
+    const { card, last, theta } = this;
+    this.last = null;
+    const again = last?.asked === card.asked && last.theta.length === theta.length && last.variant < card.variants.length;
+    await this.turnTo(again ? last.variant : 0);
+    if (!again || this.card !== card || theta.some((value) => value !== 0)) return;
+    this.constant?.show(last.variant);
+    last.theta.forEach((value, k) => value !== 0 && this.set(k, value));
   }
 
   // Its trial with one choice of its constants; each is fetched once.
@@ -64,7 +76,8 @@ export class Card {
     this.signature = new Signature();
     this.proposal = new Proposal();
     this.sliders = variant ? card.numbers.map((number, k) => new NumberSlider(number, { theta: variant.theta[k], standard_error: variant.standard_error[k] }, (theta) => this.set(k, theta))) : [];
-    const constants = card.constants.length && card.variants.length > 1 ? [new ConstantSlider(card, 0, (variant) => this.bench.attempt(() => this.turnTo(variant))).row] : [];
+    this.constant = card.constants.length && card.variants.length > 1 ? new ConstantSlider(card, 0, (variant) => this.bench.attempt(() => this.turnTo(variant))) : null;
+    const constants = this.constant ? [this.constant.row] : [];
     this.place.replaceChildren(
       element("h2", {}, words(card.effect)),
       element("p", {}, card.physics),

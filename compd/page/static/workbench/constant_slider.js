@@ -10,9 +10,13 @@ export class ConstantSlider {
     this.order = card.variants.map((_, k) => k).sort((a, b) => card.variants[a].constants[name] - card.variants[b].constants[name]);
     const text = (k) => card.constants.map((constant) => `${constant.name} ${digits(card.variants[k].constants[constant.name] ?? NaN)} ${constant.unit === "1" ? "" : constant.unit}`.trim()).join(", ");
     const value = element("output", {}, text(variant));
+    this.show = (k) => {
+      this.input.value = this.order.indexOf(k);
+      value.textContent = text(k);
+    };
     this.input = element("input", { type: "range", min: 0, max: this.order.length - 1, step: 1, value: this.order.indexOf(variant), "aria-label": `Constants ${card.constants.map((constant) => constant.name).join(", ")}`, "data-constants": "", oninput: () => {
       const chosen = this.order[Number(this.input.value)];
-      value.textContent = text(chosen);
+      this.show(chosen);
       moved(chosen);
     } });
     this.row = element("div", { class: "number-row" }, element("div", { class: "head" }, element("b", {}, card.constants.map((constant) => constant.name).join(", ")), value), this.input, element("small", {}, `${this.order.length} choices; best here: ${text(0)}`));

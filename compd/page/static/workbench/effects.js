@@ -1,22 +1,26 @@
 // The effects of the library, the one that explains most first; chosen by mouse, or by j and k.
 import { element, micro } from "../format.js";
+import { units } from "./evidence.js";
 
 export class Effects {
   // choose: called with an effect; ranked: called with the server's ranking
   constructor(place, filter, note, { choose, ranked }) {
-    Object.assign(this, { place, filter, note, choose, ranked, effects: [], draft: null, chosen: "", remarks: {} });
+    Object.assign(this, { place, filter, note, choose, ranked, effects: [], draft: null, chosen: "", noise: "", remarks: {} });
     filter.addEventListener("input", () => this.draw());
   }
 
   async begin(bench) {
-    Object.assign(this, { effects: [], draft: null, chosen: "" });
+    const last = this.chosen;
+    Object.assign(this, { effects: [], draft: null, chosen: "", noise: "" });
     this.draw();
     this.note.textContent = "computing each effect …";
     this.unit = bench.summary.unit;
     const ranking = await bench.get("effects");
-    this.effects = ranking.effects;
+    Object.assign(this, { effects: ranking.effects, noise: ranking.noise });
     this.ranked(ranking);
     this.draw();
+    // what was chosen stays chosen while it is still offered
+    if (last && this.effects.some(({ effect }) => effect === last)) await this.pick(last);
   }
 
   // Mark the findings of a diagnosis; null for none.
@@ -61,27 +65,26 @@ export class Effects {
 
   draw() {
     const shown = this.shown;
-    this.note.textContent = `${shown.length} of ${this.all.length}; what each explains alone, on rows left out`;
+    this.note.textContent = this.noise || `${shown.length} of ${this.all.length}; what each explains alone, on rows left out`;
+    this.place.classList.toggle("noise-only", Boolean(this.noise));
     this.place.replaceChildren(...shown.map((effect) => this.row(effect)));
   }
 
   row({ effect, status, why, explained, left_out_rms, own, remark = this.remarks[effect] }) {
-    const percent = explained === null ? 0 : Math.round(100 * Math.max(0, Math.min(1, explained)));
+    const percent = explained === null || this.noise ? null : Math.round(100 * Math.max(0, Math.min(1, explained)));
     const bar = element("i");
-    bar.style.width = `${percent}%`;
+    bar.style.width = `${percent ?? 0}%`;
     return element(
       "button",
       { type: "button", class: "effect", role: "option", "aria-selected": String(effect === this.chosen), "data-effect": effect, title: why, onclick: () => this.pick(effect) },
-      element("span", { class: "name" }, element("b", {}, effect.split("@")[0].replaceAll("_", " "), ...(own ? [element("small", { class: "own" }, " own")] : [])), element("span", {}, status === "not_testable" ? "–" : `${percent} %`)),
-      element("div", { class: "share" }, bar),
+      element("span", { class: "name" }, element("b", {}, effect.split("@")[0].replaceAll("_", " "), ...(own ? [element("small", { class: "own" }, " own")] : [])), element("span", {}, percent === null ? "" : `${percent} %`)),
+      ...(percent === null ? [] : [element("div", { class: "share" }, bar)]),
       element("small", { class: remark ? "remark" : "" }, remark ?? this.left(status, why, left_out_rms)),
     );
   }
 
   // The error left by an effect, tried alone.
   left(status, why, rms) {
-    if (status === "not_testable") return why;
-    if (status === "no_gain") return "no gain";
-    return `alone, leaves ${rms.toFixed(2)} ${micro(this.unit)}`;
+    return status === "partial" || status === "explains" ? `alone, leaves ${rms.toFixed(2)} ${micro(this.unit)}` : units(why);
   }
 }

@@ -5,7 +5,7 @@ import { element, micro } from "../format.js";
 
 const plain = (name) => name.replaceAll("_", " ");
 // Units within a text.
-const units = (text) => String(text).replace(/(^|[\s/(])u(m|rad)\b/g, "$1µ$2").replaceAll("+-", "±").replaceAll("->", "→").replaceAll("degC", "°C");
+export const units = (text) => String(text).replace(/(^|[\s/(])u(m|rad)\b/g, "$1µ$2").replaceAll("+-", "±").replaceAll("->", "→").replaceAll("degC", "°C");
 
 // Advice names the buttons of this page for the commands of the terminal; the commands may be wrapped.
 const BUTTONS = [

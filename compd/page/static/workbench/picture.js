@@ -1,4 +1,5 @@
-// The residual of every drawn row, before and with the trial, on the same axes and scale.
+// The residual of every drawn row in two states on the same axes and scale: without any effect and now, or now and with
+// the trial.
 import { element, ink, prepared } from "../format.js";
 import { Turn } from "../orbit_control.js";
 import { AgainstView } from "./against_view.js";
@@ -13,7 +14,7 @@ const CHOSEN = "#e69f00";
 export class Picture {
   // selection: of rows, shared by all views of rows
   constructor({ canvas, tabs, against, note }, selection) {
-    Object.assign(this, { canvas, tabs, against, note, selection, rows: null, left: null, kind: "3D", views: {}, without: false });
+    Object.assign(this, { canvas, tabs, against, note, selection, rows: null, left: null, kind: "3D", views: {}, without: false, scales: new Map(), machine: "" });
     const draw = () => this.draw();
     this.lasso = new Lasso(canvas, { wanted: (event) => event.button === 0 && (event.shiftKey || this.kind !== "3D"), draw, around: (contains) => this.pick(contains) });
     this.turn = new Turn(canvas, draw);
@@ -38,11 +39,24 @@ export class Picture {
       ...Object.fromEntries(quantities.map((name) => [name.slice(9), new AgainstView(name, rows.quantity_titles[name])])),
     };
     this.tabbed = Object.keys(this.views).length - quantities.length;
-    this.largest = 0;
-    rows.residual.forEach((value, k) => {
-      if (this.used(Math.floor(k / rows.labels.length))) this.largest = Math.max(this.largest, Math.abs(value));
-    });
+    this.largest = this.scale(rows);
     this.choose(this.views[this.kind] ? this.kind : Object.keys(this.views)[0]);
+  }
+
+  // The largest residual that the pictures have room for: of the machine without any effect, on any of the recordings that
+  // were opened. No step of the model and no other day changes it.
+  scale(rows) {
+    const { machine, recording, ledger } = this.bench.summary;
+    const whose = `${machine} ${rows.unit} ${rows.labels.join()}`;
+    if (whose !== this.machine) this.scales.clear();
+    this.machine = whose;
+    let largest = 0;
+    rows.start.forEach((value, k) => {
+      if (rows.start_used[Math.floor(k / rows.labels.length)]) largest = Math.max(largest, Math.abs(value));
+    });
+    this.scales.set(recording, largest);
+    this.fallen = ledger.length > 0;
+    return Math.max(...this.scales.values());
   }
 
   choose(kind) {
@@ -86,6 +100,7 @@ export class Picture {
   }
 
   get shown() {
+    if (this.without && !this.left && this.fallen) return this.rows.start;
     return this.left && !this.without ? this.left : this.rows.residual;
   }
 
@@ -104,15 +119,18 @@ export class Picture {
     };
     const used = (row) => this.used(row);
     if (left) paint(rows.residual, BEFORE, used);
-    if (!left) paint(rows.residual, ink("--line"), used);
-    else if (!this.without) paint(left, ink("--bad"), used);
+    else if (this.fallen) paint(rows.start, BEFORE, (row) => rows.start_used[row] !== 0);
+    if (left && !this.without) paint(left, ink("--bad"), used);
+    else if (!left && !(this.fallen && this.without)) paint(rows.residual, ink("--line"), used);
     if (this.selection.rows.size) {
       context.lineWidth = 2;
       paint(this.shown, CHOSEN, (row) => this.used(row) && this.selection.rows.has(rows.row[row]));
       context.lineWidth = 1;
     }
     this.lasso.draw(context);
-    this.note.textContent = view.note;
+    const [before, after] = left ? ["now", "with the trial"] : ["without any effect", "with the model"];
+    const states = this.without ? `Only ${before} (x).` : `Grey: ${before}; coloured: ${after}.`;
+    this.note.textContent = left || this.fallen ? `${states} ${view.note}` : view.note;
   }
 
   // Rows whose mark is inside; all rows of a recording, even if thinned for the picture.

@@ -1,5 +1,7 @@
-// The large numbers on top: the error now and with the trial, on all rows and on rows left out, and the noise.
+// The large numbers on top: the fall of the error from the machine without any effect to the model and to the trial,
+// the error on rows left out, and the noise.
 import { element, micro } from "../format.js";
+import { units } from "./evidence.js";
 
 // Most quantities listed as followed by the residual.
 const MAX_TRENDS = 3;
@@ -18,22 +20,31 @@ export class Strip {
     this.left_out_rms = null;
     const { verdict, trends, rows, recorded_rows } = bench.summary;
     const sample = rows < recorded_rows ? [element("p", { class: "note", id: "sample" }, `Too long to be shown whole: everything here, also what is fitted, is of a sample of ${rows} of its ${recorded_rows} rows, spread evenly. The command lines go through all rows.`)] : [];
-    this.verdict.replaceChildren(element("p", {}, verdict), ...sample, ...(trends.length ? [element("p", { class: "note" }, `${trends.slice(0, MAX_TRENDS).join("; ")}.`)] : []));
+    this.said = element("p", {}, units(verdict));
+    this.verdict.replaceChildren(this.said, ...sample, ...(trends.length ? [element("p", { class: "note" }, `${trends.slice(0, MAX_TRENDS).join("; ")}.`)] : []));
     this.try();
   }
 
   // left_out_rms: error of the model on rows outside its fit
-  measured({ left_out_rms }) {
+  // noise: the verdict in words where only noise is left
+  measured({ left_out_rms, noise }) {
     this.left_out_rms = left_out_rms;
+    if (noise) this.said.textContent = units(noise);
     this.try();
   }
 
   try() {
     const { summary, tried_rms } = this.bench;
     if (!summary) return;
-    const { rms, floor, floor_known, unit, rows, used } = summary;
+    const { rms, fall, floor, floor_known, unit, rows, used, numbers } = summary;
+    const [start, now] = numbers.length ? fall.rms : [rms, rms];
+    const lowest = tried_rms ?? now;
     const big = (value, text, name = "") => element("div", { class: name }, element("b", {}, value === null || value === undefined ? "–" : `${value.toFixed(2)} ${micro(unit)}`), element("small", {}, text));
+    const path = [start, ...(numbers.length ? [now] : []), ...(tried_rms === null ? [] : [tried_rms])];
+    const text = `${path.map((value) => value?.toFixed(2) ?? "–").join(" → ")} ${micro(unit)}`;
+    const states = ["without effects", "with the model", "tried"].filter((_, k) => [true, numbers.length > 0, tried_rms !== null][k]).join(" → ");
     this.numbers.replaceChildren(
+      ...(path.length > 1 ? [element("div", { class: "fall" }, element("b", {}, text), element("small", {}, `${states}${numbers.length && fall.differ ? `; ${fall.differ}` : ""}`))] : []),
       big(rms, `error now, ${used} of ${rows} rows`, "now"),
       big(this.left_out_rms, "on rows left out", "held"),
       big(tried_rms, tried_rms === null ? "nothing is tried" : "tried, not kept", "tried"),
@@ -41,10 +52,10 @@ export class Strip {
     );
     const part = (name, value) => {
       const made = element("i", { class: name });
-      made.style.width = `${Math.min(100, (100 * value) / (rms || 1))}%`;
+      made.style.width = `${Math.min(100, (100 * value) / (start || 1))}%`;
       return made;
     };
-    this.bar.setAttribute("aria-label", `The error as a bar: ${rms.toFixed(2)} ${unit} now${tried_rms === null ? "" : `, ${tried_rms.toFixed(2)} with the trial`}, noise ${floor?.toFixed(2) ?? "not known"}`);
-    this.bar.replaceChildren(part("left", tried_rms ?? rms), part("noise", floor ?? 0));
+    this.bar.setAttribute("aria-label", `The error as a bar: ${start.toFixed(2)} ${micro(unit)} without effects, ${rms.toFixed(2)} now${tried_rms === null ? "" : `, ${tried_rms.toFixed(2)} with the trial`}, noise ${floor?.toFixed(2) ?? "not known"}`);
+    this.bar.replaceChildren(part("left", lowest), part("noise", floor ?? 0));
   }
 }

@@ -18,7 +18,7 @@ def test_it_is_plain_data_that_says_what_the_report_says(situation):
     diagnosis = situation()
     answer = json.loads(json.dumps(evidence(diagnosis), allow_nan=False))
     assert answer["verdict"] == diagnosis.verdict
-    assert answer["lines"] == summary_lines(diagnosis)
+    assert answer["lines"] == summary_lines(diagnosis, on_page=True)
     assert len(answer["lines"]) <= MAX_LINES
     for number, effect in enumerate(answer["effects"]):
         report = dict(step_rows(number, diagnosis, error_fall(diagnosis)))
