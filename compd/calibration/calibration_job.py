@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from compd.arrays import FloatArray, rms
+from compd.calibration.block_sets import block_sets
 from compd.calibration.calibration import CalibratedNumber, Calibration, GrossPose, TriedBlock
 from compd.calibration.held_out import PARTS, Fold, folds
 from compd.calibration.identifiability import held_combinations, length_scale_is_told
@@ -65,14 +66,16 @@ def calibrate(
     parts = folds(whole)
     untested = untested_blocks(model, whole)
     selection = select_blocks(whole, parts, frozenset(untested.blocks), said)
-    free = np.isin(parameters.block_of, selection.needed)
-    said("the needed numbers")
-    fit = fit_machine(poses, parameters, free, considered=whole.result.scale)
+    said("the numbers of the machine as built")
+    every = block_sets(parameters.blocks, parameters.block_of, whole.result.scale, list(untested.blocks))
+    sets = every.likely(whole.normal) if selection.needed else every.none
+    free = sets.free
+    fit = fit_machine(poses, parameters, free, sets)
+    fit = fit.about(every.averaged(fit.normal))
     drawn = fit_machine(poses, parameters, np.zeros_like(free))
-    fitted = parameters.split(fit.theta, fit.covariance, selection.needed)
-    order = np.concatenate(
-        [np.zeros(0, dtype=int), *(np.flatnonzero(parameters.block_of == b) for b in selection.needed)]
-    )
+    chosen_blocks = np.flatnonzero(sets.inside.any(axis=0)).tolist()
+    fitted = parameters.split(fit.theta, fit.covariance, chosen_blocks)
+    order = np.concatenate([np.zeros(0, dtype=int), *(np.flatnonzero(parameters.block_of == b) for b in chosen_blocks)])
     said("errors of held-out poses")
     held_out = tuple(
         errors_of_folds(what, fit, drawn, chosen)
@@ -86,7 +89,7 @@ def calibrate(
     return Calibration(
         machine=recordings[0].recording.machine,
         recordings=tuple(str(one.recording.path) for one in recordings),
-        numbers=_numbers(parameters, fit, prior),
+        numbers=_numbers(parameters, fit, selection, prior),
         covariance=_in_units(parameters, fit.covariance),
         fitted=fitted,
         fitted_covariance=fit.covariance[np.ix_(order, order)],
@@ -179,7 +182,9 @@ def _in_units(parameters: Parameters, covariance: FloatArray) -> FloatArray:
     return np.asarray(covariance * np.outer(parameters.per_theta, parameters.per_theta))
 
 
-def _numbers(parameters: Parameters, fit: MachineFit, prior: FloatArray) -> tuple[CalibratedNumber, ...]:
+def _numbers(
+    parameters: Parameters, fit: MachineFit, selection: Selection, prior: FloatArray
+) -> tuple[CalibratedNumber, ...]:
     """prior : (P,) standard deviations before, in tolerances."""
     std = np.sqrt(np.diag(fit.result.C))
     correlation = fit.result.C / np.outer(std, std)
@@ -187,6 +192,7 @@ def _numbers(parameters: Parameters, fit: MachineFit, prior: FloatArray) -> tupl
     correlation[:, ~fit.free] = 0.0
     value = fit.theta * parameters.per_theta
     unit = parameters.prior_std * parameters.per_theta
+    needed = np.isin(parameters.block_of, selection.needed)
     numbers = []
     for k, name in enumerate(parameters.names):
         other = int(np.abs(correlation[k]).argmax())
@@ -203,8 +209,8 @@ def _numbers(parameters: Parameters, fit: MachineFit, prior: FloatArray) -> tupl
                 prior_std=float(prior[k] * unit[k]),
                 correlation=size,
                 with_whom=parameters.elements[other] if size else "",
-                needed=bool(fit.free[k]),
-                held=bool(std[k] > _TOLD_SHARE * prior[k]),
+                needed=bool(needed[k]),
+                held=bool(not fit.free[k] or std[k] > _TOLD_SHARE * prior[k]),
             )
         )
     return tuple(numbers)
