@@ -1,10 +1,9 @@
 """The numbers of a machine averaged over which of its blocks are off at all.
 
-What a drawing states is seldom all wrong: a machine whose joints were drilled elsewhere may have scales as drawn. To fit
-every block costs precision where some are as drawn, to drop what is needed little costs it where all are off. So each
-set s of blocks is fitted, its numbers with their tolerances as prior and the others at the drawing, and the results are
-averaged with the probability of the set given the poses (Hoeting, Madigan, Raftery, Volinsky, Statist. Sci. 14 (1999)
-382):
+A machine whose joints were drilled elsewhere may have scales as drawn. To fit every block costs precision there; to
+drop each that seems of little use costs it where all are off. So each set s of blocks is fitted, its numbers with their
+tolerances as prior and the others at the drawing, and the results are averaged with the probability of the set given
+the poses (Hoeting, Madigan, Raftery, Volinsky, Statist. Sci. 14 (1999) 382):
 
     p_s ~ prior_s evidence_s,  ln evidence_s = (b_s^T C_s b_s + ln |C_s| - ln |S_s|) / 2,
 
@@ -33,8 +32,8 @@ class BlockSets(NamedTuple):
     """Sets of blocks that may be off, beside the others as drawn.
 
     inside : (K, B).  log_prior : (K,).  scale : (B,) of the tolerances.  block_of : (P,) of the numbers.
-    refused : (B,) blocks that these poses cannot test: in no set. Their tolerance counts in the covariance, by what their
-    error would do to the numbers that are fitted (S. F. Schmidt, Adv. Control Systems 3 (1966) 293).
+    refused : (B,) blocks that these poses cannot test: in no set. Their tolerance counts in the covariance, by what
+    their error would do to the numbers that are fitted (S. F. Schmidt, Adv. Control Systems 3 (1966) 293).
     """
 
     inside: BoolArray

@@ -65,10 +65,12 @@ def calibrate(
     whole = fit_machine(poses, parameters, everything)
     parts = folds(whole)
     untested = untested_blocks(model, whole)
-    selection = select_blocks(whole, parts, frozenset(untested.blocks), said)
-    said("the numbers of the machine as built")
     every = block_sets(parameters.blocks, parameters.block_of, whole.result.scale, list(untested.blocks))
-    sets = every.likely(whole.normal) if selection.needed else every.none
+    sets = every.likely(whole.normal)
+    as_drawn = np.flatnonzero(~sets.inside.any(axis=0)).tolist()
+    selection = select_blocks(whole, parts, frozenset(as_drawn), said)
+    said("the numbers of the machine as built")
+    sets = sets if selection.needed else every.none
     free = sets.free
     fit = fit_machine(poses, parameters, free, sets)
     fit = fit.about(every.averaged(fit.normal))
@@ -93,7 +95,7 @@ def calibrate(
         covariance=_in_units(parameters, fit.covariance),
         fitted=fitted,
         fitted_covariance=fit.covariance[np.ix_(order, order)],
-        blocks=_blocks(parameters, selection, untested.blocks),
+        blocks=_blocks(parameters, selection, untested.blocks, as_drawn),
         learned=tuple(
             errors_alone(one.aligned.recording.path.name, one, fitted, out)
             for one, out in zip(poses, fit.outlier, strict=True)
@@ -216,12 +218,17 @@ def _numbers(
     return tuple(numbers)
 
 
-def _blocks(parameters: Parameters, selection: Selection, untested: dict[int, str]) -> tuple[TriedBlock, ...]:
+def _blocks(
+    parameters: Parameters, selection: Selection, untested: dict[int, str], as_drawn: list[int]
+) -> tuple[TriedBlock, ...]:
     tried = []
     for b, block in enumerate(parameters.blocks):
         without, with_it = (rms(np.sqrt(list(one[b]))) for one in (selection.without, selection.with_it))
         needed = b in selection.needed
-        why = "held-out poses are predicted worse without" if needed else "held-out poses are predicted as well without"
+        why = "the poses show it as drawn"
+        if b not in as_drawn:
+            how = "worse" if needed else "as well"
+            why = f"held-out poses are predicted {how} without"
         tried.append(TriedBlock(block.effect.id, block.words, needed, without, with_it, untested.get(b, why)))
     return tuple(tried)
 
