@@ -24,8 +24,9 @@ class CalibratedNumber(NamedTuple):
     drawing states as perfect, a zero, a gain or a direction's error.  std : posterior, with the tolerance as prior.
     prior_std : before any pose was measured, of the tolerance.
     correlation, with_whom : the largest with another number of the fit, and that one's element; 0 and "" without one.
-    needed : whether held-out poses are predicted better with its block; the number is the drawing's where it is not.
-    held : whether the poses tell it less than twice as well as the tolerance does; it may have moved with others.
+    needed : whether held-out poses are predicted better with its block.
+    held : whether it is the drawing's, or the poses tell it less than twice as well as the tolerance does: it may have
+    moved with others.
     """
 
     name: str
@@ -48,8 +49,8 @@ class CalibratedNumber(NamedTuple):
 
     @property
     def claimed(self) -> bool:
-        """Whether the calibration states this number: its block is needed, and the poses tell it."""
-        return self.needed and not self.held
+        """Whether the calibration states this number: the poses tell it."""
+        return not self.held
 
 
 class PoseErrors(NamedTuple):
@@ -182,9 +183,10 @@ class Calibration:
     numbers : tuple of CalibratedNumber
         P numbers, of needed and of other blocks, in the order of the blocks and of `covariance`.
     covariance : (P, P) array
-        Of the values, in their units; of what is not needed that of the drawing's tolerance.
+        Of the values, in their units: the mean square of their errors.
     fitted : tuple of FittedEffect
-        The needed blocks as effects of a model, from which predictions follow; each with its covariance.
+        The blocks of the machine as built as effects of a model, from which predictions follow; each with its
+        covariance: all that the drawing states and poses can test, and needed ones.
     fitted_covariance : (Q, Q) array
         Of their parameters jointly, in the order of `fitted`.
     blocks : tuple of TriedBlock

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from compd.arrays import FloatArray, rms
+from compd.calibration.block_sets import block_sets
 from compd.calibration.calibration import CalibratedNumber, Calibration, GrossPose, TriedBlock
 from compd.calibration.held_out import FEWEST_ROWS, PARTS, Fold, folds
 from compd.calibration.identifiability import held_combinations, length_scale_is_told
@@ -65,15 +66,19 @@ def calibrate(
     whole = fit_machine(poses, parameters, everything)
     parts = folds(whole)
     untested = untested_blocks(model, whole)
-    selection = select_blocks(whole, parts, frozenset(untested.blocks), said)
-    free = np.isin(parameters.block_of, selection.needed)
-    said("the needed numbers")
-    fit = fit_machine(poses, parameters, free, considered=whole.result.scale)
+    every = block_sets(parameters.blocks, parameters.block_of, whole.result.scale, list(untested.blocks))
+    sets = every.likely(whole.normal)
+    as_drawn = np.flatnonzero(~sets.inside.any(axis=0)).tolist()
+    selection = select_blocks(whole, parts, frozenset(as_drawn), said)
+    said("the numbers of the machine as built")
+    sets = sets if selection.needed else every.none
+    free = sets.free
+    fit = fit_machine(poses, parameters, free, sets)
+    fit = fit.about(every.averaged(fit.normal))
     drawn = fit_machine(poses, parameters, np.zeros_like(free))
-    fitted = parameters.split(fit.theta, fit.covariance, selection.needed)
-    order = np.concatenate(
-        [np.zeros(0, dtype=int), *(np.flatnonzero(parameters.block_of == b) for b in selection.needed)]
-    )
+    chosen_blocks = np.flatnonzero(sets.inside.any(axis=0)).tolist()
+    fitted = parameters.split(fit.theta, fit.covariance, chosen_blocks)
+    order = np.concatenate([np.zeros(0, dtype=int), *(np.flatnonzero(parameters.block_of == b) for b in chosen_blocks)])
     said("errors of held-out poses")
     held_out = tuple(
         errors_of_folds(what, fit, drawn, chosen)
@@ -89,11 +94,11 @@ def calibrate(
     return Calibration(
         machine=recordings[0].recording.machine,
         recordings=tuple(str(one.recording.path) for one in recordings),
-        numbers=_numbers(parameters, fit, prior),
+        numbers=_numbers(parameters, fit, selection, prior),
         covariance=_in_units(parameters, fit.covariance),
         fitted=fitted,
         fitted_covariance=fit.covariance[np.ix_(order, order)],
-        blocks=_blocks(parameters, selection, untested.blocks),
+        blocks=_blocks(parameters, selection, untested.blocks, as_drawn),
         learned=tuple(
             errors_alone(one.aligned.recording.path.name, one, fitted, out)
             for one, out in zip(poses, fit.outlier, strict=True)
@@ -183,7 +188,9 @@ def _in_units(parameters: Parameters, covariance: FloatArray) -> FloatArray:
     return np.asarray(covariance * np.outer(parameters.per_theta, parameters.per_theta))
 
 
-def _numbers(parameters: Parameters, fit: MachineFit, prior: FloatArray) -> tuple[CalibratedNumber, ...]:
+def _numbers(
+    parameters: Parameters, fit: MachineFit, selection: Selection, prior: FloatArray
+) -> tuple[CalibratedNumber, ...]:
     """prior : (P,) standard deviations before, in tolerances."""
     std = np.sqrt(np.diag(fit.result.C))
     correlation = fit.result.C / np.outer(std, std)
@@ -191,6 +198,7 @@ def _numbers(parameters: Parameters, fit: MachineFit, prior: FloatArray) -> tupl
     correlation[:, ~fit.free] = 0.0
     value = fit.theta * parameters.per_theta
     unit = parameters.prior_std * parameters.per_theta
+    needed = np.isin(parameters.block_of, selection.needed)
     numbers = []
     for k, name in enumerate(parameters.names):
         other = int(np.abs(correlation[k]).argmax())
@@ -207,19 +215,24 @@ def _numbers(parameters: Parameters, fit: MachineFit, prior: FloatArray) -> tupl
                 prior_std=float(prior[k] * unit[k]),
                 correlation=size,
                 with_whom=parameters.elements[other] if size else "",
-                needed=bool(fit.free[k]),
-                held=bool(std[k] > _TOLD_SHARE * prior[k]),
+                needed=bool(needed[k]),
+                held=bool(not fit.free[k] or std[k] > _TOLD_SHARE * prior[k]),
             )
         )
     return tuple(numbers)
 
 
-def _blocks(parameters: Parameters, selection: Selection, untested: dict[int, str]) -> tuple[TriedBlock, ...]:
+def _blocks(
+    parameters: Parameters, selection: Selection, untested: dict[int, str], as_drawn: list[int]
+) -> tuple[TriedBlock, ...]:
     tried = []
     for b, block in enumerate(parameters.blocks):
         without, with_it = (rms(np.sqrt(list(one[b]))) for one in (selection.without, selection.with_it))
         needed = b in selection.needed
-        why = "held-out poses are predicted worse without" if needed else "held-out poses are predicted as well without"
+        why = "the poses show it as drawn"
+        if b not in as_drawn:
+            how = "worse" if needed else "as well"
+            why = f"held-out poses are predicted {how} without"
         tried.append(TriedBlock(block.effect.id, block.words, needed, without, with_it, untested.get(b, why)))
     return tuple(tried)
 

@@ -47,7 +47,7 @@ def held_combinations(
     registered: bool,
 ) -> tuple[HeldCombination, ...]:
     """C : (P, P) after the poses, prior : (P,) standard deviations before, both in tolerances. free : (P,) numbers of
-    needed blocks.  registered : whether an instrument's frame was fitted along."""
+    blocks of the machine as built.  registered : whether an instrument's frame was fitted along."""
     place = np.flatnonzero(free)
     if not len(place):
         return ()

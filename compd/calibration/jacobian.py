@@ -122,7 +122,7 @@ def scaled_jacobian(
 
 def without(A: FloatArray, R: FloatArray) -> FloatArray:
     """A (n, P) less what the columns of R (n, Q) can make of it."""
-    if not R.shape[1]:
+    if not R.size:
         return A
     U, sizes, _ = np.linalg.svd(R / column_norms(R), full_matrices=False)
     U = U[:, sizes > _IDLE * sizes[0]]

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, rms
+from compd.calibration.block_sets import BlockSets
 from compd.calibration.parameters import Parameters
 from compd.calibration.poses import MeasuredPoses, PosesNow, links_of_pose
 from compd.calibration.prior_fit import Normal, PriorFit, Whitened, fit_with_prior, normal_equations
@@ -40,6 +41,7 @@ class MachineFit:
 
     now : (K) what is left of each.  linear : (K) the linear problem about the result, in which z has what the numbers
     explain.  result : numbers and covariance in tolerances.  outlier : (K) of (N,).  sigma_mm : (K) of (m,).
+    sets : of blocks, over which the numbers are averaged; None where all that are free are fitted.
     """
 
     parameters: Parameters
@@ -49,6 +51,7 @@ class MachineFit:
     outlier: tuple[BoolArray, ...]
     sigma_mm: tuple[FloatArray, ...]
     free: BoolArray
+    sets: BlockSets | None = None
 
     @property
     def theta(self) -> FloatArray:
@@ -61,6 +64,11 @@ class MachineFit:
         prior = self.parameters.prior_std
         return np.asarray(self.result.C * np.outer(prior, prior))
 
+    def about(self, joint: PriorFit) -> MachineFit:
+        """The same numbers, their covariance the mean square of their errors by an average over more sets."""
+        off = joint.x - self.result.x
+        return replace(self, result=self.result._replace(C=joint.C + np.outer(off, off)))
+
     @property
     def normal(self) -> Normal:
         """The linear problem of all numbers."""
@@ -71,13 +79,13 @@ def fit_machine(
     recordings: Sequence[MeasuredPoses],
     parameters: Parameters,
     free: BoolArray,
-    considered: FloatArray | None = None,
+    sets: BlockSets | None = None,
     outlier: Sequence[BoolArray] | None = None,
     start: MachineFit | None = None,
 ) -> MachineFit:
     """The numbers `free` (P,) of the parameters, the others as drawn.
 
-    considered : as of `fit_with_prior`.  outlier : of each recording the rows to leave out; None to find them.
+    sets : to average over.  outlier : of each recording the rows to leave out; None to find them.
     start : a fit of the same recordings, whose numbers to begin with and whose noise to keep.
     """
     count = len(parameters.names)
@@ -93,7 +101,8 @@ def fit_machine(
         if start is None:
             sigmas = [_sigma_mm(one, use, numbers) for one, use in zip(now, rows, strict=True)]
         linear = [_whitened(one, use, sigma, result.x) for one, use, sigma in zip(now, rows, sigmas, strict=True)]
-        new = fit_with_prior(normal_equations(linear), parameters.block_of, free, considered)
+        normal = normal_equations(linear)
+        new = fit_with_prior(normal, parameters.block_of, free) if sets is None else sets.averaged(normal)
         change = float(np.abs(new.x - result.x).max(initial=0.0))
         result = new
         found = out
@@ -106,7 +115,7 @@ def fit_machine(
         out = found
         if change < _SETTLED and same:
             break
-    return MachineFit(parameters, tuple(now), tuple(linear), result, tuple(out), tuple(sigmas), free)
+    return MachineFit(parameters, tuple(now), tuple(linear), result, tuple(out), tuple(sigmas), free, sets)
 
 
 def _outliers(now: PosesNow, left: FloatArray) -> BoolArray:

@@ -33,6 +33,8 @@ WORDS: Mapping[str, str] = {
     "tool_offset": "the place of the tip",
     "scale_gain_change": "gains that change with the reading",
 }
+# Effects of another form than a drawing's: its numbers and their tolerance say nothing of them.
+NOT_DRAWN = frozenset({"scale_gain_change"})
 
 
 class Block(NamedTuple):
@@ -48,6 +50,11 @@ class Block(NamedTuple):
     def words(self) -> str:
         """What it is, in a report."""
         return WORDS.get(self.effect.id, self.effect.id)
+
+    @property
+    def drawn(self) -> bool:
+        """Whether a drawing states these numbers, as places or lengths or as perfect, with a tolerance."""
+        return self.effect.id not in NOT_DRAWN
 
     def fitted(self, theta: FloatArray, covariance: FloatArray) -> FittedEffect:
         """The effect with the numbers in use (U,) and their covariance (U, U), the others 0 and known."""

@@ -31,7 +31,7 @@ def errors_of_folds(what: str, fit: MachineFit, drawn: MachineFit, folds: Sequen
     recordings = [now.poses for now in fit.now]
     for fold in folds:
         learned = [out | left for out, left in zip(fit.outlier, fold.left_out, strict=True)]
-        after = fit_machine(recordings, fit.parameters, fit.free, outlier=learned, start=fit)
+        after = fit_machine(recordings, fit.parameters, fit.free, fit.sets, learned, start=fit)
         before = fit_machine([now.poses for now in drawn.now], fit.parameters, drawn.free, outlier=learned, start=drawn)
         for k, left in enumerate(fold.left_out):
             test = left & ~fit.outlier[k] & before.now[k].use & after.now[k].use

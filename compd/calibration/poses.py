@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import BoolArray, FloatArray, rms
 from compd.calibration.jacobian import measured_columns, moved_to
 from compd.calibration.parameters import Parameters
 from compd.comparison import AlignedRecording, aligned_with
 from compd.display_unit import MM_PER_RAD
-from compd.model import effect_deltas, predict, sum_deltas
+from compd.model import Prediction, effect_deltas, predict, sum_deltas
 from compd.model.effects import FittedEffect
+from compd.statistics import trimmed_scale
+
+# By how many times the scatter of the measured attitudes the predicted ones must vary, rms, to show a target's place:
+# the place times that scatter is then less than the noise of a position.
+_SHOWN_TIMES = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +50,7 @@ class MeasuredPoses:
         assert model is not None
         added = sum_deltas([effect_deltas(one, aligned.rows)[0] for one in fitted])
         prediction = predict(model, aligned.rows, added)
-        aligned = aligned_with(aligned, prediction)
+        aligned = _with_shown_place(aligned_with(aligned, prediction), prediction)
         residual_mm = aligned.measured_mm - aligned.predicted_mm(added)
         registration_mm = aligned.registration_columns
         columns_mm = self.columns_mm
@@ -78,6 +83,22 @@ class PosesNow:
         if T is None:
             return residual_mm, self.registration_mm, self.columns_mm
         return (T @ residual_mm[:, :, None])[:, :, 0], T @ self.registration_mm, T @ self.columns_mm
+
+
+def _with_shown_place(aligned: AlignedRecording, prediction: Prediction) -> AlignedRecording:
+    """The recording with the place of its target wherever the tilts of the prediction show it beyond their error.
+
+    A machine whose platform only shifts tilts by its errors: a target 30 mm from the tip then moves by 20 um, which
+    would count as errors of the tip.
+    """
+    if not aligned.with_attitude or aligned.target is None or aligned.target.directions_P.shape[1] == 3:
+        return aligned
+    left_mm = aligned.measured_mm[aligned.usable.mask, -3:]
+    motion = _SHOWN_TIMES * rms(trimmed_scale(left_mm)) / MM_PER_RAD
+    if motion >= aligned.criteria.min_target_motion:
+        return aligned
+    finer = replace(aligned, criteria=replace(aligned.criteria, min_target_motion=motion))
+    return replace(aligned_with(finer, prediction), criteria=aligned.criteria)
 
 
 def links_of_pose(aligned: AlignedRecording) -> FloatArray | None:

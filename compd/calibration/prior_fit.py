@@ -58,8 +58,7 @@ class Normal(NamedTuple):
 
 class PriorFit(NamedTuple):
     """x : (P,) in tolerances, 0 of numbers that are not free.  scale : (B,) of each block's tolerance.
-    C : (P, P) covariance in tolerances; that of numbers that are not free is their prior's, and what it does to the
-    others is in theirs (S. F. Schmidt, Adv. Control Systems 3 (1966) 293).
+    C : (P, P) covariance in tolerances, 0 of numbers that are not free.
     """
 
     x: FloatArray
@@ -79,20 +78,13 @@ def normal_equations(parts: Sequence[Whitened]) -> Normal:
     return Normal(A, b)
 
 
-def fit_with_prior(
-    normal: Normal, block_of: IntArray, free: BoolArray, considered: FloatArray | None = None
-) -> PriorFit:
-    """The numbers `free` (P,) of blocks `block_of` (P,), the others at the drawing.
-
-    considered : (B,) scale of the tolerances of blocks that are not free, whose errors the covariance holds; 0 where
-        None.
-    """
+def fit_with_prior(normal: Normal, block_of: IntArray, free: BoolArray) -> PriorFit:
+    """The numbers `free` (P,) of blocks `block_of` (P,), the others at the drawing and known."""
     blocks = int(block_of.max()) + 1
-    scale = np.ones(blocks) if considered is None else considered.copy()
+    scale = np.ones(blocks)
     of_free = block_of[free]
     A, b = normal.A[np.ix_(free, free)], normal.b[free]
     present = np.unique(of_free)
-    scale[present] = 1.0
     count = np.bincount(of_free, minlength=blocks)
     for _ in range(_ROUNDS if len(present) else 0):
         C = _inverse(A + np.diag(1.0 / scale[of_free] ** 2))
@@ -107,16 +99,7 @@ def fit_with_prior(
     x = np.zeros(len(block_of))
     x[free] = C @ b
     whole = np.zeros((len(x), len(x)))
-    rest = ~free
-    if considered is None:
-        whole[np.ix_(free, free)] = C
-        return PriorFit(x, scale, whole)
-    prior = scale[block_of[rest]] ** 2
-    moved = C @ normal.A[np.ix_(free, rest)]
-    whole[np.ix_(free, free)] = C + (moved * prior) @ moved.T
-    whole[np.ix_(rest, rest)] = np.diag(prior)
-    whole[np.ix_(free, rest)] = -moved * prior
-    whole[np.ix_(rest, free)] = whole[np.ix_(free, rest)].T
+    whole[np.ix_(free, free)] = C
     return PriorFit(x, scale, whole)
 
 

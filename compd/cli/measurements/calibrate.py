@@ -124,7 +124,7 @@ def _print(console: Console, calibration: Calibration) -> None:
     console.print(blocks)
     numbers = Table("number", "drawing", "as built", "standard error", "unit", "")
     for number in calibration.numbers:
-        if number.needed:
+        if number.needed or number.claimed:
             held = "held: told less than twice as well as by the tolerance" if number.held else ""
             digits = f"{number.value:.5g}" if number.unit != "mm" else f"{number.value:.4f}"
             numbers.add_row(number.element, f"{number.drawing:.6g}", digits, f"{number.std:.2g}", number.unit, held)

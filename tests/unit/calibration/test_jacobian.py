@@ -52,3 +52,7 @@ def test_derivatives_of_poses_are_those_of_recordings(tmp_path: Path) -> None:
     columns = pose_columns(recording.model, recording.rows, parameters)
     columns[:, 3:] *= 1e3  # a urad as a um
     np.testing.assert_allclose(MeasuredPoses.of(recording, parameters).columns_mm, columns, atol=1e-12)
+
+
+def test_of_no_rows_nothing_is_projected_out() -> None:
+    assert without(np.zeros((0, 1)), np.zeros((0, 3))).shape == (0, 1)
