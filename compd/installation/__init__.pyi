@@ -1,5 +1,5 @@
-from .install_steps import install_problems as install_problems
-from .install_steps import install_steps as install_steps
+from .installing import install_problems as install_problems
+from .installing import install_steps as install_steps
 from .replacement import Replacement as Replacement
 from .replacement import go_back as go_back
 from .replacement import upgrade as upgrade

@@ -12,7 +12,7 @@ from compd.client import Message, connect
 from compd.clock import Clock, MonotonicClock
 from compd.errors import CompdError, DaemonError, Problem
 from compd.files import write_files
-from compd.installation.install_steps import DAEMON, PAGE, check_step, unit_path
+from compd.installation.installing import DAEMON, PAGE, check_step, unit_path
 from compd.installation.shipped_units import program_problems, shipped_file
 from compd.installation.step import Step
 from compd.setpoint_states import State

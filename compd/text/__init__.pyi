@@ -17,4 +17,4 @@ from .secrets import hide_secrets as hide_secrets
 from .secrets import holds_secret as holds_secret
 from .secrets import without_secrets as without_secrets
 from .secrets import without_users as without_users
-from .typeset import typeset as typeset
+from .typesetting import typeset as typeset

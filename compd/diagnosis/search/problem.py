@@ -70,8 +70,8 @@ class DiagnosisProblem:
 
     @property
     def least_loss(self) -> float:
-        """Below which nothing is gained: 1, the noise; more where rounding that repeats have in common makes most of it;
-        0 where the noise is not known.
+        """Below which nothing is gained: 1, the noise; more where rounding that repeats have in common makes most of
+        it; 0 where the noise is not known.
 
         What rounding takes off follows from the value, and over a row of places it is as regular as they are: an effect
         within half a step, sqrt(3) times the digit's uncertainty, cannot be told from it.
