@@ -45,7 +45,8 @@ class BlockSets(NamedTuple):
     @property
     def free(self) -> BoolArray:
         """(P,) numbers that are in any set."""
-        return np.asarray(self.inside.any(axis=0)[self.block_of])
+        inside: BoolArray = np.asarray(self.inside.any(axis=0))
+        return np.asarray(inside[self.block_of])
 
     @property
     def none(self) -> BlockSets:
@@ -58,7 +59,7 @@ class BlockSets(NamedTuple):
         weight, fits = self._fits(normal)
         x = np.zeros(len(normal.b))
         C = np.zeros_like(normal.A)
-        for own, numbers, values, covariance in zip(weight, *fits, strict=True):
+        for own, (numbers, values, covariance) in zip(weight, fits, strict=True):
             x[numbers] += own * values
             C[np.ix_(numbers, numbers)] += own * (covariance + np.outer(values, values))
         C -= np.outer(x, x)
@@ -77,21 +78,19 @@ class BlockSets(NamedTuple):
         kept = weight >= _LIKELY_SHARE * weight.max()
         return self._replace(inside=self.inside[kept], log_prior=self.log_prior[kept])
 
-    def _fits(self, normal: Normal) -> tuple[FloatArray, tuple[list[IntArray], list[FloatArray], list[FloatArray]]]:
+    def _fits(self, normal: Normal) -> tuple[FloatArray, list[tuple[IntArray, FloatArray, FloatArray]]]:
         """(K,) probabilities; and of each set its numbers, their values and their covariance."""
         evidence = self.log_prior.copy()
-        all_numbers, all_values, covariances = [], [], []
+        fits: list[tuple[IntArray, FloatArray, FloatArray]] = []
         for k, inside in enumerate(self.inside):
             numbers = np.flatnonzero(inside[self.block_of])
             prior = self.scale[self.block_of[numbers]] ** 2
-            C = np.linalg.inv(normal.A[np.ix_(numbers, numbers)] + np.diag(1 / prior))
-            values = C @ normal.b[numbers]
+            C = np.asarray(np.linalg.inv(normal.A[np.ix_(numbers, numbers)] + np.diag(1 / prior)), dtype=np.float64)
+            values = np.asarray(C @ normal.b[numbers])
             evidence[k] += (normal.b[numbers] @ values + np.linalg.slogdet(C)[1] - np.log(prior).sum()) / 2
-            all_numbers.append(numbers)
-            all_values.append(values)
-            covariances.append(C)
+            fits.append((numbers, values, C))
         weight = np.exp(evidence - evidence.max())
-        return weight / weight.sum(), (all_numbers, all_values, covariances)
+        return np.asarray(weight / weight.sum()), fits
 
 
 def block_sets(
