@@ -73,13 +73,15 @@ def _result_alone(
     fraction = explained_fraction(losses.baseline, subset.cv_loss, floor)
     rms_um = problem.unit_um * float(np.sqrt(max(subset.cv_loss, 0.0)))
     gain = losses.log_loss(losses.baseline) - losses.log_loss(subset.cv_loss)
+    # what as many numbers take of pure noise
+    akaike = losses.criteria.number_price * len(parameters)
     unit = problem.aligned.unit
     status: Status
     if (named := _reason_of_explaining(candidate.name, candidate.effect.separated_by, steps)) is not None:
         status, why = "explains", named
     elif gain >= losses.price(member) and (implausible := [p for p in parameters if not p.plausible]):
         status, why = "partial", f"only with implausible numbers: {_values(implausible[:3])}"
-    elif gain < losses.price(member) and (sure := _surest(losses, parameters)):
+    elif akaike <= gain < losses.price(member) and (sure := _surest(losses, parameters)):
         status, own_um = "too_small", problem.unit_um * float(np.sqrt(max(losses.baseline - subset.cv_loss, 0.0)))
         why = f"{sure} from nought; it does {number_text(own_um, unit)}, too little for a name"
     elif is_undetermined(candidate.limits, np.sqrt(np.diag(covariance))):

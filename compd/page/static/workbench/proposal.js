@@ -29,7 +29,8 @@ export class Proposal {
           ...(outcome.gone.length ? [element("p", {}, `Gone: ${outcome.gone.join(", ")}`)] : []),
           element("div", { class: "row" }, confirm, element("button", { type: "button", onclick: () => this.clear() }, "Leave it"))),
       );
-      if (!outcome.warning) confirm.focus();
+      if (outcome.warning) this.place.scrollIntoView({ block: "nearest" });
+      else confirm.focus();
     });
   }
 }

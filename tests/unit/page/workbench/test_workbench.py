@@ -100,3 +100,28 @@ def test_a_model_with_code_is_refused_and_the_code_does_not_run(path, tmp_path):
     with pytest.raises(CompdError, match="executes no file"):
         Workbench(path, model, None)
     assert not ran.exists()
+
+
+def test_what_the_rows_support_is_added_without_a_warning_and_what_they_do_not_with_the_verdict(workbench):
+    assert workbench.effects()["noise"] == ""
+    assert workbench.propose("add", "link_expansion")["warning"] == ""
+    assert (
+        "link_sag is not named. identified: What is missing is link_expansion"
+        in (workbench.propose("add", "link_sag")["warning"])
+    )
+    workbench.make("add", "link_expansion", workbench.revision)
+    offered = workbench.effects()
+    assert offered["noise"].startswith("Nothing is missing")
+    assert {effect["explained"] for effect in offered["effects"]} == {None}
+    warning = workbench.propose("add", offered["effects"][0]["effect"])["warning"]
+    assert warning.endswith(f"is not named. adequate: {offered['noise']}")
+
+
+def test_the_fall_is_from_the_machine_without_effects_on_rows_that_count_in_both(workbench):
+    before = workbench.summary()
+    assert before["fall"] == {"rms": [before["rms"]] * 2, "rows": before["used"], "differ": ""}
+    made = workbench.make("add", "link_expansion", workbench.revision)
+    assert made["fall"]["rms"] == [pytest.approx(before["rms"], rel=0.02), pytest.approx(made["rms"], rel=0.02)]
+    assert bool(made["fall"]["differ"]) == (made["used"] != before["used"])
+    _, rows = unpacked(workbench.opened.rows())
+    assert np.abs(rows["residual"]).mean() < np.abs(rows["start"]).mean()
