@@ -10,6 +10,7 @@ from plotly.graph_objects import Cone, Figure, Scatter, Scatter3d
 from compd.configuration import Configuration
 from compd.machine_builder import build_model, machine_details
 from compd.model.effects import Constant, Effect, Parameter
+from compd.report.axis_colours import AXIS_COLOURS
 from compd.report.effect_signature import (
     ASIDE_MM,
     FORCE_N,
@@ -20,7 +21,6 @@ from compd.report.effect_signature import (
     Signature,
     compute_signature,
 )
-from compd.report.axis_colours import AXIS_COLOURS
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
 

@@ -118,7 +118,11 @@ def main() -> None:
     names = ["open", "effects ranked, after that"]
     for picture in PICTURES:
         names += [f"slider, {picture}: script, ms (median / 95 %)", f"slider, {picture}: to the next frame, ms"]
-    names += ["arrows / dots of a picture, drawn in turn, and their ratio", "dry run of adding an effect", "largest memory of the page's process"]
+    names += [
+        "arrows / dots of a picture, drawn in turn, and their ratio",
+        "dry run of adding an effect",
+        "largest memory of the page's process",
+    ]
     show("the workbench by rows", ["", *(f"{rows:,} rows" for rows in ROWS)], list(zip(names, *columns, strict=True)))
 
 
