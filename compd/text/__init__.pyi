@@ -12,9 +12,9 @@ from .numbers_as_text import fall_text as fall_text
 from .numbers_as_text import join_words as join_words
 from .numbers_as_text import number_text as number_text
 from .numbers_as_text import percent_text as percent_text
+from .printed_signs import typeset as typeset
 from .secrets import has_secret as has_secret
 from .secrets import hide_secrets as hide_secrets
 from .secrets import holds_secret as holds_secret
 from .secrets import without_secrets as without_secrets
 from .secrets import without_users as without_users
-from .typesetting import typeset as typeset

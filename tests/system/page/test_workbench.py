@@ -188,7 +188,35 @@ def test_every_picture_is_drawn_and_turns_with_what_is_tried(open_tab):
         assert tab.locator("#picture").screenshot() == with_it
         tab.evaluate("bench.tried(null)")
     tab.locator("#against").select_option("temperature_room_degC")
-    assert "temperature_room_degC from" in tab.locator("#picture-note").inner_text()
+    assert tab.evaluate("bench.picture.views[bench.picture.kind].title") == "temperature room, °C"
+
+
+def test_the_row_under_the_pointer_shows_its_values(open_tab):
+    tab = open_tab("values.model.yaml")
+    tab.locator("[role=tab]", has_text="map xy").click()
+    # the middle of the picture is in view
+    tab.locator("#picture").scroll_into_view_if_needed()
+    box = tab.locator("#picture").bounding_box()
+    left, top = tab.evaluate("[...bench.picture.marks.slice(0, 2)]")
+    tab.mouse.move(box["x"] + left, box["y"] + top)
+    values = tab.locator(".row-values")
+    values.wait_for()
+    nearest = int(values.inner_text().split(",")[0].removeprefix("row "))
+    row = tab.evaluate(f"[...bench.rows.row].indexOf({nearest})")
+    residual = tab.evaluate(f"bench.rows.residual[{3 * row}]")
+    assert f"residual x {residual:.2f} µm" in values.inner_text()
+    assert "time since the first row, s: " in values.inner_text()
+    tab.mouse.move(box["x"] + 2, box["y"] + 2)
+    values.wait_for(state="hidden")
+
+
+def test_the_machine_stands_around_the_arrows_until_it_is_switched_off(open_tab):
+    tab = open_tab("around.model.yaml")
+    parts = tab.evaluate("bench.rows.machine.map(({ part }) => part)")
+    assert parts.count("rod") == 3
+    near = tab.evaluate("bench.picture.views['3D'].project.px_per_mm")
+    tab.get_by_role("checkbox", name="machine").uncheck()
+    assert tab.evaluate("bench.picture.views['3D'].project.px_per_mm") > near
 
 
 def test_constants_that_are_searched_have_a_slider(open_tab):
