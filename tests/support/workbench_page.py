@@ -13,9 +13,9 @@ from tests.support.live_page import page_process, until
 SHOWN = "window.bench?.summary && document.querySelectorAll('.effect').length > 5"
 
 
-def page_without_machine(directory: Path) -> AbstractContextManager[tuple[str, int]]:
+def page_without_machine(directory: Path, *options: str) -> AbstractContextManager[tuple[str, int]]:
     """A page for the recordings in `directory/recordings` and the model files in `directory`; no daemon runs."""
-    return page_process(Path("/no/socket"), directory / "recordings", "--models", str(directory))
+    return page_process(Path("/no/socket"), directory / "recordings", "--models", str(directory), *options)
 
 
 @contextmanager
