@@ -125,8 +125,8 @@ def _read(table: NumberColumns, options: LogOptions) -> MachineLog:
     for k, (name, stated) in wanted.items():
         unit = unit_named(stated) or stated or _header_unit(table.header[k])
         if name == _TIME:
-            own = "s" if table.header[k] == name and not stated else unit
-            time = table.time(k, own, options.read)
+            time_unit = "s" if table.header[k] == name and not stated else unit
+            time = table.time(k, time_unit, options.read)
             if time is not None:
                 columns[name], rows = time.time_s, np.isfinite(time.time_s)
                 taken[name] = f"{table.column_text(k)}, {time.assumed}"
@@ -216,7 +216,7 @@ def _turn(
             ", ".join(COMMANDED_ATTITUDE_COLUMNS),
             next_step,
         )
-    elif order not in ANGLE_ORDERS:
+    elif order is None or order not in ANGLE_ORDERS:
         what = "in which order its angles turn is not said" if order is None else "is no order of turning"
         value = ", ".join(headers) if order is None else order
         problems.add(0, what, value, ", ".join(ANGLE_ORDERS), "say it with --angles, such as --angles xyz")
