@@ -5,6 +5,10 @@ BIN    := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 # with the kernels compiled
 STAMP  := $(VENV)/.compiled
+PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
+# what compiling the kernels needs, a line each
+KERNEL_PACKAGES := import tomllib; build = tomllib.load(open("pyproject.toml", "rb"))["tool"]["hatch"]["build"]; \
+  print(*build["targets"]["wheel"]["hooks"]["custom"]["dependencies"], sep="\n")
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -33,19 +37,17 @@ help:
 	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench, faults, three hours of soak, the scoreboard"
 	@echo "tests/README.md says what each takes and what .ci/run runs"
 
-$(INSTALLED): pyproject.toml
+# The kernels are compiled beside the installation of most of the packages: numba and what the kernels import come first.
+$(STAMP) $(INSTALLED) &: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "compd needs Python >= 3.11; this is $$($(PYTHON) --version). Try: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || \
 	  { echo "Python cannot make a virtual environment; on Debian and Ubuntu: apt-get install python3-venv"; exit 1; }
-	@echo "Installing compd and what it needs into $(VENV) (a minute or two, once) ..."
-	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	@touch $@
-
-$(STAMP): $(INSTALLED)
-	@echo "Compiling the kernels for this processor (a minute, once) ..."
-	@$(BIN)/python -c 'import compd.live.run_daemon'
-	@touch $@
+	@echo "Installing compd and what it needs into $(VENV), and compiling the kernels (two minutes at most, once) ..."
+	@$(PYTHON) -c '$(KERNEL_PACKAGES)' | $(PIP) --requirement /dev/stdin
+	@$(BIN)/python -m compd.compile_kernels & compiling=$$!; \
+	  $(PIP) --editable '.[dev]'; installed=$$?; wait $$compiling && exit $$installed
+	@touch $(INSTALLED) $(STAMP)
 
 demo: $(STAMP)
 	@$(BIN)/compd demo

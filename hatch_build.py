@@ -21,8 +21,6 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 PAGES, INSTALLED_PAGES = "docs/_build/html", "compd/documentation"
 KERNELS = "compd/compiled_kernels"
-# compd.kernel_target chooses among them
-LEVELS = ("x86-64-v3", "x86-64-v2")
 
 
 class BuildHook(BuildHookInterface):
@@ -52,19 +50,11 @@ class BuildHook(BuildHookInterface):
 
 
 def _compile(root: Path, directory: str) -> None:
-    """Compile all kernels for each level into `directory`, side by side. Raises RuntimeError if one fails."""
-    environment = os.environ | {
-        "PYTHONPATH": os.pathsep.join(filter(None, [str(root), os.environ.get("PYTHONPATH")])),
-        "NUMBA_CACHE_DIR": directory,
-        "NUMBA_CPU_FEATURES": "",
-    }
-    command = [sys.executable, "-m", "compd.compile_kernels"]
-    started = {
-        level: subprocess.Popen(command, cwd=root, env=environment | {"NUMBA_CPU_NAME": level}) for level in LEVELS
-    }
-    failed = [level for level, process in started.items() if process.wait() != 0]
-    if failed:
+    """Compile all kernels for each level into `directory`. Raises RuntimeError if that fails."""
+    path = os.pathsep.join(filter(None, [str(root), os.environ.get("PYTHONPATH")]))
+    command = [sys.executable, "-m", "compd.compile_kernels", directory]
+    if subprocess.run(command, cwd=root, env=os.environ | {"PYTHONPATH": path}, check=False).returncode != 0:
         raise RuntimeError(
-            f"the kernels for {' and '.join(failed)} do not compile, see above; "
+            "the kernels do not compile, see above; "
             "a build without isolation needs what pyproject.toml lists for hatch_build.py"
         )
