@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from compd.api.arguments import Model, opened_model
+from compd.api.diagnosis import with_tested_noise
 from compd.arrays import FloatArray
 from compd.comparison import (
     AlignedRecording,
@@ -135,8 +136,8 @@ def compare_stream(
     """
     stream, sample = open_long(Path(path), machine, progress, criteria, hold=hold)
     file = opened_model(model, sample.aligned)
-    return compare_blocks(
-        stream, sample, file.fitted, file.covariance, progress=lambda done: progress(sample.rows + done)
+    return with_tested_noise(
+        compare_blocks(stream, sample, file.fitted, file.covariance, progress=lambda done: progress(sample.rows + done))
     )
 
 

@@ -236,6 +236,12 @@ class Comparison:
             error = f"{error} and {format_error(self.attitude_rms_urad, ATTITUDE_UNIT, 3)}"
             noise = f"{noise} and {format_error(rms(self.floor.by_axis_um[-3:]), ATTITUDE_UNIT, 3)}"
         who = f"{self.aligned.recording.machine}: measured and modelled differ by {error} (rms per coordinate)"
+        if not math.isnan(self.floor.declared_um):
+            declared = format_error(self.floor.declared_um, unit, 3)
+            return (
+                f"{who}. Noise of {declared} is declared, and neighbouring rows scatter by {noise}. Measure one point "
+                "twice, with the same number in the column `visit`, to know how much of it is noise."
+            )
         if not self.floor.known:
             return (
                 f"{who}. How much of it is noise cannot be known: measure one point twice, with the same number in the "
