@@ -7,6 +7,7 @@ from typing import Any
 
 from compd.demo.page import error_rows, timing_rows, verdict, write_demo_page
 from compd.demo.session import DemoSession, DemoVisit
+from compd.text import typeset
 
 SETPOINT: dict[str, Any] = {
     "time_s": 100.0,
@@ -41,7 +42,7 @@ def test_the_page_works_offline_and_holds_the_verdict(tmp_path: Path) -> None:
     page = tmp_path / "demo.html"
     write_demo_page(page, session())
     text = page.read_text()
-    assert verdict(session()) in text
+    assert typeset(verdict(session())) in text
     assert "<script src=" not in text, "nothing may be loaded from a network"
     for title in ("Error of the tool tip", "What the correction is made of", "How the frame moved"):
         assert f"<h2>{title}</h2>" in text
