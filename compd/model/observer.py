@@ -15,7 +15,6 @@ from compd.model.kinematics import Frame, Mechanism, Movement, Pose, ToolOnPlatf
 from compd.model.machine import MachineModel
 from compd.rotation import to_outer
 
-
 # Of the shortest link, the most that a scale moves between two poses solved one from the other.
 _STEP_SHARE = 0.1
 
@@ -82,7 +81,7 @@ def _from_machine_zero(
     before: far from machine zero it would else find another assembly, or none.
     """
     zero = model.zero
-    longest_mm = np.abs(np.nan_to_num(scale_mm, posinf=0.0, neginf=0.0)).max(axis=1, initial=0.0)
+    longest_mm = np.abs(np.nan_to_num(scale_mm)).max(axis=1, initial=0.0)
     steps = np.maximum(np.ceil(longest_mm / (_STEP_SHARE * float(zero.link_length_mm.min()))), 1.0)
     guess = zero.platform_origin_M_mm, zero.rotation_M_P
 
