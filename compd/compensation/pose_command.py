@@ -39,10 +39,26 @@ def scales_of_command(model: MachineModel, tip_mm: FloatArray, rotation_rad: Flo
         rows = slice(begin, begin + _ROWS_AT_ONCE)
         values = GaugeValues(scale_mm[rows], nowhere, _NO_LENGTHS, {})
         turned = rotation_rad[rows] if rotation_rad is not None and model.attitude_is_free else None
-        found, _ = compensate_machine_tool(drawn, tip_mm[rows], turned, values, WarmStart.at_zero(drawn))
+        found, _ = compensate_machine_tool(drawn, tip_mm[rows], turned, values, _start(drawn, tip_mm[rows]))
         solved = found.reason == Reason.OK
         scale_mm[rows][solved] = found.nominal_scale_mm[solved]
     return scale_mm
+
+
+def _start(model: MachineModel, tip_mm: FloatArray) -> WarmStart:
+    """At the commanded tips with the attitude as at machine zero, and where there is no such pose at machine zero."""
+    start = WarmStart.at_zero(model)
+    if start.actuator_mm is None:
+        return start
+    tip_M_mm = model.arrangement.target_contact(model.frame, tip_mm).tip_M_mm
+    pose, scale_mm = model.reach(np.broadcast_to(tip_M_mm, tip_mm.shape))
+    known = pose.reason == Reason.OK
+    return start._replace(
+        supports_M_mm=np.broadcast_to(start.supports_M_mm, (len(known), 3, 3)),
+        origin_M_mm=np.where(known[:, None], pose.origin_M_mm, start.origin_M_mm),
+        rotation_M_P=np.where(known[:, None, None], pose.rotation_M_P, start.rotation_M_P),
+        actuator_mm=start.actuator_mm + np.where(known[:, None], scale_mm, 0.0),
+    )
 
 
 def command_pose(model: MachineModel, wanted: Compensation) -> Compensation:

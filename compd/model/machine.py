@@ -35,6 +35,9 @@ from compd.model.kinematics import (
 from compd.model.structures import MODEL
 from compd.rotation import compose, to_inner, to_outer
 
+# Poses on the way from machine zero to a place; of a way as long as a rod, a tenth of the rod apart.
+_REACH_STEPS = 10
+
 
 class Reach(NamedTuple):
     """A pose, and the scales (..., m) that show it, mm since machine zero."""
@@ -182,9 +185,14 @@ class MachineModel:
             pose = inverse_kinematics(self.mechanism(zero.base_joints_M_mm), tip_M_mm, tip_P_mm, zero.rotation_M_P)
             return Reach(pose, pose.link_length_mm - zero.link_length_mm)
         mechanism = self.mechanism(self.base_joints_at_0_M_mm)
-        reached = inverse_by_actuators(
-            mechanism, self.actuators, tip_M_mm, tip_P_mm, zero.rotation_M_P, zero.actuator_mm
-        )
+        rotation_M_P, actuator_mm = zero.rotation_M_P, zero.actuator_mm
+        # followed from machine zero: Newton alone finds another assembly, or none, of a far place
+        for share in np.arange(1, _REACH_STEPS + 1) / _REACH_STEPS:
+            here_M_mm = zero.contact.tip_M_mm + share * (tip_M_mm - zero.contact.tip_M_mm)
+            reached = inverse_by_actuators(mechanism, self.actuators, here_M_mm, tip_P_mm, rotation_M_P, actuator_mm)
+            actuator_mm = reached.actuator_mm
+            if not self.actuators.fixed[3:].any():
+                rotation_M_P = reached.pose.rotation_M_P
         return Reach(reached.pose, reached.actuator_mm - zero.actuator_mm)
 
     @cached_property

@@ -8,12 +8,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.model.effects import MachineConstants, Observations
-from compd.model.kernels import GaugeRows, joint_shortening
-from compd.model.kinematics import Movement, Pose, ToolOnPlatform, forward_kinematics, solve_frame
+from compd.model.kernels import GaugeRows, Reason, joint_shortening
+from compd.model.kinematics import Frame, Mechanism, Movement, Pose, ToolOnPlatform, forward_kinematics, solve_frame
 from compd.model.machine import MachineModel
 from compd.rotation import to_outer
+
+# Of the shortest link, the most that a scale moves between two poses solved one from the other.
+_STEP_SHARE = 0.1
 
 
 class EffectInputs(NamedTuple):
@@ -44,7 +47,7 @@ def observe(
     movement: Movement,
     quantities_at_zero: Mapping[str, float] | None = None,
 ) -> Observations:
-    """N rows by equations (1), (3) and forward kinematics; Newton starts at machine zero, so that no row needs another.
+    """N rows by equations (1), (3) and forward kinematics, each followed from machine zero: no row needs another.
 
     constants : of this machine, from `machine_constants`.
     scale_mm (N, m), joint_mm (N, k), frame_mm (N, 9), or as in `whole_frame_mm`: changes since machine zero.
@@ -56,8 +59,7 @@ def observe(
     zero, frame_mm = model.zero, whole_frame_mm(frame_mm)
     frame = solve_frame(model.frame, zero.distances_mm + frame_mm)
     shortening_mm, _ = joint_shortening(model.joint_weights, joint_mm)
-    mechanism, length_mm = model.links_on(frame.rotation_M_B, frame.base_joints_M_mm, scale_mm)
-    pose = forward_kinematics(mechanism, length_mm - shortening_mm, zero.platform_origin_M_mm, zero.rotation_M_P)
+    mechanism, pose = _from_machine_zero(model, frame, scale_mm, shortening_mm)
     inputs = EffectInputs(
         GaugeRows(scale_mm, joint_mm, frame_mm, np.asarray(time_s, dtype=np.float64)),
         quantities,
@@ -68,6 +70,35 @@ def observe(
         np.broadcast_to(model.arrangement.contact_at(pose).tip_M_mm, pose.origin_M_mm.shape),
     )
     return observe_at_pose(constants, inputs, session_start, movement)
+
+
+def _from_machine_zero(
+    model: MachineModel, frame: Frame, scale_mm: FloatArray, shortening_mm: FloatArray
+) -> tuple[Mechanism, Pose]:
+    """The links of N rows and their poses, in the assembly of machine zero.
+
+    The scales go from machine zero to a row's readings in equal steps, and Newton starts at the pose of the step
+    before: far from machine zero it would else find another assembly, or none.
+    """
+    zero = model.zero
+    longest_mm = np.abs(np.nan_to_num(scale_mm)).max(axis=1, initial=0.0)
+    steps = np.maximum(np.ceil(longest_mm / (_STEP_SHARE * float(zero.link_length_mm.min()))), 1.0)
+    guess = zero.platform_origin_M_mm, zero.rotation_M_P
+
+    def solved(rows: slice | IntArray, step: int, guess: tuple[FloatArray, FloatArray]) -> Pose:
+        reading_mm = scale_mm[rows] * (step / steps[rows])[:, None]
+        mechanism, length_mm = model.links_on(frame.rotation_M_B[rows], frame.base_joints_M_mm[rows], reading_mm)
+        return forward_kinematics(mechanism, length_mm - shortening_mm[rows], *guess)
+
+    pose = solved(slice(None), 1, guess)
+    for step in range(2, int(steps.max(initial=1.0)) + 1):
+        going = np.flatnonzero((steps >= step) & (pose.reason == Reason.OK))
+        if not len(going):
+            break
+        ahead = solved(going, step, (pose.origin_M_mm[going], pose.rotation_M_P[going]))
+        for values, new in zip(pose, ahead, strict=True):
+            values[going] = new
+    return model.links_on(frame.rotation_M_B, frame.base_joints_M_mm, scale_mm)[0], pose
 
 
 def whole_frame_mm(frame_mm: FloatArray) -> FloatArray:

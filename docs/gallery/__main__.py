@@ -12,6 +12,7 @@ from pathlib import Path
 from compd.report.page import SHARED_SCRIPT
 from docs.gallery.cases import CASES
 from docs.gallery.markdown import gallery_text
+from docs.gallery.real_hexapod import NAME, SESSIONS, real_hexapod_text, run_real_hexapod
 from docs.gallery.result import run_case
 from docs.gallery.screenshot import find_browser, take_screenshot
 
@@ -42,10 +43,16 @@ def main() -> None:
     PICTURES.mkdir(exist_ok=True)
     with ProcessPoolExecutor(2) as pool:
         results = list(pool.map(partial(run_case, directory=PAGES), CASES))
+    real = run_real_hexapod(PAGES)
+    if real is None:
+        print(f"gallery: the real hexapod is left out, there are no recordings in {SESSIONS}")
     if browser is not None:
+        if real is not None:
+            take_screenshot(browser, PAGES / f"{NAME}-calibration.html", PICTURES / f"{NAME}.png")
         for case in CASES:
             take_screenshot(browser, PAGES / f"{case.name}-diagnosis.html", PICTURES / f"{case.name}.png")
-    TEXT.write_text(gallery_text(results, "../_build/gallery-pictures" if browser else ""), encoding="utf-8")
+    pictures = "../_build/gallery-pictures" if browser else ""
+    TEXT.write_text(f"{gallery_text(results, pictures)}\n{real_hexapod_text(real, pictures)}", encoding="utf-8")
     size_mb = sum(path.stat().st_size for path in PAGES.iterdir()) / 1e6
     script_mb = (PAGES / SHARED_SCRIPT).stat().st_size / 1e6
     print(f"gallery: {len(results)} cases, {size_mb:.1f} MB, of which {script_mb:.1f} MB are plotly's script")

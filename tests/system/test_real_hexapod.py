@@ -4,22 +4,16 @@ are predicted better. Its data are in ../shared; nothing of them is kept here.
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
-import numpy as np
 import pytest
-import yaml
 
 import compd
 from compd.arrays import rms
 from compd.comparison.recording_comparison import compare
 from compd.diagnosis import Diagnosis
-from compd.machine_kinds import KINDS, machine_text
-from tests.support.paths import ROOT
+from docs.gallery.real_hexapod import PLAIN_BLOCKS, SESSIONS, machine, recording
 
-SESSIONS = ROOT.parent / "shared" / "real" / "jugglebot"
-DRAWING = re.compile(r"^\s+(base joints|platform joints|mm per turn)\s+(\[.*\])", re.MULTILINE)
 # What least squares on the leg lengths, written for this machine alone, leaves at the position is 424 um.
 MAX_SEALED_UM = 420.0
 MAX_SEALED_WITH_GAIN_OF_EXTENSION_UM = 370.0
@@ -27,7 +21,7 @@ MAX_SEALED_WITH_GAIN_OF_EXTENSION_UM = 370.0
 # on this session, and 0.32 with a gain that changes with extension.
 MAX_SEALED_LEGS_MM = 0.34
 MAX_SEALED_LEGS_WITH_GAIN_OF_EXTENSION_MM = 0.33
-NAMED = {"link_zero", "scale_gain", "base_joint_position"}
+NAMED = set(PLAIN_BLOCKS)
 # An effect of its owner's, as docs/how-to/add-an-effect.md says.
 GAIN_OF_EXTENSION = """
 id: gain_of_extension
@@ -37,45 +31,6 @@ formula: "k * reading_mm ** 2"
 parameters:
   k: {unit: um/mm^2, plausible: [-1, 1], source: "a line of 1 mm on a spool of 11 mm", per: link}
 """
-
-
-def drawing() -> dict[str, np.ndarray]:
-    text = (SESSIONS / "README.md").read_text(encoding="utf-8")
-    return {name: np.array(yaml.safe_load(values)) for name, values in DRAWING.findall(text)}
-
-
-def machine(directory: Path) -> Path:
-    data = yaml.safe_load(
-        machine_text("real", "6-ups", KINDS["6-ups"].usual).replace("{on: platform", '{"on": platform')
-    )
-    drawn = drawing()
-    ends = zip(drawn["base joints"].tolist(), drawn["platform joints"].tolist(), strict=True)
-    data["geometry"] |= {
-        "rods": [
-            {"actuator": i, "base_B_mm": base, "platform_P_mm": platform}
-            for i, (base, platform) in enumerate(ends, start=1)
-        ],
-        "tool": {"on": "platform", "at_P_mm": [0, 0, 0], "zero_tip_M_mm": [0, 0, 565]},
-        "tolerance_mm": "hand-built",
-    }
-    path = directory / "real.yaml"
-    path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
-    return path
-
-
-def recording(directory: Path, name: str) -> Path:
-    """The session as it is: legs in mm, positions and quaternions, no times."""
-    table = np.genfromtxt(SESSIONS / f"{name}.csv", delimiter=",", names=True)
-    legs = np.stack([table[f"leg_length_{i}"] for i in range(1, 7)], axis=1) * drawing()["mm per turn"]
-    columns = {f"scale_{i + 1}_mm": legs[:, i] for i in range(6)}
-    columns |= {f"reference_{axis}_mm": table[f"position_{axis}"] for axis in "xyz"}
-    columns |= {f"reference_q{part}": table[f"orientation_{part}"] for part in "xyzw"}
-    path = directory / f"{name}.csv"
-    rows = np.stack(list(columns.values()), axis=1).tolist()
-    path.write_text("\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n")
-    sidecar = {"machine": "real", "reference": {"quantity": "tool_pose", "frame": "instrument"}}
-    path.with_suffix(".yaml").write_text(yaml.safe_dump(sidecar))
-    return path
 
 
 def diagnosed(directory: Path, effects: str = "") -> tuple[Diagnosis, float, float]:
