@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import compd
-from compd.calibration import calibration_parameters, pose_columns
+from compd.calibration import calibration_parameters, pose_columns, without
 from compd.calibration.poses import MeasuredPoses
 from compd.comparison.alignment.aligned_recording import effect_deltas
 from compd.machine_kinds import KINDS
