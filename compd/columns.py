@@ -13,7 +13,7 @@ from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
-ID_COLUMNS = ("session", "visit", "point", "ball", "pin")
+ID_COLUMNS = ("session", "visit", "point", "ball", "pin", "reflector")
 DISTANCE_COLUMN = "reference_distance_mm"
 SKEW_COLUMN = "skew_s"
 # What people read in place of time where none was recorded.
@@ -157,6 +157,13 @@ COLUMN_KINDS: tuple[ColumnKind, ...] = tuple(
             "number or name of the fixed end that it was measured from, optional where there is one",
         ),
         ("pin", r"pin", "", "in place of the tip: number or name of the fixed pin in which the tip was"),
+        (
+            "reflector",
+            r"reflector",
+            "",
+            "beside a position: number or name of the reflector that was measured in place of the tip; its place is in "
+            "the sidecar, `reference.reflectors`",
+        ),
         ("temperature_<place>_degC", r"temperature_[a-z][a-z0-9_]*", "degC", "temperature of a part or of the room"),
         (
             "force_x_N, force_y_N, force_z_N",

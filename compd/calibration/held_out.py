@@ -15,6 +15,7 @@ from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.calibration.jacobian import without
 from compd.calibration.machine_fit import MachineFit
 from compd.calibration.prior_fit import Whitened, fit_with_prior, normal_equations, open_columns, registration_of
+from compd.recording import Recording
 
 # Parts into which rows are dealt at random, and how often.
 PARTS, _DEALS = 5, 2
@@ -47,12 +48,12 @@ class HeldOut(NamedTuple):
 
 
 def folds(fit: MachineFit) -> list[Fold]:
-    """Random parts, the repeats of a visit together; and the lowest and the highest third along each direction in which
-    the poses spread."""
+    """Random parts, the repeats of a visit and the reflectors of a pose together; and the lowest and the highest third
+    along each direction in which the poses spread."""
     rng = np.random.default_rng(_SEED)
     result = []
     for _ in range(_DEALS):
-        part = [_dealt(rng, now.aligned.recording.visit, len(now.use)) for now in fit.now]
+        part = [_dealt(rng, _together(now.aligned.recording), len(now.use)) for now in fit.now]
         result += [Fold(False, tuple(own == k for own in part)) for k in range(PARTS)]
     places_mm = [now.aligned.rows.tip_M_mm for now in fit.now]
     used_mm = np.concatenate([place[now.use] for place, now in zip(places_mm, fit.now, strict=True)])
@@ -101,11 +102,23 @@ def left_of(fit: MachineFit, free: BoolArray, fold: Fold) -> list[FloatArray]:
     return left
 
 
-def _dealt(rng: np.random.Generator, visit: IntArray | None, rows: int) -> IntArray:
-    """(N,) number of the random part of each row, alike for the repeats of a visit."""
+def _together(recording: Recording) -> IntArray | None:
+    """(N,) number of what is left out as a whole, -1 for a row by itself; None where every row is.
+
+    These are visits; of several reflectors poses, by the point of a row, or by equal positions of the machine.
+    """
+    if recording.target_P_mm is None or recording.motion_mm is None:
+        return recording.visit
+    if recording.point is not None:
+        return recording.point
+    return np.asarray(np.unique(recording.motion_mm, axis=0, return_inverse=True)[1].ravel())
+
+
+def _dealt(rng: np.random.Generator, together: IntArray | None, rows: int) -> IntArray:
+    """(N,) number of the random part of each row, alike for rows that are left out together."""
     own = rng.permutation(rows) % PARTS
-    if visit is None:
+    if together is None:
         return np.asarray(own)
-    names, place = np.unique(visit, return_inverse=True)
-    of_visit = rng.permutation(len(names)) % PARTS
-    return np.asarray(np.where(visit >= 0, of_visit[place], own))
+    names, place = np.unique(together, return_inverse=True)
+    of_each = rng.permutation(len(names)) % PARTS
+    return np.asarray(np.where(together >= 0, of_each[place], own))

@@ -109,9 +109,7 @@ def links_of_pose(aligned: AlignedRecording) -> FloatArray | None:
     if aligned.of_links or not aligned.shows_tip or aligned.model is None:
         return None
     link = aligned.sensitivity(["link"])["link"]
-    both = link.tip
-    if aligned.with_attitude:
-        both = np.concatenate([link.tip, link.rotation * MM_PER_RAD], axis=1)
+    both = aligned.shown(link)
     good = np.isfinite(both).all(axis=(1, 2))
     by_pose = np.full((len(both), both.shape[2], both.shape[1]), np.nan)
     by_pose[good] = np.linalg.pinv(both[good])

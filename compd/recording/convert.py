@@ -23,7 +23,7 @@ from compd.table_file import CSV, PARQUET, SUFFIXES, row_count, table_blocks, ta
 from compd.tables import FIRST_ROW, Table
 
 # Columns that may hold text; a reader knows whether they do.
-_ID_COLUMNS = ("point", "ball", "pin")
+_ID_COLUMNS = ("point", "ball", "pin", "reflector")
 # Rows held as text at once: a cell takes 60 bytes then.
 _TEXT_ROWS = 4096
 

@@ -204,7 +204,7 @@ def _check_reference(
     names: Sequence[str], sidecar: Sidecar, layout: Layout, attitude: list[str], problems: ProblemList
 ) -> None:
     """Check the reference's columns against the quantity that the sidecar names."""
-    present = [name for name in names if name.startswith("reference_") or name in ("ball", "pin")]
+    present = [name for name in names if name.startswith("reference_") or name in ("ball", "pin", "reflector")]
     if sidecar.reference is None:
         if present:
             problems.add(
@@ -217,7 +217,7 @@ def _check_reference(
     quantity = sidecar.reference.quantity
     positions = [f"reference_{axis}_{layout.ending}" for axis in AXES]
     wanted: dict[str, list[str]] = {
-        "tool_position": positions,
+        "tool_position": [*positions, *["reflector"] * (sidecar.reference.reflectors is not None)],
         "tool_pose": [*positions, *ATTITUDE_COLUMNS],
         "link_length": [name for name in present if name.startswith("reference_link_")],
         "ball_plate": ["ball"],
@@ -243,6 +243,8 @@ def _check_reference(
         beyond = [i for i in layout.links if layout.scales and i > layout.scales]
         if beyond:
             problems.add("", f"reference of link {beyond[0]}, but there are {layout.scales} scales")
+    if sidecar.reference.reflectors is not None:
+        _add_missing([name for name in ["reflector"] if name not in names], names, problems)
     if quantity in ("ball_plate", "fixed_point"):
         _add_missing([name for name in wanted[quantity] if name not in names], names, problems)
     if quantity == "distance":

@@ -79,6 +79,16 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
     ]
     problems += [
         Problem(
+            where=str(recording.sidecar.path),
+            what="recordings of several reflectors are not merged: each names its own",
+            value="reference.reflectors",
+            next_step="give them to `compd calibrate` side by side",
+        )
+        for recording in recordings
+        if recording.target_P_mm is not None and recording.reference and recording.reference.frame == "machine"
+    ]
+    problems += [
+        Problem(
             where=str(recording.path),
             what="has no time, so that nothing says when it began",
             allowed="recordings with `time_s`",

@@ -92,6 +92,8 @@ class Recording:
     left_out : reason -> rows of the file that are no row here (no time; empty row between others).
     columns : name -> (N,) every column as in the file, in the file's unit.
     warnings : what can be used but should be looked at.
+    target_P_mm : (N, 3) or None: where the row's reflector is, from the tip along the axes of {P}; nan where the cell
+        is empty; None where the tip itself was measured.
     faults : data that are wrong or look so. Cells that these take as empty are so in `quantities`, not in `columns`.
     """
 
@@ -132,6 +134,7 @@ class Recording:
     commanded_rotation_rad: FloatArray | None = None
     begin_s: float = 0.0
     faults: tuple[DataFault, ...] = ()
+    target_P_mm: FloatArray | None = None
 
     @property
     def machine(self) -> str:
@@ -214,7 +217,8 @@ class Recording:
     @property
     def reference_columns(self) -> tuple[str, ...]:
         """Names of the columns that hold the reference (`ball` for a ball plate, `pin` for a fixed pin)."""
-        return tuple(name for name in self.columns if name.startswith("reference_") or name in ("ball", "pin"))
+        own = ("ball", "pin", "reflector")
+        return tuple(name for name in self.columns if name.startswith("reference_") or name in own)
 
     @property
     def fixed_end(self) -> IntArray | None:

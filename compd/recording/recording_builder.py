@@ -42,6 +42,7 @@ from compd.recording.quantity_faults import hanging_reference, quantity_faults, 
 from compd.recording.quaternion import with_rotation_vectors
 from compd.recording.recording import Recording
 from compd.recording.reference_faults import reference_faults
+from compd.recording.reflectors import check_reflectors, reflector_places_mm
 from compd.recording.sidecar import Sidecar, read_sidecar
 from compd.tables import FIRST_ROW, ProblemList, Table, rows_text
 from compd.travel_direction import RowDirections
@@ -78,7 +79,7 @@ class RecordingBuilder:
         no_reference = sidecar is not None and sidecar.reference is None and self._reference_valid
         if sidecar is not None and no_reference and (needs_reference or sidecar.external):
             self._problems.append(_no_reference(sidecar))
-        self.id_columns = ("point", "pin", "ball") if _names_fixed_ends(sidecar) else ("point", "pin")
+        self.id_columns = ("point", "pin", "reflector", *["ball"] * _names_fixed_ends(sidecar))
         balls = sidecar.reference.balls if sidecar and sidecar.reference else None
         self._plate = None if balls is None else read_plate(balls, self._problems)
         self._directions = RowDirections()
@@ -115,6 +116,8 @@ class RecordingBuilder:
         self._check_whole(table, layout, excluded, table_problems, last)
         if self._plate is not None and "ball" in table.columns:
             check_balls(table, self._plate, table_problems)
+        if sidecar is not None and sidecar.reference is not None and sidecar.reference.reflectors is not None:
+            check_reflectors(table, sidecar.reference.reflectors, table_problems)
         if self._configuration is not None and sidecar is not None and sidecar.machine:
             counts = (layout.scales, layout.joints, layout.frame)
             quantity = sidecar.reference.quantity if sidecar.reference else None
@@ -184,6 +187,8 @@ class RecordingBuilder:
             return np.where(np.isnan(columns[name]), -1, columns[name]).astype(np.int64) if name in columns else None
 
         session, ball = ids("session"), ids("ball")
+        reflectors = None if sidecar.reference is None else sidecar.reference.reflectors
+        places_mm = None if reflectors is None else reflector_places_mm(table, reflectors)[kept]
         scale_mm = stack(scale_columns(layout.scales))
         approach = stack(approach_columns(layout.scales)) if layout.approach else None
         if approach is None and scale_mm is not None:
@@ -247,6 +252,7 @@ class RecordingBuilder:
             point_labels=table.labels.get("point", ()),
             begin_s=self._begin_s or 0.0,
             faults=tuple(faults),
+            target_P_mm=places_mm,
         )
 
     def _blank_rows(self, table: Table) -> int:
@@ -300,6 +306,8 @@ def _needed_columns(layout: Layout, sidecar: Sidecar | None, names: Collection[s
     reference_columns = [f"reference_{name}" for name in layout.reference]
     if reference is not None and reference.quantity == "ball_plate":
         reference_columns = ["ball"]
+    if reference is not None and reference.reflectors is not None:
+        reference_columns.append("reflector")
     if reference is not None and reference.of_fixed_places:
         own = ("pin",) if reference.quantity == "fixed_point" else (DISTANCE_COLUMN, "ball")
         reference_columns = [name for name in own if name in names]

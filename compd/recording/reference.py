@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationInfo, WithJsonSchema, field_validator, model_validator
 
+from compd.columns import AXES
 from compd.documents import Section, refusal
 from compd.units import REFERENCE_UNITS
 
@@ -75,6 +76,12 @@ class Reference(Section):
         default=None,
         description="distance only: the same distance in every row, in place of the column `reference_distance_mm`: "
         "the radius of a calibrated ball and that of the probe that touches it",
+    )
+
+    reflectors: dict[str, tuple[float, float, float]] | None = Field(
+        default=None,
+        description="tool_position only: by the name in the column `reflector`, where each reflector is on the "
+        "platform, from the tip along the axes of {P}, mm",
     )
 
     @property
@@ -166,6 +173,22 @@ class Reference(Section):
         _only_of("distance", info)
         return _positive(radius, "is no distance", "a number greater than 0, in mm")
 
+    @field_validator("reflectors", mode="before")
+    @classmethod
+    def _reflectors_of_a_position(cls, reflectors: Any, info: ValidationInfo) -> Any:
+        if reflectors is None:
+            return None
+        _only_of("tool_position", info)
+        if info.data.get("unit", "um") != "um":
+            raise refusal(f"are places, and the reference is in {info.data['unit']}", next_step="delete it")
+        if not isinstance(reflectors, dict) or not reflectors or not all(map(_is_place, reflectors.values())):
+            raise refusal(
+                "is no list of reflectors with the place of each",
+                "{1: [40, 0, -10], 2: [-20, 35, -10]}, in mm from the tip along the axes of {P}",
+                "take the places from the platform's drawing, or measure them",
+            )
+        return {str(name): tuple(map(float, place)) for name, place in reflectors.items()}
+
     @field_validator("balls", mode="before")
     @classmethod
     def _balls_of_a_ball_plate(cls, balls: Any, info: ValidationInfo) -> Any:
@@ -191,6 +214,13 @@ def _only_of(quantity: Quantity, info: ValidationInfo) -> None:
     """Refuse a key of another quantity than the reference's; an unknown key passes."""
     if info.data.get("quantity") not in (None, quantity):
         raise refusal(f"belongs to {quantity}, not to {info.data['quantity']}", next_step="delete it")
+
+
+def _is_place(place: Any) -> bool:
+    """Whether these are three finite numbers."""
+    if not isinstance(place, list) or len(place) != len(AXES):
+        return False
+    return all(isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in place)
 
 
 def _positive(value: Any, what: str, allowed: str) -> float:

@@ -67,7 +67,8 @@ def _left_out(reason: str, rows: IntArray, columns: tuple[str, ...], what: str) 
 def _pairs(columns: Mapping[str, FloatArray], same_frame: bool) -> Iterable[_Pair]:
     """The reference as a whole with the machine's position, links with their scales, then each axis alone."""
     names = list(columns)
-    scales = tuple(name for name in names if re.fullmatch(r"scale_\d+_mm|commanded_[xyz]_mm", name))
+    # another reflector at the same pose is another place
+    scales = tuple(name for name in names if re.fullmatch(r"scale_\d+_mm|commanded_[xyz]_mm|reflector", name))
     references = {m[1]: name for name in names if (m := re.fullmatch(r"reference_([xyz])_(?!rad)\w+", name))}
     models = {m[1]: name for name in names if (m := re.fullmatch(r"model_([xyz])_(?!rad)\w+", name))}
     axes = [axis for axis in "xyz" if axis in references]

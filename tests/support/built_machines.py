@@ -131,31 +131,36 @@ def record(
     noise: float = 1.0,
     pose: bool = True,
     gross_mm: dict[int, float] | None = None,
+    reflectors: dict[str, list[float]] | None = None,
 ) -> Path:
     """A recording in an instrument's frame, with a target of its own place and turn where it shows attitudes.
 
     noise : times `NOISE_MM` and `NOISE_RAD`.  pose : False for positions of the tip alone.  gross_mm : error of single
-    poses, by their place.
+    poses, by their place.  reflectors : places on the platform, each seen at every pose in place of the
+    tip.
     """
     frame, body = Rotation.from_rotvec(rng.uniform(-1, 1, 3)), Rotation.from_rotvec(rng.uniform(-1, 1, 3))
     at, place_P = rng.uniform(-500, 500, 3), rng.uniform(-30, 30, 3) if pose else np.zeros(3)
     lines: list[str] = []
     for reading, tip, R in poses(world, targets(world, rng) if wanted is None else wanted):
-        seen = frame.apply(tip + R @ place_P) + at + noise * NOISE_MM * rng.standard_normal(3)
-        seen = seen + np.array([(gross_mm or {}).get(len(lines), 0.0), 0.0, 0.0])
-        row = [*reading, *seen]
-        if pose:
-            off = Rotation.from_rotvec(noise * NOISE_RAD * rng.standard_normal(3))
-            row += (off * frame * Rotation.from_matrix(R) * body).as_quat().tolist()
-        lines.append(",".join(repr(float(value)) for value in row))
-        if len(lines) == count:
+        for name, on_P in (reflectors or {"": place_P.tolist()}).items():
+            seen = frame.apply(tip + R @ np.array(on_P)) + at + noise * NOISE_MM * rng.standard_normal(3)
+            seen = seen + np.array([(gross_mm or {}).get(len(lines), 0.0), 0.0, 0.0])
+            row = [*reading, *seen]
+            if pose:
+                off = Rotation.from_rotvec(noise * NOISE_RAD * rng.standard_normal(3))
+                row += (off * frame * Rotation.from_matrix(R) * body).as_quat().tolist()
+            lines.append(",".join([*(repr(float(value)) for value in row), *([name] if name else [])]))
+        if len(lines) >= count:
             break
     names = [f"scale_{i + 1}_mm" for i in range(world.drawn.scales)] + [f"reference_{axis}_mm" for axis in "xyz"]
     names += [f"reference_q{part}" for part in "xyzw"] if pose else []
+    names += ["reflector"] if reflectors else []
     path.write_text("\n".join([",".join(names), *lines]) + "\n", encoding="utf-8")
     reference: dict[str, Any] = {"quantity": "tool_pose" if pose else "tool_position", "frame": "instrument"}
     reference["sigma_um"] = 1e3 * NOISE_MM
     reference |= {"sigma_urad": 1e6 * NOISE_RAD} if pose else {}
+    reference |= {"reflectors": reflectors} if reflectors else {}
     sidecar = {"machine": world.name, "machine_file": f"{world.name}.yaml", "reference": reference}
     path.with_suffix(".yaml").write_text(yaml.safe_dump(sidecar), encoding="utf-8")
     return path

@@ -12,7 +12,7 @@ from compd.comparison.alignment.external_machine import external_observations
 from compd.comparison.alignment.fixed_ends import place_balls, place_pins
 from compd.comparison.alignment.measured_attitude import attitude_mm, measured_attitude, target_turn
 from compd.comparison.alignment.registration import Registration, register
-from compd.comparison.alignment.target_place import HELD, PlacedTarget, place_target
+from compd.comparison.alignment.target_place import HELD, PlacedTarget, place_target, target_M_mm
 from compd.comparison.alignment.velocity import velocities
 from compd.comparison.criteria import ComparisonCriteria, SpeedCriteria
 from compd.compensation import scales_of_command
@@ -76,6 +76,15 @@ def align_observations(
         recording does not fit in any case.
     """
     assert recording.reference is not None
+    if recording.target_P_mm is not None and (model is None or model.arrangement.on_plate):
+        raise RecordingError(
+            Problem(
+                where=f"{recording.sidecar.path} reference.reflectors",
+                what="are on the platform of a machine that carries its tool, and this recording's is none",
+                allowed="machines of which the platform carries the tool",
+                next_step="make a recording of each reflector by itself",
+            )
+        )
     if held and part_of is None:
         _check_held(recording, model, held)
     if recording.reference_link_mm is not None:
@@ -124,7 +133,8 @@ def align_observations(
     elif registration is not None:
         measured_mm = registration.into_M(_in_space(measured_mm, axes))[:, list(axes)]
     elif recording.reference.frame == "instrument" and part_of is None:
-        registration, measured_mm = _registered(recording, measured_mm, observations.tip_M_mm, axes, criteria)
+        seen_M_mm = target_M_mm(observations.tip_M_mm, nominal, recording.target_P_mm)
+        registration, measured_mm = _registered(recording, measured_mm, seen_M_mm, axes, criteria)
     labels = recording.reference_axes
     # beside a declared noise of the position nothing says what a urad counts: the attitude is compared, and fits no
     # effect; where no noise is declared, each counts by the size of its own residual

@@ -25,7 +25,7 @@ from compd.comparison.alignment.registration import (
     points_spread_mm,
     registration_columns,
 )
-from compd.comparison.alignment.target_place import HELD, PlacedTarget
+from compd.comparison.alignment.target_place import HELD, PlacedTarget, target_change, target_M_mm
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.lone_visits import lone_distance
 from compd.comparison.outliers import outlier_rows
@@ -181,7 +181,8 @@ class AlignedRecording:
         prediction = predict(self.model, rows, added)
         if self.of_links:
             return (prediction.link_length_mm - self.model.zero.link_length_mm)[:, list(self.axes)]
-        shown = self._from_ends(prediction.tip_mm[:, list(self.axes)])
+        seen_mm = target_M_mm(prediction.tip_mm, prediction.rotation_M_P, self.recording.target_P_mm)
+        shown = self._from_ends(seen_mm[:, list(self.axes)])
         if self.with_attitude:
             return np.concatenate([shown, attitude_mm(prediction.rotation_M_P, rows.rotation_M_P)], axis=1)
         return shown
@@ -192,16 +193,23 @@ class AlignedRecording:
 
     @cached_property
     def nominal_tip_mm(self) -> FloatArray:
-        """(N, 3) the tip that is predicted without effects, in the frame in which the reference shows it."""
+        """(N, 3) what is seen of the tip as predicted without effects, in the frame in which the reference shows it.
+
+        Where reflectors were measured in its place, these.
+        """
         if self.model is None:
             return self.rows.tip_M_mm
-        return predict(self.model, self.rows, {}).tip_mm
+        prediction = predict(self.model, self.rows, {})
+        return target_M_mm(prediction.tip_mm, prediction.rotation_M_P, self.recording.target_P_mm)
 
     def shown(self, sensitivity: Sensitivity) -> FloatArray:
         """(N, m, size) the measured coordinates' share of a prediction's derivatives."""
         if self.of_links:
             return sensitivity.link_length[:, list(self.axes)]
-        shown = self.along_ends(sensitivity.tip[:, list(self.axes)])
+        tip, place_P_mm = sensitivity.tip, self.recording.target_P_mm
+        if place_P_mm is not None:
+            tip = target_change(tip, sensitivity.rotation, self.rows.rotation_M_P, place_P_mm)
+        shown = self.along_ends(tip[:, list(self.axes)])
         if self.with_attitude:
             return np.concatenate([shown, sensitivity.rotation * MM_PER_RAD], axis=1)
         return shown
@@ -254,8 +262,9 @@ class AlignedRecording:
         if self.ends is not None:
             return self.ends.columns(self.nominal_tip_mm)
         if self.registered:
-            points_M_mm = self.rows.tip_M_mm if self.part_of is None else self.part_of.rows.tip_M_mm
-            columns = registration_columns(self.rows.tip_M_mm, self.axes, points_M_mm)
+            seen_M_mm = self._seen_M_mm
+            points_M_mm = seen_M_mm if self.part_of is None else self.part_of._seen_M_mm
+            columns = registration_columns(seen_M_mm, self.axes, points_M_mm)
             place = self._place_columns
             spread_mm = points_spread_mm(points_M_mm)
             if self.with_attitude:
@@ -266,6 +275,11 @@ class AlignedRecording:
         if self.model is None:
             return displacement_columns(*self.measured_mm.shape)
         return np.zeros((*self.measured_mm.shape, 0))
+
+    @property
+    def _seen_M_mm(self) -> FloatArray:
+        """(N, 3) the tip of the rows, or the reflector that was measured in its place."""
+        return target_M_mm(self.rows.tip_M_mm, self.rows.rotation_M_P, self.recording.target_P_mm)
 
     @property
     def _place_columns(self) -> FloatArray:

@@ -4,6 +4,8 @@ A marker body or a reflector with an attitude of its own, at the place d in {P} 
 
     x_M = tip_M + R d.
 
+Several reflectors at different places have a d each, which the sidecar gives; the attitude is then that of the model.
+
 Where the attitude R varies, d is told apart from a displacement of the instrument's frame. The first registration finds
 frame and d together, by Gauss and Newton's method; in every fit d has columns of its own, R.
 """
@@ -64,7 +66,23 @@ class PlacedTarget(NamedTuple):
 
     def tip_M_mm(self, points_mm: FloatArray, attitude_M_P: FloatArray) -> FloatArray:
         """(N, 3) the tip from points (N, 3) in the instrument's frame and attitudes (N, 3, 3) of {P} in {M}."""
-        return np.asarray(self.registration.into_M(points_mm) - attitude_M_P @ self.place_P_mm)
+        return target_M_mm(self.registration.into_M(points_mm), attitude_M_P, -self.place_P_mm)
+
+
+def target_M_mm(tip_M_mm: FloatArray, attitude_M_P: FloatArray, place_P_mm: FloatArray | None) -> FloatArray:
+    """(N, 3) where targets are whose place in {P} from the tip is (3,), or (N, 3) of each row; the tip for None."""
+    return tip_M_mm if place_P_mm is None else tip_M_mm + np.einsum("...ij,...j", attitude_M_P, place_P_mm)
+
+
+def target_change(
+    tip: FloatArray, rotation: FloatArray, attitude_M_P: FloatArray, place_P_mm: FloatArray
+) -> FloatArray:
+    """(N, 3, K) changes of such targets (mm) by those of the tip (mm) and of the attitude about axes of {M} (rad).
+
+    tip, rotation : (N, 3, K).  attitude_M_P, place_P_mm : as of `target_M_mm`.
+    """
+    lever_mm = np.einsum("...ij,...j", attitude_M_P, place_P_mm)
+    return np.asarray(tip + np.cross(rotation, lever_mm[..., None], axis=1))
 
 
 def place_target(

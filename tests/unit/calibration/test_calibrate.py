@@ -110,6 +110,33 @@ def test_positions_of_a_reflector_alone_serve_as_well(tmp_path: Path) -> None:
     assert result.sealed[0].after_rms_um < 0.5 * result.sealed[0].before_rms_um
 
 
+THREE = {"A": [60.0, 0.0, -15.0], "B": [-30.0, 50.0, 10.0], "C": [-30.0, -50.0, 25.0]}
+
+
+def test_three_reflectors_at_different_places_tell_what_turns_the_platform(tmp_path: Path) -> None:
+    world, rng = world_of(tmp_path, "6-ups", seed=6)
+    learned = opened(record(tmp_path / "monday.csv", world, rng, 3 * POSES, pose=False, reflectors=THREE))
+    alone = opened(record(tmp_path / "alone.csv", world, rng, POSES, pose=False))
+    other = opened(record(tmp_path / "other.csv", world, rng, POSES, noise=0.0))
+    three, one = compd.calibrate(learned, other), compd.calibrate(alone, other)
+    assert three.sealed[0].after_rms_um < 0.3 * three.sealed[0].before_rms_um
+    assert three.sealed[0].after_rms_um < one.sealed[0].after_rms_um
+    off = deviations(world, learned, three)
+    assert len(off) > len(deviations(world, alone, one))
+    assert np.abs(off).max() < 4.5
+
+
+def test_the_place_of_a_reflector_is_that_of_the_tip_where_it_is_none(tmp_path: Path) -> None:
+    """A recording with one reflector at the tip says the same as one of the tip."""
+    world, _ = world_of(tmp_path, "6-ups", seed=6)
+    both = [
+        opened(record(tmp_path / f"{name}.csv", world, np.random.default_rng(1), 30, pose=False, reflectors=places))
+        for name, places in (("tip", None), ("named", {"1": [0.0, 0.0, 0.0]}))
+    ]
+    tip, named = map(compd.calibrate, both)
+    assert [number.change for number in named.numbers] == [number.change for number in tip.numbers]
+
+
 @pytest.mark.parametrize("kind", ["linear-delta", "rotary-delta"])
 def test_the_place_of_a_target_is_no_error_of_a_platform_that_only_shifts(kind: str, tmp_path: Path) -> None:
     """As built it tilts by half a mrad: a target 30 mm from the tip moves by 15 um that are none of the tip."""
