@@ -6,7 +6,7 @@ the same. A second session, or a second time up after a time down, can contradic
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -29,15 +29,24 @@ def seen_once(aligned: AlignedRecording, used: BoolArray, effects: Iterable[Effe
     session = aligned.recording.session
     if session is not None and len(np.unique(session[used & (session >= 0)])) > 1:
         return []
-    return [effect.id for effect in effects if is_thermal(effect) and not _cycles(aligned, used, effect, criteria)]
+    quantities, links = aligned.rows.quantities, aligned.rows.links
+
+    def cycles(effect: Effect) -> bool:
+        names = [name for name in needed_quantities(effect, links) if name.startswith("temperature")]
+        return has_cycled([quantities[name][used] for name in names if name in quantities], criteria.swing_share)
+
+    return [effect.id for effect in effects if is_thermal(effect) and not cycles(effect)]
 
 
-def _cycles(aligned: AlignedRecording, used: BoolArray, effect: Effect, criteria: Criteria) -> bool:
-    """Whether a temperature of an effect goes up and down, and the first way again."""
-    quantities = aligned.rows.quantities
-    names = [name for name in needed_quantities(effect, aligned.rows.links) if name.startswith("temperature")]
-    columns = [quantities[name][used] for name in names if name in quantities]
-    return any(swings(column[np.isfinite(column)], criteria.swing_share) > 2 for column in columns)
+def has_cycled(temperatures: Sequence[FloatArray], share: float) -> bool:
+    """Whether one of some temperatures goes up and down, and the first way again.
+
+    temperatures : (R,) each, in order. One that moves by less than a share of what another moves shows its noise alone.
+    """
+    known = [values[np.isfinite(values)] for values in temperatures]
+    ranges = [float(np.ptp(values)) if len(values) else 0.0 for values in known]
+    moving = [values for values, moved in zip(known, ranges, strict=True) if moved >= share * max(ranges)]
+    return any(swings(values, share) > 2 for values in moving)
 
 
 def swings(values: FloatArray, share: float) -> int:
