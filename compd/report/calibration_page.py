@@ -10,7 +10,7 @@ from plotly.graph_objects import Bar, Figure, Heatmap, Scatter, Scatter3d
 from plotly.subplots import make_subplots
 
 from compd.arrays import BoolArray, FloatArray, rms
-from compd.calibration import Calibration, PoseErrors, PredictionMap
+from compd.calibration import CalibratedNumber, Calibration, PoseErrors, PredictionMap
 from compd.display_unit import format_error
 from compd.report.figures import ARROW_SHARE, ARROWS
 from compd.report.page import COLOURS, Panel, style_figure, write_page
@@ -222,7 +222,17 @@ def _side(name: str, at: FloatArray) -> tuple[FloatArray, str]:
 
 
 def _numbers(calibration: Calibration) -> PageTable:
-    head = ("number", "drawing", "as built", "change", "standard error", "unit", "largest correlation", "needed", "")
+    head = (
+        "number",
+        "drawing",
+        "as built",
+        "change",
+        "standard error",
+        "unit",
+        "largest correlation",
+        "needed",
+        "held",
+    )
     return PageTable(
         head,
         [
@@ -230,16 +240,21 @@ def _numbers(calibration: Calibration) -> PageTable:
                 number.element,
                 _stated(number.drawing, number.unit),
                 _stated(number.value, number.unit),
-                f"{number.change:+.3g}",
+                _change(number),
                 f"{number.std:.2g}",
                 number.unit,
                 f"{number.correlation:+.2f} {number.with_whom}" if number.with_whom else "-",
                 "yes" if number.needed else "no",
-                "held" if number.needed and number.held else "",
+                "yes" if number.needed and number.held else "",
             ]
             for number in calibration.numbers
         ],
     )
+
+
+def _change(number: CalibratedNumber) -> str:
+    """Less than a billionth of the tolerance is the rounding of value less drawing."""
+    return "0" if abs(number.change) < 1e-9 * number.prior_std else f"{number.change:+.3g}"
 
 
 def _stated(value: float, unit: str) -> str:
