@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 import compd
 from compd.arrays import FloatArray
-from compd.calibration import Parameters
+from compd.calibration import Calibration, Parameters, calibration_parameters
+from compd.comparison import AlignedRecording
 from compd.configuration import load
 from compd.machine_kinds import KINDS, machine_text
 from compd.simulation import Mechanism
@@ -203,3 +204,14 @@ def truth(world: World, parameters: Parameters) -> FloatArray:
         own["hinge_inclination"] = 1e6 * de[:, 2]
     values = [own[block.effect.id][block.used[: len(own[block.effect.id])]] for block in parameters.blocks]
     return np.concatenate(values)
+
+
+def deviations(world: World, learned: AlignedRecording, result: Calibration) -> FloatArray:
+    """Of the claimed numbers from the truth, in standard errors."""
+    without = ["tool_offset"] if learned.target is not None else []
+    assert learned.model is not None
+    parameters = calibration_parameters(learned.model, learned.rows, (), without)
+    off = truth(world, parameters)
+    return np.array(
+        [(n.change - own) / n.std for n, own in zip(result.numbers, off, strict=True) if n.claimed], dtype=np.float64
+    )

@@ -11,10 +11,10 @@ import pytest
 
 import compd
 from compd.arrays import FloatArray
-from compd.calibration import Calibration, calibration_parameters, check_calibration
+from compd.calibration import check_calibration
 from compd.comparison import AlignedRecording
 from compd.machine_kinds import KINDS
-from tests.support.built_machines import NOISE_MM, World, built, drawing, record, truth
+from tests.support.built_machines import NOISE_MM, World, built, deviations, drawing, record
 
 POSES = 60
 
@@ -26,17 +26,6 @@ def world_of(directory: Path, kind: str, seed: int, tolerance_mm: float = 0.05) 
 
 def opened(path: Path) -> AlignedRecording:
     return compd.open_recording(path)
-
-
-def deviations(world: World, learned: AlignedRecording, result: Calibration) -> FloatArray:
-    """Of the claimed numbers from the truth, in standard errors."""
-    without = ["tool_offset"] if learned.target is not None else []
-    assert learned.model is not None
-    parameters = calibration_parameters(learned.model, learned.rows, (), without)
-    off = truth(world, parameters)
-    return np.array(
-        [(n.change - own) / n.std for n, own in zip(result.numbers, off, strict=True) if n.claimed], dtype=np.float64
-    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
