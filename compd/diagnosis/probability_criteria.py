@@ -20,13 +20,13 @@ class ProbabilityCriteria:
     """
 
     certain: float = threshold(
-        4.1,
+        3.5,
         unit="logarithm of odds",
         meaning="where no other set that was seen may be better, and only noise is left",
         reason=_FITTED,
     )
     per_better: float = threshold(
-        0.52,
+        0.42,
         unit="logarithm of odds",
         meaning="what each factor e of N + unseen takes off",
         reason=_FITTED,
@@ -38,7 +38,7 @@ class ProbabilityCriteria:
         reason=_FITTED,
     )
     above_noise: float = threshold(
-        1.5,
+        0.9,
         unit="logarithm of odds",
         meaning="what an error above the noise takes off that nothing describes",
         reason=_FITTED,
