@@ -448,7 +448,7 @@ def test_a_release_that_does_not_start_gives_way_to_the_one_before(service: Serv
     shebang, rest = program.read_text().split("\n", 1)
     program.write_text(f"{shebang}\n{broken}{rest}")
     with pytest.raises(AssertionError, match="did not become ok within"):
-        service.container.run(str(next_release), "service", "upgrade")
+        print(service.container.run(str(next_release), "service", "upgrade"))
     assert str(COMPD) in service.shown("ExecStart")
     service.wait_for_ok()
 
