@@ -15,7 +15,7 @@ from compd.files import write_files
 from compd.installation.installing import DAEMON, PAGE, check_step, unit_path
 from compd.installation.shipped_units import program_problems, shipped_file
 from compd.installation.step import Step
-from compd.setpoint_states import State
+from compd.setpoint_states import State, state_named
 
 # Longest wait (s) for the state before: a start takes one or two seconds, and a correction may slew for more.
 PATIENCE_S = 30.0
@@ -36,6 +36,13 @@ class Replacement:
     before: str
     after: str
     without_s: float
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether setpoints are not valid after it, or not ok, and were before."""
+        before, after = state_named(self.before), state_named(self.after)
+        was_valid, is_valid = (state is not None and state.valid for state in (before, after))
+        return (was_valid and not is_valid) or (before is State.OK and after is not State.OK)
 
 
 def upgrade(socket: str, program: Path, clock: Clock | None = None) -> Replacement:
@@ -122,15 +129,15 @@ def _exchange(socket: str, new: Mapping[str, str], clock: Clock) -> Replacement:
     old = {unit: unit_path(unit).read_text("utf-8") for unit in new}
     _write(new, old)
     came = _restart(socket, clock)
-    if came.before == State.OK and came.after != State.OK:
+    if came.is_worse:
         _write(old, new)
         back = _restart(socket, clock, State.OK)
         raise CompdError(
             Problem(
                 where="the release that replaced the one before",
-                what=f"did not become ok within {PATIENCE_S:g} s",
+                what=f"did not come as far as the one before within {PATIENCE_S:g} s",
                 value=came.after,
-                allowed="ok, as before",
+                allowed=f"{State.OK}, or {came.before} as before",
                 next_step=f"the release before runs again ({back.after}); look at `journalctl --unit {DAEMON}`",
             )
         )
