@@ -2,8 +2,8 @@
 
 What a page writes below /opt, /etc and /usr/lib goes into the stage. `sudo` runs the command that follows.
 `python3 -m venv` makes an environment whose pip does not install, but checks what it is told (.ci/run builds and
-installs the wheel). `install` leaves the owner of a file out, a user that has been made in the stage alone.
-`systemd-sysusers` runs with the stage as its root. `systemctl` checks that what it is told to start could be started.
+installs the wheel). Of its compd `service install` does its steps in the stage, but for those that only a system can
+do; a test in a container upgrades and goes back. `systemctl` checks that what it is told to start could be started.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+from compd.configuration import load
+from compd.installation import install_steps
 from tests.support.paths import ROOT
 
 PREFIXES = ("/opt/", "/etc/", "/usr/lib/")
-PROGRAMS = ("sudo", "python3", "install", "systemctl", "systemd-sysusers")
+PROGRAMS = ("sudo", "python3", "systemctl")
 # Directories that a system has before anything is installed.
-DIRECTORIES = ("opt", "etc/systemd/system", "usr/lib/sysusers.d")
+DIRECTORIES = ("opt", "etc/systemd/system")
 
 
 def staged(command: str, stage: Path) -> str:
@@ -57,30 +59,43 @@ def _python3(stage: Path, arguments: list[str]) -> None:
         case ["-m", "venv", directory]:
             programs = Path(directory) / "bin"
             programs.mkdir(parents=True)
-            _write_program(programs / "pip", stage, "pip")
+            for name in ("pip", "compd"):
+                _write_program(programs / name, stage, name)
         case _:
             raise SystemExit(f"python3: the stage has no {arguments}")
 
 
-def _pip(stage: Path, arguments: list[str]) -> None:
+def _pip(_: Path, arguments: list[str]) -> None:
     if arguments != ["install", "dist/compd-*.whl"]:
         raise SystemExit(f"pip: not what `make wheel` builds: {arguments}")
-    (stage / "opt/compd/bin/compd").symlink_to(Path(sys.executable).parent / "compd")
 
 
-def _install(_: Path, arguments: list[str]) -> None:
+def _compd(stage: Path, arguments: list[str]) -> None:
     match arguments:
-        case ["-m", mode, "-o", "compd-page", "-g", "compd-page", *files]:
-            arguments = ["-m", mode, *files]
-    os.execv("/usr/bin/install", ["install", *arguments])
+        case ["service", "install", configuration]:
+            for step in install_steps(load(Path(configuration)), Path("/opt/compd/bin/compd"), page=True):
+                match step.command:
+                    case ["install", "-D", *_, path]:
+                        target = Path(staged(path, stage))
+                        target.parent.mkdir(parents=True, exist_ok=True)
+                        target.write_text(step.text or "")
+                        target.chmod(int(step.command[3], 8))
+                    case ["systemd-sysusers"]:
+                        _sysusers(stage)
+                    case ["systemctl", *rest]:
+                        _systemctl(stage, rest)
+        case ["service", "upgrade" | "back"]:
+            pass
+        case _:
+            os.execv(Path(sys.executable).parent / "compd", ["compd", *arguments])
 
 
-def _sysusers(stage: Path, arguments: list[str]) -> None:
+def _sysusers(stage: Path) -> None:
     program = shutil.which("systemd-sysusers", path="/usr/bin:/bin")
     if program is None:
         print("systemd-sysusers is not installed: not checked")
         return
-    subprocess.run([program, f"--root={stage}", *arguments], check=True)
+    subprocess.run([program, f"--root={stage}"], check=True)
     if "\ncompd:" not in "\n" + (stage / "etc/passwd").read_text():
         raise SystemExit("systemd-sysusers made no user compd")
 
@@ -91,8 +106,9 @@ def _systemctl(stage: Path, arguments: list[str]) -> None:
             pass
         case ["restart", name] if (stage / f"etc/systemd/system/{name}.service").is_file():
             pass
-        case ["enable", "--now", name]:
-            _check_unit(stage, stage / f"etc/systemd/system/{name}.service")
+        case ["enable", "--now", *names]:
+            for name in names:
+                _check_unit(stage, stage / f"etc/systemd/system/{name}.service")
         case _:
             raise SystemExit(f"systemctl: the stage has no {arguments}")
 
@@ -106,7 +122,7 @@ def _check_unit(stage: Path, unit: Path) -> None:
     assert user is not None, text
     program, configuration = (Path(staged(name, stage)) for name in start.groups())
     subprocess.run([program, "check", configuration], check=True, stdout=subprocess.DEVNULL)
-    assert re.search(rf"(?m)^u {user[1]} ", (stage / "usr/lib/sysusers.d/compd.conf").read_text())
+    assert re.search(rf"(?m)^u {user[1]} ", (stage / "etc/sysusers.d/compd.conf").read_text())
     if shutil.which("systemd-analyze") is None:
         print("systemd-analyze is not installed: the unit is not verified")
         return
@@ -116,8 +132,8 @@ def _check_unit(stage: Path, unit: Path) -> None:
 
 
 MAIN = {
-    **{"sudo": _sudo, "python3": _python3, "pip": _pip, "install": _install},
-    **{"systemd-sysusers": _sysusers, "systemctl": _systemctl},
+    **{"sudo": _sudo, "python3": _python3, "pip": _pip},
+    **{"compd": _compd, "systemctl": _systemctl},
 }
 
 if __name__ == "__main__":

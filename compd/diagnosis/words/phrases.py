@@ -10,6 +10,7 @@ import numpy as np
 
 from compd.comparison import Comparison
 from compd.diagnosis.findings import (
+    CandidateResult,
     ConstantFinding,
     DiagnosisStep,
     EmpiricalFinding,
@@ -307,6 +308,12 @@ def shown_by(diagnosis: Diagnosis) -> str:
     if ends is None:
         return ""
     return " that lengths can show" if ends.of_lengths else " that pins can show"
+
+
+def too_small(diagnosis: Diagnosis) -> CandidateResult | None:
+    """The effect that surely acts and takes too little for a name, the one that takes most; None without any."""
+    small = [candidate for candidate in diagnosis.candidates if candidate.status == "too_small"]
+    return min(small, key=lambda candidate: candidate.heldout_rms_um, default=None)
 
 
 def was_any_tried(diagnosis: Diagnosis) -> bool:

@@ -17,6 +17,7 @@ from compd.diagnosis.words.phrases import (
     rivals_text,
     shown_by,
     thermal_in_one_session,
+    too_small,
     was_any_tried,
 )
 from compd.text import join_words, number_text
@@ -43,6 +44,11 @@ def _verdict(diagnosis: Diagnosis) -> str:
         case "adequate" if fall.noise_known:
             but = " but for a constant" if diagnosis.constant else ""
             own, nothing = number_text(fall.noise, fall.unit), f"Nothing is missing{shown_by(diagnosis)}{but}"
+            if (small := too_small(diagnosis)) is not None:
+                return (
+                    f"{nothing} that could be named: the error of {before} is little above the noise ({own}). "
+                    f"{small.effect} may act: {small.why}."
+                )
             if diagnosis.before.at_floor:
                 return f"{nothing}: the error of {before} is the measurement's own noise ({own})."
             return f"{nothing} that could be named: the error of {before} is so little above the noise ({own})."

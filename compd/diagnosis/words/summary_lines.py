@@ -27,6 +27,7 @@ from compd.diagnosis.words.phrases import (
     rivals_text,
     shown_by,
     thermal_in_one_session,
+    too_small,
     untested_here,
     was_any_tried,
 )
@@ -93,9 +94,11 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
         case "adequate" if fall.noise_known and diagnosis.constant is not None:
             text = "nothing is missing but a constant; what varies is noise"
         case "adequate" if fall.noise_known:
-            text = (
-                f"nothing is missing{shown_by(diagnosis)}; the error of {number_text(fall.before, fall.unit)} is noise"
+            error, only_noise = number_text(fall.before, fall.unit), too_small(diagnosis) is None
+            rest = (
+                f"; the error of {error} is noise" if only_noise else f" that could be named; {error} is near the noise"
             )
+            text = f"nothing is missing{shown_by(diagnosis)}{rest}"
         case "identified":
             text = f"What is missing is {{}}: {fall.text(fall.after)}"
         case "likely":
@@ -199,7 +202,9 @@ def _left(diagnosis: Diagnosis, fall: ErrorFall) -> list[str]:
         check = f"check `{sigma_key(fall.unit)}`"
         return [f"{text}; {fall.unknown}", *([check] if given_up else remarks)]
     at_floor = left**2 <= diagnosis.criteria.most_at_floor * fall.noise**2
-    if diagnosis.verdict in ("adequate", "identified", "likely", "ambiguous") or at_floor:
+    if diagnosis.verdict == "adequate" and (small := too_small(diagnosis)) is not None:
+        meaning = f"{small.effect} may act, too little for a name"
+    elif diagnosis.verdict in ("adequate", "identified", "likely", "ambiguous") or at_floor:
         meaning = "only noise is left"
     elif diagnosis.steps and is_best_a_change(diagnosis):
         meaning = "some of it goes with the change"

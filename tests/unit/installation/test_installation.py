@@ -1,4 +1,4 @@
-"""What an installation does, without a system to install on: its steps, what is refused, and when a release is worse."""
+"""An installation without a system to install on: its steps, what is refused, and when a release is worse."""
 
 from __future__ import annotations
 
