@@ -34,7 +34,7 @@ class NaiveUser:
     def open(self, recording: str, model: str) -> None:
         """Choose a recording, name a model, and wait for the effects."""
         self.tab.get_by_label("Recording", exact=True).select_option(recording)
-        self.tab.get_by_label("Model", exact=True).fill(model)
+        self.tab.get_by_label("Model file, new or old").fill(model)
         self.press("Open")
         self.wait_for_effects()
 
@@ -56,8 +56,8 @@ class NaiveUser:
         effects.get_by_role("option").filter(has_text=words).first.click()
         chosen = effects.get_by_role("option", selected=True)
         name = str(chosen.inner_text()).splitlines()[0]
-        self.press("Fit (0)")
-        self.press("Add (a)")
+        self.press("Fit")
+        self.press("Add …")
         self.tab.get_by_role("button", name=re.compile("^Add it to the model")).wait_for()
         warnings = self.tab.get_by_role("alert").filter(visible=True)
         return Offered(name, str(warnings.first.inner_text()) if warnings.count() else "")

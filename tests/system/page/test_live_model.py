@@ -55,7 +55,8 @@ def add_by_mouse(tab, effect):
     tab.locator(f".effect[data-effect={effect}]").click()
     until(tab, "bench.trial")
     tab.locator("#add").click()
-    tab.locator("#confirm").click()
+    # it is there when the diagnosis has said whether the rows support it
+    tab.locator("#confirm").click(timeout=120_000)
     until(tab, f"bench.summary?.ledger.length === 1 && {SHOWN}")
 
 

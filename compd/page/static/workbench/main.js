@@ -18,7 +18,7 @@ const at = (id) => document.getElementById(id);
 const bench = new Bench(at("problem-line"));
 const selection = new Selection();
 const strip = new Strip(at("errors"), at("verdict"));
-const picture = new Picture({ canvas: at("picture"), tabs: at("tabs"), against: at("against"), note: at("picture-note") }, selection);
+const picture = new Picture({ canvas: at("picture"), tabs: at("tabs"), around: at("around"), against: at("against"), note: at("picture-note") }, selection);
 const card = new Card(at("card"), (rivals) => plan.planFor(rivals));
 const effects = new Effects(at("effects"), at("filter"), at("effects-note"), { choose: (effect) => card.choose(effect), ranked: (ranking) => strip.measured(ranking) });
 const diagnosis = new Diagnosis(at("diagnosis"), {

@@ -13,8 +13,8 @@ const CHOSEN = "#e69f00";
 
 export class Picture {
   // selection: of rows, shared by all views of rows
-  constructor({ canvas, tabs, against, note }, selection) {
-    Object.assign(this, { canvas, tabs, against, note, selection, rows: null, left: null, kind: "3D", views: {}, without: false, scales: new Map(), machine: "" });
+  constructor({ canvas, tabs, around, against, note }, selection) {
+    Object.assign(this, { canvas, tabs, around, against, note, selection, rows: null, left: null, kind: "3D", views: {}, without: false, scales: new Map(), machine: "" });
     const draw = () => this.draw();
     this.lasso = new Lasso(canvas, { wanted: (event) => event.button === 0 && (event.shiftKey || this.kind !== "3D"), draw, around: (contains) => this.pick(contains) });
     this.turn = new Turn(canvas, draw);
@@ -62,7 +62,8 @@ export class Picture {
   choose(kind) {
     this.kind = kind;
     const kinds = Object.keys(this.views);
-    this.tabs.replaceChildren(...kinds.slice(0, this.tabbed).map((name) => element("button", { type: "button", role: "tab", "aria-selected": String(name === kind), onclick: () => this.choose(name) }, name)), ...this.machineSwitch(kind));
+    this.tabs.replaceChildren(...kinds.slice(0, this.tabbed).map((name) => element("button", { type: "button", role: "tab", "aria-selected": String(name === kind), onclick: () => this.choose(name) }, name)));
+    this.around.replaceChildren(...this.machineSwitch(kind));
     this.against.replaceChildren(element("option", { value: "" }, "against …"), ...kinds.slice(this.tabbed).map((name) => element("option", { value: name, selected: name === kind }, name)));
     this.draw();
   }
