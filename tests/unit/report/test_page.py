@@ -115,6 +115,7 @@ def test_lines_to_be_copied_stay(tmp_path: Path) -> None:
 
 def test_x_y_and_z_have_the_colours_of_the_page_server() -> None:
     rules = (STATIC / "page.css").read_text(encoding="utf-8")
-    assert '@import url("axes.css")' in rules
+    for page in STATIC.glob("*.html"):
+        assert 'href="/static/axes.css"' in page.read_text(encoding="utf-8"), page.name
     assert not re.search(r"--[xyz]:", rules)
     assert SERIES_COLOURS[:3] == tuple(AXIS_COLOURS[axis] for axis in "xyz")
