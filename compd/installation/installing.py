@@ -8,7 +8,7 @@ from pathlib import Path
 from compd.configuration import Configuration
 from compd.errors import Problem
 from compd.installation.shipped_units import program_problems, shipped_file
-from compd.installation.step import Step, installed_file
+from compd.installation.system_command import SystemCommand, installed_file
 
 MACHINE = Path("/etc/compd/machine.yaml")
 UNIT_DIRECTORY = Path("/etc/systemd/system")
@@ -56,7 +56,7 @@ def install_problems(configuration: Configuration, program: Path, page: bool) ->
     return problems
 
 
-def install_steps(configuration: Configuration, program: Path, page: bool) -> list[Step]:
+def install_steps(configuration: Configuration, program: Path, page: bool) -> list[SystemCommand]:
     """The steps, in their order; each may be done again.
 
     Parameters
@@ -68,9 +68,9 @@ def install_steps(configuration: Configuration, program: Path, page: bool) -> li
     text = configuration.path.read_text(encoding="utf-8")
     steps = [
         installed_file("/etc/sysusers.d/compd.conf", shipped_file("compd.sysusers", program), "name the users"),
-        Step("make the users", ("systemd-sysusers",)),
+        SystemCommand("make the users", ("systemd-sysusers",)),
         installed_file(str(MACHINE), text, "the machine's configuration"),
-        Step(
+        SystemCommand(
             "a directory for what is compiled",
             ("install", "-d", "-m", "700", "-o", DAEMON, "-g", DAEMON, "/var/cache/compd"),
         ),
@@ -87,19 +87,19 @@ def install_steps(configuration: Configuration, program: Path, page: bool) -> li
     units = (DAEMON, PAGE) if page else (DAEMON,)
     return [
         *steps,
-        Step("systemd reads the units", ("systemctl", "daemon-reload")),
-        Step("start now, and with the computer", ("systemctl", "enable", "--now", *units)),
+        SystemCommand("systemd reads the units", ("systemctl", "daemon-reload")),
+        SystemCommand("start now, and with the computer", ("systemctl", "enable", "--now", *units)),
     ]
 
 
-def _unit_step(program: Path, unit: str) -> Step:
+def _unit_step(program: Path, unit: str) -> SystemCommand:
     name = f"{unit}.service"
     return installed_file(str(unit_path(unit)), shipped_file(name, program), f"the unit {name}")
 
 
-def check_step(program: Path) -> Step:
+def check_step(program: Path) -> SystemCommand:
     """The step that checks the installed configuration as the daemon's user, and compiles what the daemon needs."""
-    return Step(
+    return SystemCommand(
         "check the configuration as the daemon's user; kernels are compiled where there are none",
         (*_AS_THE_DAEMON, "env", _KERNELS, str(program), "check", str(MACHINE)),
     )

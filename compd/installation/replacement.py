@@ -14,7 +14,7 @@ from compd.errors import CompdError, DaemonError, Problem
 from compd.files import write_files
 from compd.installation.installing import DAEMON, PAGE, check_step, unit_path
 from compd.installation.shipped_units import program_problems, shipped_file
-from compd.installation.step import Step
+from compd.installation.system_command import SystemCommand
 from compd.setpoint_states import State, state_named
 
 # Longest wait (s) for the state before: a start takes one or two seconds, and a correction may slew for more.
@@ -49,8 +49,8 @@ def upgrade(socket: str, program: Path, clock: Clock | None = None) -> Replaceme
     """Replace the release that runs by the one of `program`.
 
     The new release checks the configuration, and compiles what it needs, while the old one goes on. Then the units
-    start the new program, and those before are kept beside them. Where the setpoints were ok before and are not within
-    `PATIENCE_S`, the old release comes back.
+    start the new program, and those before are kept beside them. Where the setpoints were valid or ok before and are
+    not within `PATIENCE_S`, the old release comes back.
 
     Parameters
     ----------
@@ -153,9 +153,9 @@ def _restart(socket: str, clock: Clock, wanted: str = "") -> Replacement:
     """Restart, and watch until the state is `wanted`, or else the one before, or patience is over."""
     setpoints = _setpoints(socket, clock)
     before = next(setpoints)
-    Step("systemd reads the units", ("systemctl", "daemon-reload")).run()
+    SystemCommand("systemd reads the units", ("systemctl", "daemon-reload")).run()
     # without waiting: a start that fails is tried again for ever
-    Step("start the other release", ("systemctl", "restart", "--no-block", *_installed_units())).run()
+    SystemCommand("start the other release", ("systemctl", "restart", "--no-block", *_installed_units())).run()
     wanted = wanted or before.get("state", "")
     state, has_ended, valid_s, without_s = _SILENT, not before, before.get("time_s", math.nan), 0.0
     for setpoint in setpoints:

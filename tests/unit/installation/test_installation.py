@@ -8,7 +8,7 @@ import pytest
 
 from compd.configuration import load, shipped_configuration
 from compd.errors import CompdError
-from compd.installation import Replacement, Step, install_problems, install_steps
+from compd.installation import Replacement, SystemCommand, install_problems, install_steps
 
 PROGRAM = Path("/opt/another/bin/compd")
 
@@ -42,7 +42,7 @@ def test_all_reasons_are_told_at_once(tmp_path: Path) -> None:
 
 def test_a_step_that_fails_tells_its_command_and_what_it_said() -> None:
     with pytest.raises(CompdError, match="nothing of that name"):
-        Step("try", ("sh", "-c", "echo nothing of that name >&2; exit 3")).run()
+        SystemCommand("try", ("sh", "-c", "echo nothing of that name >&2; exit 3")).run()
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from compd.errors import CompdError, Problem
 
 
 @dataclass(frozen=True)
-class Step:
+class SystemCommand:
     """A command of an installation.
 
     purpose : what it does, for people. command : program and arguments. text : what the program reads.
@@ -51,7 +51,7 @@ class Step:
         )
 
 
-def installed_file(path: str, text: str, purpose: str, mode: str = "644", owner: Sequence[str] = ()) -> Step:
+def installed_file(path: str, text: str, purpose: str, mode: str = "644", owner: Sequence[str] = ()) -> SystemCommand:
     """The step that writes a file, with the directories above it. owner : user and group; root's where it is empty."""
     ownership = ("-o", owner[0], "-g", owner[1]) if owner else ()
-    return Step(purpose, ("install", "-D", "-m", mode, *ownership, "/dev/stdin", path), text)
+    return SystemCommand(purpose, ("install", "-D", "-m", mode, *ownership, "/dev/stdin", path), text)
