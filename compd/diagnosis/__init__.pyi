@@ -9,7 +9,6 @@ from .holdout import Holdout as Holdout
 from .holdout import evaluate_holdouts as evaluate_holdouts
 from .recording_diagnosis import candidate_pool as candidate_pool
 from .recording_diagnosis import diagnose as diagnose
-from .search.gross_rows import RowWeights as RowWeights
 from .search.problem import DiagnosisProblem as DiagnosisProblem
 from .search.problem import build_problem as build_problem
 from .search.problem import fitted_along_columns as fitted_along_columns

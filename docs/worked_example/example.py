@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
-import numpy as np
-
 from compd.arrays import FloatArray, IntArray
 from compd.cli.app import app
 from compd.comparison import compare, neighbour_blocks, open_recording
@@ -20,9 +18,7 @@ from compd.diagnosis import Candidate, Diagnosis, DiagnosisProblem, diagnose
 from compd.diagnosis.recording_diagnosis import explain_residual
 from compd.diagnosis.search.cross_validation import row_splits
 from compd.diagnosis.search.explanation import Explanation
-from compd.diagnosis.search.gross_rows import ROUNDS
 from compd.model.library import load_library
-from compd.statistics import robust_regression, trimmed_scale
 
 SEED, HIDDEN = 5, "link_elasticity"
 # A second member that would lower the loss a little, and an effect that does nearly the same: for the scores.
@@ -72,23 +68,7 @@ def make_example() -> Example:
         members=(members[0], members[1], members[2]),
         splits=row_splits(aligned),
         block=neighbour_blocks(aligned.recording),
-        robust_fit=_robust_fit(problem, explanation.losses.candidates[members[0]]),
-    )
-
-
-def _robust_fit(problem: DiagnosisProblem, candidate: Candidate) -> FloatArray:
-    """(m + 1,) the fit of a constant and one candidate beside which `weigh_rows` weighs the rows."""
-    known, m, gross = problem.known, problem.residual.shape[1], problem.criteria.gross
-    constant = np.broadcast_to(np.eye(m), (*problem.residual.shape, m))
-    columns = np.concatenate([constant, candidate.columns_um / problem.sigma_um[:, None]], axis=2)[known]
-    return robust_regression(
-        columns,
-        problem.residual[known],
-        ridge=gross.ridge,
-        exponent=gross.exponent,
-        rounds=ROUNDS,
-        scale=trimmed_scale,
-        huber=problem.aligned.criteria.huber_sigmas,
+        robust_fit=problem.weigh_beside([explanation.losses.candidates[members[0]]]).fit,
     )
 
 

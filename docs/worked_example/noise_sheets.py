@@ -104,7 +104,7 @@ def write_weights(sheets: Sheets) -> None:
         for axis in AXES:
             constant = fit[f"c_{axis}"]
             cells.append(f"={here[f'r_{axis}']}-{constant}-{here[f'a_{axis}']}*{fit['a']}")
-        distances = [f"{here[f'e_{axis}']}/{scale[axis]}" for axis in AXES]
+        distances = [f"{here[f'e_{axis}']}/MAX({scale[axis]},1)" for axis in AXES]
         cells.append(f"=SQRT(({'+'.join(f'({distance})^2' for distance in distances)})/3)")
         cells.append(f"=IF(MAX({','.join(f'ABS({distance})' for distance in distances)})>{gross},1,0)")
         near = [f"(ABS({ends[f'e_{axis}']}-{here[f'e_{axis}']})<={gross}*SQRT(2))" for axis in AXES]
@@ -115,7 +115,7 @@ def write_weights(sheets: Sheets) -> None:
         rows.append(cells)
     about = (
         "r, a, b, c: divided by the noise.  e: what the robust fit leaves.  d: distance in robust standard "
-        "deviations.  gross: far, and no repeat confirms it"
+        "deviations, at least the noise.  gross: far, and no repeat confirms it"
     )
     sheets.table("Weights", about, names, rows)
     _count(sheets, "gross", f"=SUM({ends['gross']})", 10, side)

@@ -40,23 +40,26 @@ def write_blocks(sheets: Sheets) -> None:
 
 def write_verdict(sheets: Sheets) -> None:
     """Scores, what each member is worth, the rival, and the word."""
-    price = sheets.criteria["effect_price"]
+    price, number_price = sheets.criteria["effect_price"], sheets.criteria["number_price"]
+    counts = {name: candidate.parameter_count for name, candidate in zip("abc", sheets.example.candidates, strict=True)}
     head = ["set", "loss L", "log of the loss, not below 0", "prices", "score"]
     sheets.book.put("Verdict", 1, 1, head, bold=True)
     for k, (name, members) in enumerate(SETS.items(), start=2):
-        logarithm, prices = f"=LN(MAX(B{k},1))", f"={len(members)}*{price}"
+        further = sum(counts[member] - 1 for member in members)
+        logarithm, prices = f"=LN(MAX(B{k},1))", f"={len(members)}*{price}+{further}*{number_price}"
         sheets.book.put("Verdict", k, 1, [name, f"={sheets.results[f'loss_{name}']}", logarithm, prices, f"=C{k}+D{k}"])
         sheets.results[f"score_{name}"] = Address("Verdict", k, 5)
     sheets.book.put("Verdict", 8, 1, ["question", "number", "limit", "answer"], bold=True)
     sigmas, at_floor = sheets.criteria["least_sigmas"], sheets.criteria["most_at_floor"]
     rival_share = sheets.criteria["rival_share"]
+    # for an effect with more numbers the price is no excuse
     ratio = {m: f"{sheets.results[f'gain_{m}']}/{sheets.results[f'std_{m}']}" for m in "abc"}
     questions = [
         ("a: log loss falls by", "=C2-C3", f"={price}", ">="),
         ("a: gain in standard errors", f"={ratio['a']}", f"={sigmas}", ">="),
         ("b beside a: log loss falls by", "=C3-C4", f"={price}", ">="),
         ("b beside a: gain in standard errors", f"={ratio['b']}", f"={sigmas}", ">="),
-        ("c for a: log loss rises by", "=C5-C3", f"={price}", "<="),
+        ("c for a: log loss rises by", "=C5-C3", f"=IF({counts['c']}<={counts['a']},{price},0)", "<="),
         ("c for a: loss rises by, in standard errors", f"={ratio['c']}", f"={sigmas}", "<="),
         ("c for a: misses this share of what a takes", "=(B5-B3)/(B2-B3)", f"={rival_share}", "<="),
         ("set a: its loss", "=B3", f"={at_floor}", "<="),

@@ -25,10 +25,12 @@ class RowWeights(NamedTuple):
 
     gross : (N,) rows that do not.  weight : (N,) of the others, so scaled that the mean square of normal noise is not
     changed; 0 for rows that are gross, or that the fit does not rest on.
+    fit : (m + P,) the constant of each coordinate and the parameters of the robust fit beside which they were weighed.
     """
 
     gross: BoolArray
     weight: FloatArray
+    fit: FloatArray
 
 
 def weigh_rows(
@@ -87,7 +89,7 @@ def weigh_rows(
     # a row that is not known, as a copy, lies between no others
     weight[known] = np.where(_in_runs(((size > full) & ~gross)[known], criteria.gross.min_in_run), 1.0, weight[known])
     weight /= consistency(m, full)
-    return RowWeights(gross, np.where(known & ~gross, weight, 0.0))
+    return RowWeights(gross, np.where(known & ~gross, weight, 0.0), theta)
 
 
 def _in_runs(far: BoolArray, least: int) -> BoolArray:

@@ -32,7 +32,7 @@ class DiagnosisProblem:
     same_as_nuisance : effects that do nothing on these rows but what is fitted along in any case.
     criteria : numbers of the verdict.  sigma_um : (m,) standard deviation of the noise, or a unit where it is unknown.
     known : (N,) rows in which the residual and all candidates are known.
-    gross : (N,) rows that nothing explains; rows : (N,) those that count: known and not gross.
+    weights : of the rows, and which are gross.  rows : (N,) those that count: known and not gross.
     root_weight : (R,) root of each row's weight, by which residual and columns are multiplied.
     residual : (N, m) whitened, nan where not known.  nuisance : (N, m, Q) whitened columns of what every fit contains.
     data : residual and nuisance columns on the rows that count, weighted, and how these are divided.
@@ -46,13 +46,18 @@ class DiagnosisProblem:
     criteria: Criteria
     sigma_um: FloatArray
     known: BoolArray
-    gross: BoolArray
+    weights: RowWeights
     rows: BoolArray
     root_weight: FloatArray
     residual: FloatArray
     nuisance: FloatArray
     data: RegressionData
     states: int = 0
+
+    @property
+    def gross(self) -> BoolArray:
+        """(N,) rows that nothing explains."""
+        return self.weights.gross
 
     @property
     def aligned(self) -> AlignedRecording:
@@ -184,7 +189,7 @@ def build_problem(
         criteria=criteria,
         sigma_um=sigma_um,
         known=known,
-        gross=weights.gross,
+        weights=weights,
         rows=rows,
         root_weight=root,
         residual=residual,

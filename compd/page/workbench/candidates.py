@@ -16,7 +16,6 @@ from compd.diagnosis import (
     Criteria,
     DiagnosisProblem,
     DiagnosisStep,
-    RowWeights,
     SubsetLosses,
     build_problem,
     candidate_pool,
@@ -58,7 +57,7 @@ class Candidates:
         """The residual and the columns of every effect."""
         searched = self._searched
         pool = candidate_pool(searched, list(self.library.values()), self._criteria.candidates)
-        weights = None if self._weighed is None else _weights(self._weighed)
+        weights = None if self._weighed is None else self._weighed.weights
         return build_problem(searched, pool, self._criteria, weights)
 
     @cached_property
@@ -193,12 +192,6 @@ class Candidates:
             "standard_error": _numbers(np.sqrt(np.diag(covariance))),
             "left_out_rms": self._rms(loss),
         }
-
-
-def _weights(problem: DiagnosisProblem) -> RowWeights:
-    weight = np.zeros(len(problem.rows))
-    weight[problem.rows] = problem.root_weight**2
-    return RowWeights(gross=problem.gross, weight=weight)
 
 
 def _numbers(values: FloatArray) -> list[float]:
