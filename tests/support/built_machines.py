@@ -50,43 +50,50 @@ def drawing(kind: str, directory: Path, tolerance_mm: float = TOLERANCE_MM) -> P
     return path
 
 
-def built(path: Path, rng: np.random.Generator, tolerance_mm: float = TOLERANCE_MM) -> World:
-    """The machine with every number off by its tolerance: normal, with the tolerance as standard deviation."""
+# Kinds of numbers of a machine, as the blocks of a calibration have them.
+OFF = ("base", "platform", "length", "way", "radius", "hinge", "zero", "gain")
+
+
+def built(path: Path, rng: np.random.Generator, tolerance_mm: float = TOLERANCE_MM, probability: float = 1.0) -> World:
+    """The machine with every number off by its tolerance: normal, with the tolerance as standard deviation.
+
+    probability : that the numbers of a kind are off at all; those of the other kinds are as drawn.
+    """
+    sizes = {kind: tolerance_mm * (probability >= 1.0 or rng.random() < probability) for kind in OFF}
     text = path.read_text(encoding="utf-8").replace("{on: platform", '{"on": platform')
     data: dict[str, Any] = yaml.safe_load(text)
     geometry = data["geometry"]
     off = copy.deepcopy(geometry)
     joints = np.array([rod["platform_P_mm"] for rod in geometry["rods"]], dtype=np.float64)
     radius_mm = float(np.sqrt(((joints - joints.mean(axis=0)) ** 2).sum(axis=1).mean()))
-    tilt = tolerance_mm / radius_mm
     for rod in off["rods"]:
-        for end in ("base_B_mm", "platform_P_mm"):
-            rod[end] = (np.array(rod[end]) + tolerance_mm * rng.standard_normal(3)).tolist()
+        for end, kind in (("base_B_mm", "base"), ("platform_P_mm", "platform")):
+            rod[end] = (np.array(rod[end]) + sizes[kind] * rng.standard_normal(3)).tolist()
         if "length_mm" in rod:
-            rod["length_mm"] += float(tolerance_mm * rng.standard_normal())
+            rod["length_mm"] += float(sizes["length"] * rng.standard_normal())
     for actuator in off["actuators"]:
-        turn = Rotation.from_rotvec(tilt * rng.standard_normal(3)).as_matrix()
+        turn = Rotation.from_rotvec(sizes["way"] / radius_mm * rng.standard_normal(3)).as_matrix()
         for key in ("along_B", "cosine_B", "sine_B"):
             if key in actuator:
                 actuator[key] = (turn @ np.array(actuator[key])).tolist()
         if "radius_mm" in actuator:
-            actuator["radius_mm"] += float(tolerance_mm * rng.standard_normal())
+            actuator["radius_mm"] += float(sizes["radius"] * rng.standard_normal())
     for hinge in off.get("hinges", []):
         for key in ("axis_P", "axis_B"):
             if key in hinge:
-                axis = np.array(hinge[key]) + tilt * rng.standard_normal(3)
+                axis = np.array(hinge[key]) + sizes["hinge"] / radius_mm * rng.standard_normal(3)
                 hinge[key] = (axis / np.linalg.norm(axis)).tolist()
     other = path.with_name(f"built-{path.name}")
     other.write_text(yaml.safe_dump({**data, "geometry": off}, sort_keys=False), encoding="utf-8")
     drawn, real = (Mechanism(load(one).geometry) for one in (path, other))
     # where the actuators stand at machine zero is a number of its own, whatever the tip does there
-    zero_mm = tolerance_mm * rng.standard_normal(drawn.scales)
+    zero_mm = sizes["zero"] * rng.standard_normal(drawn.scales)
     moved_mm = np.where(
         drawn.extended[drawn.link_of_scale],
         _first(drawn, drawn.lengths0_mm) - _first(real, real.lengths0_mm),
         _zeros(drawn) - _zeros(real),
     )
-    gain = tolerance_mm / (2 * REACH_MM) * rng.standard_normal(drawn.scales)
+    gain = sizes["gain"] / (2 * REACH_MM) * rng.standard_normal(drawn.scales)
     return World(drawn, real, gain, zero_mm, moved_mm, np.zeros(drawn.scales), path.stem)
 
 
