@@ -24,11 +24,13 @@ def test_rows_at_rest_that_were_written_twice_count_once_beside_rows_of_a_motion
 def test_one_row_at_rest_that_is_there_once_leaves_all_in() -> None:
     columns = {name: np.delete(values, 20) for name, values in table(20, 15).items()}
     kept, left_out = kept_rows(columns)
-    assert len(kept) == 54 and left_out[DOUBLED] == 0
+    assert len(kept) == 54
+    assert left_out[DOUBLED] == 0
 
 
 def test_a_row_without_a_time_is_none() -> None:
     columns = table(3, 0)
     columns["time_s"][2] = np.nan
     kept, left_out = kept_rows(columns)
-    assert 2 not in kept and left_out[NO_TIME] == 1
+    assert 2 not in kept
+    assert left_out[NO_TIME] == 1
