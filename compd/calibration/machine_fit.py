@@ -217,21 +217,37 @@ def in_likelier_coordinates(fit: MachineFit) -> list[MeasuredPoses]:
     """Each recording of poses weighed as measured, or as errors of links, whichever makes what is left likelier.
 
     Where the instrument is the noisiest part its coordinates have one scatter each; where the machine is, its links
-    have. The likelihoods are those of normal errors of one scatter in either coordinates.
+    have. The likelihoods are those of normal errors, each beside a fit that is weighed so. Lengths and angles have a
+    scatter each, links one: a scatter costs half the logarithm of the number of values (Schwarz, Ann. Statist. 6 (1978)
+    461).
     """
+    as_links = [_as_links(now) for now in fit.now]
+    if all(one is None for one in as_links):
+        return [now.poses for now in fit.now]
+    poses = [now.poses if one is None else one for now, one in zip(fit.now, as_links, strict=True)]
+    other = fit_machine(poses, fit.parameters, fit.free)
     chosen = []
-    for now, outlier in zip(fit.now, fit.outlier, strict=True):
-        poses, use = now.poses, now.use & ~outlier
-        to_links = links_of_pose(poses.aligned)
-        if to_links is None or to_links.shape[1] != to_links.shape[2] or np.isfinite(_declared_mm(now, 6)).any():
-            chosen.append(poses)
-            continue
-        other = replace(now, poses=replace(poses, to_links=to_links))
-        rows = int(use.sum())
-        sigma = _scatter_mm(now, registered_mm(now, use)[0][use])
-        links = _scatter_mm(other, registered_mm(other, use)[0][use])
-        # density of the pose = density of the links times the determinant
-        as_measured = -rows * np.log(sigma).sum()
-        as_links = -rows * np.log(links).sum() + np.linalg.slogdet(to_links[use])[1].sum()
-        chosen.append(other.poses if as_links > as_measured else poses)
+    for k, one in enumerate(as_links):
+        by_links = one is not None and _log_likelihood(other, k) > _log_likelihood(fit, k)
+        chosen.append(poses[k] if by_links else fit.now[k].poses)
     return chosen
+
+
+def _as_links(now: PosesNow) -> MeasuredPoses | None:
+    """The recording weighed as errors of links; None where a pose does not tell them, or its noise is declared."""
+    to_links = links_of_pose(now.poses.aligned)
+    if to_links is None or to_links.shape[1] != to_links.shape[2] or np.isfinite(_declared_mm(now, 6)).any():
+        return None
+    return replace(now.poses, to_links=to_links)
+
+
+def _log_likelihood(fit: MachineFit, k: int) -> float:
+    """Of what the fit leaves of recording k as measured, less the price of its scatters, but for a constant."""
+    now, outlier = fit.now[k], fit.outlier[k]
+    use = now.use & ~outlier
+    sigma = _scatter_mm(now, registered_mm(now, use)[0][use])
+    # density of the pose = density of the links times the determinant
+    links = now.poses.to_links
+    turned = 0.0 if links is None else float(np.linalg.slogdet(links[use])[1].sum())
+    price = len(_sections(now, len(sigma))) * np.log(use.sum() * len(sigma)) / 2
+    return turned - float(use.sum() * np.log(sigma).sum() + price)
