@@ -360,7 +360,7 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         instrument_M_mm=np.array(details.instrument_M_mm),
         joints=model.joint_weights.shape[1],
         tolerance_mm=details.tolerance_mm,
-        stroke_mm=details.stroke_mm,
+        link_limits_mm=details.link_limits_mm,
         zero=zero,
     )
 
