@@ -171,12 +171,11 @@ def _guess_mm(actuator: Actuator) -> float:
 def machine_details(geometry: Geometry) -> MachineDetails:
     """What effects need of a geometry beyond its kinematics; nan where it says nothing."""
     unknown = float("nan")
-    shortest_mm, longest_mm = geometry.link_length_mm or (unknown, unknown)
     return MachineDetails(
         geometry.plate_thickness_mm or unknown,
         geometry.scale_signal_period_mm or unknown,
         tolerance_mm=geometry.made_to_mm or unknown,
-        stroke_mm=longest_mm - shortest_mm,
+        link_limits_mm=geometry.link_length_mm or (unknown, unknown),
     )
 
 

@@ -7,12 +7,11 @@ as singular, as in every cycle (C. Gosselin, J. Angeles, IEEE Trans. Robotics Au
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from compd.arrays import FloatArray
+from compd.arrays import BoolArray, FloatArray
 from compd.model import MachineModel, MachineParts
 from compd.model.kernels import AMPLIFICATION_LIMIT, Reason
 from compd.model.kinematics import Mechanism, closure_at, inverse_by_actuators, links_at
@@ -88,7 +87,7 @@ def machine_reach(model: MachineModel, stroke_mm: tuple[float, float] | None = N
             if found.pose.reason[way]:
                 near = found.pose.reason[way] in (Reason.NEAR_SINGULAR, Reason.OTHER_ASSEMBLY)
                 ends[way], going[way] = "singularity" if near else "reach", False
-            elif stroke_mm is not None and not _within(model, found.pose.link_length_mm[way], stroke_mm):
+            elif not within_stroke(model, found.pose.link_length_mm[way], stroke_mm):
                 ends[way], going[way] = "stroke", False
             else:
                 reach[way] = longest[way] * step / _STEPS
@@ -162,9 +161,11 @@ def _scaled_rows(mechanism: Mechanism, origin_M_mm: FloatArray, rotation_M_P: Fl
     return np.concatenate([by_displacement, by_rotation / radius_mm], axis=-1)
 
 
-def _within(model: MachineModel, lengths_mm: FloatArray, stroke_mm: Sequence[float]) -> bool:
-    extended = lengths_mm[model.extended]
-    return bool((extended >= stroke_mm[0]).all() and (extended <= stroke_mm[1]).all())
+def within_stroke(model: MachineModel, lengths_mm: FloatArray, stroke_mm: tuple[float, float] | None) -> BoolArray:
+    """(...) whether links (..., n) that extend have lengths within these; all where the limits are None or nan."""
+    shortest_mm, longest_mm = stroke_mm or (np.nan, np.nan)
+    extended = lengths_mm[..., model.extended]
+    return np.asarray(~((extended < shortest_mm) | (extended > longest_mm)).any(axis=-1))
 
 
 def reach_lines(reach: MachineReach) -> list[str]:

@@ -54,6 +54,12 @@ class BlockSets(NamedTuple):
         empty = ~self.inside.any(axis=1)
         return self._replace(inside=self.inside[empty], log_prior=self.log_prior[empty])
 
+    @property
+    def whole(self) -> BlockSets:
+        """The largest set alone: every block that these poses can test is off."""
+        largest = np.array([int(self.inside.sum(axis=1).argmax())])
+        return self._replace(inside=self.inside[largest], log_prior=self.log_prior[largest])
+
     def averaged(self, normal: Normal) -> PriorFit:
         """Mean and covariance of the numbers."""
         weight, fits = self._fits(normal)

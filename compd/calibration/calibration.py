@@ -142,7 +142,7 @@ class PredictionMap(NamedTuple):
     place_mm, turn_rad : (R, 3) poses spread evenly over what the machine reaches: tip in {M}, turn since machine zero.
     std_um, std_urad : (R,) standard errors of the tip and of the attitude, in space: the root of the sum over x, y, z.
     measured_mm, measured_rad : (M, 3) the poses that were measured.  measured_std_um, measured_std_urad : (M,) there.
-    slices : through the middle of the workspace.
+    slices : through the middle of the workspace, through places first.
     """
 
     place_mm: FloatArray
@@ -168,6 +168,13 @@ class PredictionMap(NamedTuple):
             f"{np.median(self.std_um):.3g} um, "
             f"largest {largest}{turned}; at the measured poses {np.median(self.measured_std_um):.3g} um (median)."
         )
+
+    @property
+    def slice_groups(self) -> tuple[tuple[PredictionSlice, ...], ...]:
+        """The slices through places alone, and the others."""
+        places = tuple(one for one in self.slices if one.up in "xyz")
+        turns = self.slices[len(places) :]
+        return tuple(group for group in (places, turns) if group)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -17,7 +17,6 @@ from compd.calibration.parameters import WORDS, Parameters, calibration_paramete
 from compd.calibration.pose_errors import errors_alone, errors_of_folds
 from compd.calibration.poses import MeasuredPoses, links_of_pose
 from compd.calibration.prediction_map import prediction_map
-from compd.calibration.prior_fit import PriorFit
 from compd.calibration.selection import Selection, select_blocks
 from compd.calibration.untested import Untested, untested_blocks
 from compd.comparison import AlignedRecording, compare
@@ -75,7 +74,7 @@ def calibrate(
     sets = sets if selection.needed else every.none
     free = sets.free
     fit = fit_machine(poses, parameters, free, sets)
-    fit = fit.about(every.averaged(fit.normal))
+    fit = fit.about(every.whole.averaged(fit.normal))
     drawn = fit_machine(poses, parameters, np.zeros_like(free))
     chosen_blocks = np.flatnonzero(sets.inside.any(axis=0)).tolist()
     fitted = parameters.split(fit.theta, fit.covariance, chosen_blocks)
@@ -95,7 +94,7 @@ def calibrate(
     return Calibration(
         machine=recordings[0].recording.machine,
         recordings=tuple(str(one.recording.path) for one in recordings),
-        numbers=_numbers(parameters, fit, selection, whole.result),
+        numbers=_numbers(parameters, fit, selection, prior),
         covariance=_in_units(parameters, fit.covariance),
         fitted=fitted,
         fitted_covariance=fit.covariance[np.ix_(order, order)],
@@ -190,11 +189,10 @@ def _in_units(parameters: Parameters, covariance: FloatArray) -> FloatArray:
 
 
 def _numbers(
-    parameters: Parameters, fit: MachineFit, selection: Selection, whole: PriorFit
+    parameters: Parameters, fit: MachineFit, selection: Selection, prior: FloatArray
 ) -> tuple[CalibratedNumber, ...]:
-    """whole : the fit of all blocks. What it leaves open is known only as far as a block is as drawn: nothing told."""
-    prior = whole.scale[parameters.block_of]
-    std, open_std = np.sqrt(np.diag(fit.result.C)), np.sqrt(np.diag(whole.C))
+    """prior : (P,) standard deviations before, in tolerances."""
+    std = np.sqrt(np.diag(fit.result.C))
     correlation = fit.result.C / np.outer(std, std)
     np.fill_diagonal(correlation, 0.0)
     correlation[:, ~fit.free] = 0.0
@@ -218,7 +216,7 @@ def _numbers(
                 correlation=size,
                 with_whom=parameters.elements[other] if size else "",
                 needed=bool(needed[k]),
-                held=bool(not fit.free[k] or max(std[k], open_std[k]) > _TOLD_SHARE * prior[k]),
+                held=bool(not fit.free[k] or std[k] > _TOLD_SHARE * prior[k]),
             )
         )
     return tuple(numbers)

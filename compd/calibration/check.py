@@ -15,15 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import chdtri, ndtri
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import FloatArray, IntArray, rms
 from compd.calibration.calibration import Calibration, PoseErrors
 from compd.calibration.jacobian import without
-from compd.calibration.machine_fit import whitened_poses
-from compd.calibration.parameters import calibration_parameters
+from compd.calibration.machine_fit import declared_mm, gross_rows, registered_mm, scatter_mm, whitened_poses
+from compd.calibration.parameters import Parameters, calibration_parameters
 from compd.calibration.pose_errors import errors_alone
-from compd.calibration.poses import MeasuredPoses, links_of_pose
+from compd.calibration.poses import MeasuredPoses, PosesNow, links_of_pose
 from compd.comparison import AlignedRecording
-from compd.text import nan_to_null
+from compd.text import join_words, nan_to_null
 
 # Confidence, over all numbers together, beyond which a change or a misfit is more than chance.
 _CONFIDENCE = 0.999
@@ -47,12 +47,14 @@ class CalibrationCheck(NamedTuple):
     errors : at its poses, as drawn and calibrated.  misfit : mean square of what is left over what the noise and the
     uncertainty of the calibration leave, 1 where it holds.  limit : what chance alone exceeds once in 1,000.
     changes : numbers that have changed; empty where it holds, or where no number explains it.
+    gross : rows that no noise explains, as a spreadsheet shows them; they are left out.
     """
 
     errors: PoseErrors
     misfit: float
     limit: float
     changes: tuple[NumberChange, ...]
+    gross: tuple[int, ...] = ()
 
     @property
     def holds(self) -> bool:
@@ -63,6 +65,8 @@ class CalibrationCheck(NamedTuple):
     def verdict(self) -> str:
         """In a sentence."""
         error = f"{self.errors.what}: {self.errors.after_rms_um:.3g} um (rms per coordinate)"
+        if self.gross:
+            error += f" without row{'s'[: len(self.gross) > 1]} {join_words([str(row) for row in self.gross], 'and')}"
         if self.holds:
             return f"{error}; the calibration holds."
         if not self.changes:
@@ -81,6 +85,7 @@ class CalibrationCheck(NamedTuple):
             "misfit": self.misfit,
             "limit": self.limit,
             "changes": [change._asdict() for change in self.changes],
+            "gross": list(self.gross),
         }
         return dict(nan_to_null(data))
 
@@ -95,20 +100,19 @@ def check_calibration(
     model = learned[0].model
     assert model is not None
     rows = learned[0].rows.extended_by(*(one.rows for one in learned[1:]))
-    kept = {number.block for number in calibration.numbers}
     parameters = calibration_parameters(model, rows, learned[0].ranges)
     poses = MeasuredPoses.of(later, parameters)
-    if calibration.in_links and (to_links := links_of_pose(later)) is not None:
+    to_links = links_of_pose(later) if calibration.in_links else None
+    if to_links is not None and to_links.shape[1] == to_links.shape[2]:
         poses = replace(poses, to_links=to_links)
     now = poses.now(calibration.fitted)
-    sigma_mm = calibration.sigma_mm
-    outlier: BoolArray = np.zeros(len(now.use), dtype=bool)
-    part = whitened_poses(now, now.use, sigma_mm)
+    sigma_mm = _sigma_mm(calibration, learned[0], now)
+    outlier = gross_rows(now, registered_mm(now, now.use, sigma_mm)[0] / sigma_mm)
+    part = whitened_poses(now, now.use & ~outlier, sigma_mm)
     both = without(np.column_stack([part.J, part.z]), part.R)
-    use = np.flatnonzero([name.split(".")[0] in kept for name in parameters.names])
+    use, C = _known(calibration, parameters, all(one.target is not None for one in learned))
     J, d = both[:, :-1][:, use], both[:, -1]
     unit = (parameters.prior_std * parameters.per_theta)[use]
-    C = calibration.covariance / np.outer(unit, unit)
     dof = len(d) - part.R.shape[1]
     inverse = np.linalg.inv(np.eye(len(d)) + J @ C @ J.T)
     limit = float(ndtri(1 - (1 - _CONFIDENCE) / 2 / len(use)))
@@ -144,4 +148,47 @@ def check_calibration(
         for i, k in enumerate(taken)
     )
     errors = errors_alone(later.recording.path.name, poses, calibration.fitted, outlier)
-    return CalibrationCheck(errors, misfit, float(chdtri(dof, 1 - _CONFIDENCE)) / dof, changes)
+    gross = tuple(later.recording.row[outlier].tolist())
+    return CalibrationCheck(errors, misfit, float(chdtri(dof, 1 - _CONFIDENCE)) / dof, changes, gross)
+
+
+def _known(calibration: Calibration, parameters: Parameters, placed: bool) -> tuple[IntArray, FloatArray]:
+    """Which of the P numbers a calibration has, and their covariance in tolerances.
+
+    placed : whether it had targets whose place was fitted along. They leave the place of the tip at its tolerance.
+    """
+    have = {number.name: k for k, number in enumerate(calibration.numbers)}
+    own = [k for k, name in enumerate(parameters.names) if name in have]
+    tip = [k for k, name in enumerate(parameters.names) if placed and name.startswith("tool_offset.")]
+    use = np.array([*own, *(k for k in tip if k not in own)], dtype=np.int64)
+    unit = (parameters.prior_std * parameters.per_theta)[use]
+    C = np.eye(len(use))
+    places = [have[parameters.names[k]] for k in own]
+    C[: len(own), : len(own)] = (calibration.covariance / np.outer(unit[: len(own)], unit[: len(own)]))[
+        np.ix_(places, places)
+    ]
+    return use, C
+
+
+def _sigma_mm(calibration: Calibration, learned: AlignedRecording, now: PosesNow) -> FloatArray:
+    """(w,) standard deviation of the later poses: what the calibration found of the same instrument, else declared.
+
+    What the machine does beyond its numbers it does on another day as well: the excess of what was found over what was
+    declared. Where neither is known, what is left.
+    """
+    width = now.weighed[0].shape[1]
+    if len(calibration.sigma_mm) == width and _instrument(learned) == _instrument(now.aligned):
+        return calibration.sigma_mm
+    declared = declared_mm(now, width)
+    stated_mm = rms(learned.recording.reference_sigma_mm)
+    lengths = calibration.sigma_mm[: len(calibration.sigma_mm) - 3 * learned.with_attitude]
+    excess_mm2 = max(rms(lengths) ** 2 - stated_mm**2, 0.0) if len(lengths) and stated_mm > 0 else 0.0
+    declared[now.aligned.lengths] = np.sqrt(declared[now.aligned.lengths] ** 2 + excess_mm2)
+    found: FloatArray = scatter_mm(now, registered_mm(now, now.use)[0][now.use])
+    return np.where(np.isfinite(declared), declared, found)
+
+
+def _instrument(aligned: AlignedRecording) -> str:
+    """What was measured and how well, to compare."""
+    reference = aligned.recording.reference
+    return "" if reference is None else f"{reference.quantity} {reference.sigma_um} {reference.sigma_urad}"

@@ -108,7 +108,7 @@ def fit_machine(
         found = out
         if outlier is None and change < _NEAR:
             found = [
-                _outliers(one, registered_mm(one, use, sigma)[0] / sigma)
+                gross_rows(one, registered_mm(one, use, sigma)[0] / sigma)
                 for one, use, sigma in zip(now, rows, sigmas, strict=True)
             ]
         same = all((a == b).all() for a, b in zip(found, out, strict=True))
@@ -118,7 +118,7 @@ def fit_machine(
     return MachineFit(parameters, tuple(now), tuple(linear), result, tuple(out), tuple(sigmas), free, sets)
 
 
-def _outliers(now: PosesNow, left: FloatArray) -> BoolArray:
+def gross_rows(now: PosesNow, left: FloatArray) -> BoolArray:
     """(N,) rows with an error (N, w), in standard deviations, that neither the others nor the noise explain.
 
     Of few rows the fit takes most of the scatter, so that the scatter alone would make outliers.
@@ -138,7 +138,7 @@ def registered_mm(now: PosesNow, use: BoolArray, sigma_mm: FloatArray | None = N
     # urad and um have no size in common: each counts in the scatter that the registration leaves
     for _ in range(_WEIGHT_ROUNDS if sigma_mm is None and R_mm.shape[2] and len(_sections(now, len(sigma))) > 1 else 1):
         if sigma_mm is None:
-            sigma = _scatter_mm(now, (residual_mm - R_mm @ r)[use])
+            sigma = scatter_mm(now, (residual_mm - R_mm @ r)[use])
         if R_mm.shape[2]:
             r = robust_regression(
                 R_mm[use] / sigma[:, None], residual_mm[use] / sigma, huber=now.aligned.criteria.huber_sigmas
@@ -172,7 +172,7 @@ def _sections(now: PosesNow, width: int) -> list[slice]:
     return [slice(width)]
 
 
-def _scatter_mm(now: PosesNow, left_mm: FloatArray) -> FloatArray:
+def scatter_mm(now: PosesNow, left_mm: FloatArray) -> FloatArray:
     """(w,) scatter of what is left (R, w), alike for all coordinates of a section."""
     sigma = np.empty(left_mm.shape[1])
     for part in _sections(now, len(sigma)):
@@ -189,10 +189,10 @@ def _sigma_mm(now: PosesNow, use: BoolArray, numbers: float) -> FloatArray:
     left_mm = registered_mm(now, use)[0][use]
     values = left_mm.size
     dof = max(values - numbers - now.registration_mm.shape[2], _FEWEST_SHARE * values)
-    sigma: FloatArray = _scatter_mm(now, left_mm) * np.sqrt(values / dof)
-    declared_mm = _declared_mm(now, len(sigma))
+    sigma: FloatArray = scatter_mm(now, left_mm) * np.sqrt(values / dof)
+    declared = declared_mm(now, len(sigma))
     for part in _sections(now, len(sigma)):
-        stated = declared_mm[part]
+        stated = declared[part]
         own = left_mm[:, part].size * dof / values
         if np.isfinite(stated).all() and rms(sigma[part]) <= np.sqrt(float(fdtri(own, 1e9, _CONTRADICTS))) * rms(
             stated
@@ -201,7 +201,7 @@ def _sigma_mm(now: PosesNow, use: BoolArray, numbers: float) -> FloatArray:
     return sigma
 
 
-def _declared_mm(now: PosesNow, width: int) -> FloatArray:
+def declared_mm(now: PosesNow, width: int) -> FloatArray:
     """(w,) declared standard uncertainty of the reference; nan where nobody declared it, or links are weighed."""
     aligned, reference = now.aligned, now.aligned.recording.reference
     if now.poses.to_links is not None or reference is None:
@@ -236,7 +236,7 @@ def in_likelier_coordinates(fit: MachineFit) -> list[MeasuredPoses]:
 def _as_links(now: PosesNow) -> MeasuredPoses | None:
     """The recording weighed as errors of links; None where a pose does not tell them, or its noise is declared."""
     to_links = links_of_pose(now.poses.aligned)
-    if to_links is None or to_links.shape[1] != to_links.shape[2] or np.isfinite(_declared_mm(now, 6)).any():
+    if to_links is None or to_links.shape[1] != to_links.shape[2] or np.isfinite(declared_mm(now, 6)).any():
         return None
     return replace(now.poses, to_links=to_links)
 
@@ -245,7 +245,7 @@ def _log_likelihood(fit: MachineFit, k: int) -> float:
     """Of what the fit leaves of recording k as measured, less the price of its scatters, but for a constant."""
     now, outlier = fit.now[k], fit.outlier[k]
     use = now.use & ~outlier
-    sigma = _scatter_mm(now, registered_mm(now, use)[0][use])
+    sigma = scatter_mm(now, registered_mm(now, use)[0][use])
     # density of the pose = density of the links times the determinant
     links = now.poses.to_links
     turned = 0.0 if links is None else float(np.linalg.slogdet(links[use])[1].sum())

@@ -9,7 +9,7 @@ from scipy.stats.qmc import Sobol
 
 from compd.arrays import FloatArray, IntArray
 from compd.errors import CompdError, Problem
-from compd.machine_reach import amplification, amplifications, machine_reach
+from compd.machine_reach import amplification, amplifications, machine_reach, within_stroke
 from compd.model import MachineModel, observe
 from compd.model.effects import Observations
 from compd.model.kinematics import Mechanism, Movement, Pose, inverse_by_actuators, links_at
@@ -144,9 +144,7 @@ def reachable(model: MachineModel, poses: FloatArray, stroke_mm: tuple[float, fl
         ).all(axis=1)
         actuator_mm = np.where(good[:, None], found.actuator_mm, zero.actuator_mm)
     good &= (np.abs(actuator_mm - zero.actuator_mm) <= _stroke_mm(model)).all(axis=1)
-    if stroke_mm is not None:
-        extended = pose.link_length_mm[:, model.extended]
-        good &= ((extended >= stroke_mm[0]) & (extended <= stroke_mm[1])).all(axis=1)
+    good &= within_stroke(model, pose.link_length_mm, stroke_mm)
     rows = rows_at(model, actuator_mm[good] - zero.actuator_mm)
     # a recording's poses are solved from machine zero: one that leads to another assembly from there is of no use
     off_mm = np.abs(rows.origin_M_mm - pose.origin_M_mm[good]).max(axis=1)

@@ -49,10 +49,11 @@ def prediction_map(model: MachineModel, fit: MachineFit, whole: MachineFit) -> P
     measured_mm = np.concatenate([one.tip_M_mm for one in rows])
     attitudes = np.concatenate([one.rotation_M_P for one in rows])
     measured_rad = rotation_vector(compose(attitudes, model.zero.rotation_M_P.T))
-    box = _with(reachable_box(model), np.concatenate([measured_mm, measured_rad], axis=1))
+    stroke_mm = rows[0].constants.link_limits_mm
+    box = _with(reachable_box(model, stroke_mm), np.concatenate([measured_mm, measured_rad], axis=1))
     spread = even_poses(model, box, _POSES, _SEED)
     planes = _planes(model, box)
-    found = reachable(model, np.concatenate([spread, *(poses for *_, poses in planes)]))
+    found = reachable(model, np.concatenate([spread, *(poses for *_, poses in planes)]), stroke_mm)
     apart = whole.result.x - fit.result.x
     near = _Moved(model, fit.parameters, whole.result.C + np.outer(apart, apart), rows)
     std = near.standard_errors([found.rows])
@@ -122,15 +123,15 @@ def _with(box: Box, poses: FloatArray) -> Box:
 def _planes(model: MachineModel, box: Box) -> list[tuple[int, int, FloatArray]]:
     """Across, up and (_GRID^2, 6) poses of each slice, a row of the grid after the other.
 
-    Places where a target fixes two or more; otherwise all that it fixes.
+    Through places, then through turns, each at the middle of the others; through both where a target fixes one place.
     """
     fixed = np.flatnonzero(model.actuators.fixed == 1)
-    shown = fixed[fixed < 3] if (fixed < 3).sum() >= 2 else fixed[:3]
+    shown = [fixed[fixed < 3], fixed[fixed >= 3]] if (fixed < 3).sum() >= 2 else [fixed]
     middle = np.concatenate([(box.low + box.high)[:3] / 2, np.zeros(3)])
     free = model.actuators.fixed == 0
     middle[:3] = np.where(free[:3], model.zero.contact.tip_M_mm, middle[:3])
     planes = []
-    for across, up in combinations(shown.tolist(), 2):
+    for across, up in (pair for own in shown for pair in combinations(own.tolist(), 2)):
         poses = np.tile(middle, (_GRID**2, 1))
         sides = [np.linspace(box.low[k], box.high[k], _GRID) for k in (across, up)]
         poses[:, across], poses[:, up] = np.tile(sides[0], _GRID), np.repeat(sides[1], _GRID)
@@ -140,5 +141,7 @@ def _planes(model: MachineModel, box: Box) -> list[tuple[int, int, FloatArray]]:
 
 def _held(model: MachineModel, shown: tuple[int, int], pose: FloatArray) -> str:
     fixed = [k for k in np.flatnonzero(model.actuators.fixed == 1).tolist() if k not in shown]
-    words = [f"{_NAMES[k]} {pose[k]:.0f} mm" for k in fixed if k < 3]
-    return ", ".join([*words, "no turn"] if any(k >= 3 for k in fixed) else words)
+    places = ", ".join(f"{_NAMES[k]} {pose[k]:.0f}" for k in fixed if k < 3)
+    turns = [_NAMES[k - 3] for k in fixed if k >= 3]
+    none = "no turn" + (f" about {', '.join(turns)}" if len(turns) < 3 else "")
+    return ", ".join([*([f"{places} mm"] if places else []), *([none] if turns else [])])

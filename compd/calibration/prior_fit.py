@@ -11,7 +11,7 @@ by expectation and maximisation (Dempster, Laird, Rubin, J. R. Statist. Soc. B 3
 
     s_b^2 = (v + sum (x_i^2 + C_ii)) / (v + n_b),   C = (A + S^-1)^-1,  A = J^T (1 - R R^+) J,
 
-with v as if so many numbers at the stated tolerance had been seen before.
+with v as if so many numbers at the stated tolerance had been seen before, and s_b no more than a hundred.
 Where the poses tell nothing of a combination, x stays 0 along it, the drawing, and C keeps the tolerance.
 """
 
@@ -28,6 +28,8 @@ from compd.statistics import determined, solve_least_squares
 
 # Numbers at the stated tolerance that count as seen before.
 _SEEN_BEFORE = 2.0
+# A tolerance is wrong by a hundred at most. Numbers that stand for what was left out would else grow without an end.
+_LARGEST_SCALE = 100.0
 # Rounds of expectation and maximisation, and a change of a factor that ends them.
 _ROUNDS, _SETTLED = 60, 1e-3
 
@@ -90,7 +92,7 @@ def fit_with_prior(normal: Normal, block_of: IntArray, free: BoolArray) -> Prior
         C = _inverse(A + np.diag(1.0 / scale[of_free] ** 2))
         x = C @ b
         size = np.bincount(of_free, weights=x**2 + np.diag(C), minlength=blocks)
-        new = np.sqrt((_SEEN_BEFORE + size) / (_SEEN_BEFORE + count))[present]
+        new = np.minimum(np.sqrt((_SEEN_BEFORE + size) / (_SEEN_BEFORE + count)), _LARGEST_SCALE)[present]
         change = np.abs(new / scale[present] - 1).max()
         scale[present] = new
         if change < _SETTLED:

@@ -48,7 +48,7 @@ def scales_of_command(model: MachineModel, tip_mm: FloatArray, rotation_rad: Flo
 def _start(model: MachineModel, tip_mm: FloatArray) -> WarmStart:
     """At the commanded tips with the attitude as at machine zero, and where there is no such pose at machine zero."""
     start = WarmStart.at_zero(model)
-    if start.actuator_mm is None:
+    if model.attitude_is_free and start.actuator_mm is None:
         return start
     tip_M_mm = model.arrangement.target_contact(model.frame, tip_mm).tip_M_mm
     pose, scale_mm = model.reach(np.broadcast_to(tip_M_mm, tip_mm.shape))
@@ -57,7 +57,7 @@ def _start(model: MachineModel, tip_mm: FloatArray) -> WarmStart:
         supports_M_mm=np.broadcast_to(start.supports_M_mm, (len(known), 3, 3)),
         origin_M_mm=np.where(known[:, None], pose.origin_M_mm, start.origin_M_mm),
         rotation_M_P=np.where(known[:, None, None], pose.rotation_M_P, start.rotation_M_P),
-        actuator_mm=start.actuator_mm + np.where(known[:, None], scale_mm, 0.0),
+        actuator_mm=None if start.actuator_mm is None else start.actuator_mm + np.where(known[:, None], scale_mm, 0.0),
     )
 
 

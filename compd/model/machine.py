@@ -181,19 +181,23 @@ class MachineModel:
         Coordinates that a target does not fix follow. A row fails as `inverse_kinematics` does.
         """
         zero, tip_P_mm = self.zero, self.zero.contact.tip_P_mm
-        if not self.by_actuators:
-            pose = inverse_kinematics(self.mechanism(zero.base_joints_M_mm), tip_M_mm, tip_P_mm, zero.rotation_M_P)
-            return Reach(pose, pose.link_length_mm - zero.link_length_mm)
         mechanism = self.mechanism(self.base_joints_at_0_M_mm)
         rotation_M_P, actuator_mm = zero.rotation_M_P, zero.actuator_mm
         # followed from machine zero: Newton alone finds another assembly, or none, of a far place
         for share in np.arange(1, _REACH_STEPS + 1) / _REACH_STEPS:
             here_M_mm = zero.contact.tip_M_mm + share * (tip_M_mm - zero.contact.tip_M_mm)
-            reached = inverse_by_actuators(mechanism, self.actuators, here_M_mm, tip_P_mm, rotation_M_P, actuator_mm)
-            actuator_mm = reached.actuator_mm
+            if self.by_actuators:
+                reached = inverse_by_actuators(
+                    mechanism, self.actuators, here_M_mm, tip_P_mm, rotation_M_P, actuator_mm
+                )
+                pose, actuator_mm = reached.pose, reached.actuator_mm
+            else:
+                pose = inverse_kinematics(mechanism, here_M_mm, tip_P_mm, rotation_M_P)
             if not self.actuators.fixed[3:].any():
-                rotation_M_P = reached.pose.rotation_M_P
-        return Reach(reached.pose, reached.actuator_mm - zero.actuator_mm)
+                rotation_M_P = pose.rotation_M_P
+        if self.by_actuators:
+            return Reach(pose, actuator_mm - zero.actuator_mm)
+        return Reach(pose, pose.link_length_mm - zero.link_length_mm)
 
     @cached_property
     def extended(self) -> BoolArray:
@@ -360,7 +364,7 @@ def machine_constants(model: MachineModel, details: MachineDetails) -> MachineCo
         instrument_M_mm=np.array(details.instrument_M_mm),
         joints=model.joint_weights.shape[1],
         tolerance_mm=details.tolerance_mm,
-        stroke_mm=details.stroke_mm,
+        link_limits_mm=details.link_limits_mm,
         zero=zero,
     )
 

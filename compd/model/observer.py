@@ -171,7 +171,7 @@ def observe_external(
         instrument_M_mm=np.zeros(3),
         joints=0,
         tolerance_mm=np.nan,
-        stroke_mm=np.nan,
+        link_limits_mm=(np.nan, np.nan),
         zero=None,
     )
     return Observations(

@@ -16,11 +16,13 @@ from compd.report.figures import ARROW_SHARE, ARROWS
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
 from compd.report.small_multiples import NOT_RECORDED, thin
-from compd.text import number_text
+from compd.text import join_words, number_text
 from compd.units import UM_PER_MM
 
 # Names and colours of the two states, on every figure of the page.
 STATES = (("as drawn", COLOURS["worst"]), ("calibrated", COLOURS["best"]))
+# A smaller range of turns is not mentioned: a decimal of a degree would not show it.
+_SEEN_DEG = 0.1
 LOOK = (
     "A number counts as needed where held-out poses are predicted better with its block; as held where these poses "
     "tell it less than twice as well as the tolerance does. The standard error is that after the poses, the "
@@ -157,32 +159,32 @@ def _prediction(prediction: PredictionMap | None) -> Panel:
     name = "How uncertain the prediction is"
     if prediction is None or not prediction.slices:
         return Panel(name, "Not computed: the machine has no places of its own to plan.", NOT_RECORDED)
-    slices = prediction.slices
     # an attitude that no target fixes follows from the place, and needs no map of its own
     kinds = ["um", "urad"] if prediction.turn_rad.any() else ["um"]
+    panels = [(kind, group) for kind in kinds for group in prediction.slice_groups]
     figure = make_subplots(
-        len(kinds),
-        len(slices),
+        len(panels),
+        len(prediction.slice_groups[0]),
         subplot_titles=[
-            f"{'tip' if kind == 'um' else 'attitude'}, {kind}" + (f"<br>at {one.held}" if one.held else "")
-            for kind in kinds
-            for one in slices
+            f"{'tip' if kind == 'um' else 'attitude'}, {kind}" + (f"<br>{one.held}" if one.held else "")
+            for kind, group in panels
+            for one in group
         ],
         horizontal_spacing=0.09,
-        vertical_spacing=0.22,
+        vertical_spacing=0.44 / len(panels),
     )
-    style_figure(figure, "", "", 60 + 370 * len(kinds)).update_annotations(font_size=13)
+    style_figure(figure, "", "", 60 + 370 * len(panels)).update_annotations(font_size=13)
     poses = np.concatenate([prediction.measured_mm, np.degrees(prediction.measured_rad)], axis=1)
     poses = poses[thin(np.arange(len(poses)), ARROWS)]
-    for row, kind in enumerate(kinds, start=1):
-        for col, one in enumerate(slices, start=1):
+    for row, (kind, group) in enumerate(panels, start=1):
+        for col, one in enumerate(group, start=1):
             sides = [_side(name, at) for name, at in ((one.across, one.across_at), (one.up, one.up_at))]
             (across, across_title), (up, up_title) = sides
             cells = Heatmap(
                 x=across,
                 y=up,
                 z=one.std_um if kind == "um" else one.std_urad,
-                coloraxis="coloraxis" if row == 1 else "coloraxis2",
+                coloraxis="coloraxis" if kind == "um" else "coloraxis2",
                 hovertemplate=f"%{{z:.3g}} {kind} at %{{x:.4g}}, %{{y:.4g}}<extra></extra>",
             )
             dots = Scatter(
@@ -206,12 +208,22 @@ def _prediction(prediction: PredictionMap | None) -> Panel:
         }
         for k, kind in enumerate(kinds)
     }
-    figure.update_layout(margin={"r": 80, "t": 100}, legend={"y": 1 + 80 / (370 * len(kinds))}, **scales)
+    figure.update_layout(margin={"r": 80, "t": 100}, legend={"y": 1 + 80 / (370 * len(panels))}, **scales)
     text = (
         f"{prediction.words} It follows from the covariance of all numbers; what is held counts with its tolerance. "
         "Left out are the noise of a measurement and a motion of the whole machine. White: not reached."
+        + _turned(prediction.measured_rad)
     )
     return Panel(name, text, figure)
+
+
+def _turned(turn_rad: FloatArray) -> str:
+    """What the turns (N, 3) of the measured poses mean for the slices; "" where there are none."""
+    ends = [(axis, *np.degrees([own.min(), own.max()])) for axis, own in zip("xyz", turn_rad.T, strict=True)]
+    ranges = [f"{low:.1f} to {high:.1f} deg about {axis}" for axis, low, high in ends if high - low >= _SEEN_DEG]
+    if not ranges:
+        return ""
+    return f" A slice holds for the pose in its title; the measured poses turn by {join_words(ranges, 'and')}."
 
 
 def _side(name: str, at: FloatArray) -> tuple[FloatArray, str]:

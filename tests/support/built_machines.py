@@ -72,7 +72,12 @@ def built(path: Path, rng: np.random.Generator, tolerance_mm: float = TOLERANCE_
         if "length_mm" in rod:
             rod["length_mm"] += float(sizes["length"] * rng.standard_normal())
     for actuator in off["actuators"]:
-        turn = Rotation.from_rotvec(sizes["way"] / radius_mm * rng.standard_normal(3)).as_matrix()
+        off_rad = sizes["way"] / radius_mm * rng.standard_normal(3)
+        if "cosine_B" in actuator:
+            # a turn about its own axis is another zero, which is a number of its own
+            axis = np.cross(actuator["cosine_B"], actuator["sine_B"])
+            off_rad -= axis * (axis @ off_rad) / (axis @ axis)
+        turn = Rotation.from_rotvec(off_rad).as_matrix()
         for key in ("along_B", "cosine_B", "sine_B"):
             if key in actuator:
                 actuator[key] = (turn @ np.array(actuator[key])).tolist()

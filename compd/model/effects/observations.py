@@ -29,7 +29,7 @@ class MachineDetails(NamedTuple):
     """What effects need of a machine's description beyond its kinematics; nan where it says nothing.
 
     plate_thickness_mm, scale_signal_period_mm, tolerance_mm: of the configuration's `geometry:`.
-    stroke_mm: by how much a link's length changes at most.
+    link_limits_mm: shortest and longest length of a link that extends.
     instrument_M_mm: where the reference instrument's beam starts. Only the refractive index of air depends on it;
         without a place of its own the beam is taken to start at the origin of {M}.
     """
@@ -38,7 +38,7 @@ class MachineDetails(NamedTuple):
     scale_signal_period_mm: float = math.nan
     instrument_M_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tolerance_mm: float = math.nan
-    stroke_mm: float = math.nan
+    link_limits_mm: tuple[float, float] = (math.nan, math.nan)
 
 
 class AtZero(NamedTuple):
@@ -76,7 +76,8 @@ class MachineConstants(NamedTuple):
     plate_thickness_mm, scale_signal_period_mm.
     instrument_M_mm (3,): where the reference instrument's beam starts; the origin of {M} unless configured.
     joints : number of joint comparators.
-    tolerance_mm, stroke_mm : what plausible ranges of geometric effects rest on.
+    tolerance_mm : what plausible ranges of geometric effects rest on, beside the stroke.
+    link_limits_mm : shortest and longest length of a link that extends.
     zero : the machine at machine zero; None where its kinematics is not known.
     """
 
@@ -99,8 +100,14 @@ class MachineConstants(NamedTuple):
     instrument_M_mm: FloatArray
     joints: int
     tolerance_mm: float
-    stroke_mm: float
+    link_limits_mm: tuple[float, float]
     zero: AtZero | None
+
+    @property
+    def stroke_mm(self) -> float:
+        """By how much the length of a link changes at most."""
+        shortest_mm, longest_mm = self.link_limits_mm
+        return longest_mm - shortest_mm
 
 
 @dataclass(frozen=True)

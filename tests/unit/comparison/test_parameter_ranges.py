@@ -20,7 +20,7 @@ LIBRARY = load_library()
 
 
 def rows(tolerance_mm: float, stroke_mm: float = np.nan) -> Observations:
-    details = MachineDetails(tolerance_mm=tolerance_mm, stroke_mm=stroke_mm)
+    details = MachineDetails(tolerance_mm=tolerance_mm, link_limits_mm=(0.0, stroke_mm))
     return replace(row_at_zero(), constants=machine_constants(tripod(), details))
 
 

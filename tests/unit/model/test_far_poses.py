@@ -27,7 +27,7 @@ POSES = 400
 SHARE_OF_REACH = 0.95
 MOST_TURN_RAD = np.deg2rad(20.0)
 MOST_AMPLIFIED = 4.0
-MACHINES = pytest.mark.parametrize("kind", ["linear-delta", "rotary-delta", "6-pus", "3-prs"])
+MACHINES = pytest.mark.parametrize("kind", KINDS)
 
 
 class Walked(NamedTuple):
