@@ -11,7 +11,8 @@ by expectation and maximisation (Dempster, Laird, Rubin, J. R. Statist. Soc. B 3
 
     s_b^2 = (v + sum (x_i^2 + C_ii)) / (v + n_b),   C = (A + S^-1)^-1,  A = J^T (1 - R R^+) J,
 
-with v as if so many numbers at the stated tolerance had been seen before, and s_b no more than a hundred.
+with v as if so many numbers at the stated tolerance had been seen before, and s_b from 1 to 100: numbers that look as
+drawn do not make those better known that the poses cannot tell.
 Where the poses tell nothing of a combination, x stays 0 along it, the drawing, and C keeps the tolerance.
 """
 
@@ -92,7 +93,7 @@ def fit_with_prior(normal: Normal, block_of: IntArray, free: BoolArray) -> Prior
         C = _inverse(A + np.diag(1.0 / scale[of_free] ** 2))
         x = C @ b
         size = np.bincount(of_free, weights=x**2 + np.diag(C), minlength=blocks)
-        new = np.minimum(np.sqrt((_SEEN_BEFORE + size) / (_SEEN_BEFORE + count)), _LARGEST_SCALE)[present]
+        new = np.clip(np.sqrt((_SEEN_BEFORE + size) / (_SEEN_BEFORE + count)), 1.0, _LARGEST_SCALE)[present]
         change = np.abs(new / scale[present] - 1).max()
         scale[present] = new
         if change < _SETTLED:
