@@ -121,12 +121,19 @@ def read_layout(names: Sequence[str], sidecar: Sidecar | None, reference_valid: 
 
 
 def machine_problems(
-    machine: str, counts: tuple[int, int, int], quantity: str | None, configuration: Configuration, where: str
+    machine: str,
+    counts: tuple[int, int, int],
+    quantity: str | None,
+    configuration: Configuration,
+    where: str,
+    *,
+    commanded: bool = False,
 ) -> list[Problem]:
     """Contradictions to `configuration`: the machine's name, and how many gauges of each kind were recorded.
 
     counts : scales, joint comparators, frame comparators. quantity : of the reference; a link's change by
         interferometer needs no frame (the paper's figures 17 and 18). where : the sidecar, for messages.
+    commanded : whether the commanded pose was recorded, which stands for the scales where none were.
     """
     problems: list[Problem] = []
     if machine != configuration.machine:
@@ -143,8 +150,9 @@ def machine_problems(
         return problems
     scales, joints, frame = counts
     wired_frame = frame if quantity == "link_length" and not frame else len(configuration.wiring.frame)
+    wired_scales = 0 if commanded and not scales else len(configuration.wiring.scale)
     comparisons = (
-        ("scale", scales, len(configuration.wiring.scale), "scale_<i>_mm"),
+        ("scale", scales, wired_scales, "scale_<i>_mm"),
         ("joint comparator", joints, len(configuration.wiring.joint), "joint_<k>_um"),
         ("frame comparator", frame, wired_frame, ", ".join(frame_columns(wired_frame))),
     )

@@ -33,6 +33,7 @@ def check_against(recording: Recording, configuration: Configuration) -> None:
     joints = 0 if recording.joint_mm is None else recording.joint_mm.shape[1]
     frame = 0 if recording.frame_mm is None else recording.frame_mm.shape[1]
     quantity = recording.reference.quantity if recording.reference else None
-    where = str(recording.sidecar.path)
-    if problems := machine_problems(recording.machine, (scales, joints, frame), quantity, configuration, where):
+    where, commanded = str(recording.sidecar.path), recording.commanded_mm is not None
+    counts = (scales, joints, frame)
+    if problems := machine_problems(recording.machine, counts, quantity, configuration, where, commanded=commanded):
         raise RecordingError(problems)

@@ -121,7 +121,10 @@ class RecordingBuilder:
         if self._configuration is not None and sidecar is not None and sidecar.machine:
             counts = (layout.scales, layout.joints, layout.frame)
             quantity = sidecar.reference.quantity if sidecar.reference else None
-            problems += machine_problems(sidecar.machine, counts, quantity, self._configuration, str(sidecar.path))
+            where, commanded = str(sidecar.path), bool(layout.commanded)
+            problems += machine_problems(
+                sidecar.machine, counts, quantity, self._configuration, where, commanded=commanded
+            )
         problems += table_problems.problems
         if problems or sidecar is None:
             raise RecordingError(problems)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
+from urllib.parse import quote
 
 import uvicorn
 
@@ -21,7 +22,7 @@ from compd.page.server import Server
 from compd.setpoint_states import State
 
 LOOKS, ORDERS = get_args(Role)
-TOKEN = "a token"
+TOKENS: dict[Role, str] = {LOOKS: "a viewer's", ORDERS: "an operator's"}
 LINKS = (1, 2, 3)
 MACHINE = {
     "class": "MACHINE",
@@ -65,9 +66,11 @@ class ScriptedLink(DaemonLink):
 
 @dataclass
 class ScriptedPage:
-    """A page that is served. address : with its token. recordings : their directory."""
+    """A page that is served. address, viewer : with a token that may give orders, or only look. recordings : their
+    directory."""
 
     address: str
+    viewer: str
     link: ScriptedLink
     recordings: Path
 
@@ -80,14 +83,14 @@ def scripted(recordings: Path) -> Iterator[ScriptedPage]:
     listener = socket.create_server(("127.0.0.1", 0))
     host = f"127.0.0.1:{listener.getsockname()[1]}"
     server = Server(link, Recordings(recordings, "/no/socket"))
-    guarded = Guard(
-        server.app(), [Token("a person", LOOKS, hashed(TOKEN))], [f"http://{host}"], listener.getsockname()[1]
-    )
+    tokens = [Token(f"who {role}s", role, hashed(token)) for role, token in TOKENS.items()]
+    guarded = Guard(server.app(), tokens, [f"http://{host}"], listener.getsockname()[1])
     running = uvicorn.Server(uvicorn.Config(guarded, log_config=None, access_log=False, timeout_graceful_shutdown=1))
     thread = threading.Thread(target=running.run, kwargs={"sockets": [listener]}, name="page")
     thread.start()
     try:
-        yield ScriptedPage(f"http://{host}/?token={TOKEN.replace(' ', '%20')}", link, recordings)
+        addresses = {role: f"http://{host}/?token={quote(token)}" for role, token in TOKENS.items()}
+        yield ScriptedPage(addresses[ORDERS], addresses[LOOKS], link, recordings)
     finally:
         server.end()
         running.should_exit = True

@@ -1,7 +1,7 @@
 // State and reason in words, on top of everything; outdated ones are grey.
 import { SILENT_S } from "./age.js";
 import { ago, isKnown, tipText } from "./format.js";
-import { nameOf } from "./orders.js";
+import { firstStep } from "./order_names.js";
 import { remedyOf } from "./remedy.js";
 import { appearance, stateName } from "./states.js";
 
@@ -40,7 +40,7 @@ export function showBanner(page, behind_s) {
   write("state", summary.name);
   write("reason", summary.reason);
   if (at("reason").title !== summary.reason) at("reason").title = summary.reason;
-  showRemedy(remedyOf(page, summary));
+  showRemedy(remedyOf(page, summary), page.role === "operate");
   const setpoint = summary.tone === "gone" ? null : page.live.setpoint;
   write("mode", setpoint ? (setpoint.mode === "cmm" ? "measuring (cmm)" : "machine tool") : "");
   write("tip", setpoint?.valid ? tipText(setpoint.tip_M_mm, setpoint.u_tip_um) : "");
@@ -54,11 +54,12 @@ export function showBanner(page, behind_s) {
   at("role").classList.toggle("armed", left_s > 0);
 }
 
-function showRemedy({ text, order, subject }) {
-  write("remedy", text);
+// A browser that may only look is told who can do it instead.
+function showRemedy({ text, order, subject }, mayOrder) {
+  write("remedy", order && !mayOrder ? `${text} A browser with the role operate can do it: “${firstStep(order, subject)}”.` : text);
   const button = at("remedy-order");
-  button.hidden = !order;
-  if (!order) return;
+  button.hidden = !order || !mayOrder;
+  if (button.hidden) return;
   Object.assign(button.dataset, { order, subject });
-  write("remedy-order", `${nameOf(order, subject)} …`);
+  write("remedy-order", firstStep(order, subject));
 }

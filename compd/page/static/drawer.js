@@ -1,7 +1,8 @@
 // Orders and recordings, beside the machine.
 import { ago, element } from "./format.js";
 import { ModelList } from "./model_list.js";
-import { Orders, nameOf } from "./orders.js";
+import { firstStep } from "./order_names.js";
+import { Orders } from "./orders.js";
 import { Recordings } from "./recordings.js";
 
 // The address as a picture for the camera of another device, which then asks for a token of its own.
@@ -39,7 +40,7 @@ export class Drawer {
 
   build() {
     const button = (text, onclick, more = {}) => element("button", { type: "button", onclick, ...more }, text);
-    const order = (name, subject, id = name) => button(nameOf(name, subject()), () => this.ask(name, subject()), { id: `order-${id}` });
+    const order = (name, subject, id = name) => button(firstStep(name, subject()), () => this.ask(name, subject()), { id: `order-${id}` });
     const chosen = () => this.models.chosen;
     this.looking = element("ul");
     this.place.replaceChildren(
@@ -49,7 +50,7 @@ export class Drawer {
       element("div", { class: "row" }, order("zero", () => ""), order("accept", () => "all")),
       element("h3", {}, "Model"),
       ...this.models.parts,
-      element("div", { class: "row" }, button(nameOf("shadow", "a model"), () => this.ask("shadow", chosen()), { id: "order-shadow" }), order("shadow", () => "", "no-shadow"), button(nameOf("adopt"), () => this.ask("adopt", chosen()), { id: "order-adopt" }), order("no-model", () => "")),
+      element("div", { class: "row" }, button(firstStep("shadow", "a model"), () => this.ask("shadow", chosen()), { id: "order-shadow" }), order("shadow", () => "", "no-shadow"), button(firstStep("adopt"), () => this.ask("adopt", chosen()), { id: "order-adopt" }), order("no-model", () => "")),
       this.orders.consequence,
       this.orders.answer,
       element("h2", {}, "Who is looking"),

@@ -27,8 +27,9 @@ function write(cell, text) {
 }
 
 export class GaugeRow {
-  constructor(wire, { accept, select }) {
-    Object.assign(this, { wire, ...measured(wire) });
+  // accept: gives the order; mayAccept: whether this browser can
+  constructor(wire, { accept, mayAccept, select }) {
+    Object.assign(this, { wire, mayAccept, ...measured(wire) });
     this.cells = Object.fromEntries(["value", "age", "quality", "change", "total", "recent"].map((name) => [name, element("span")]));
     this.bar = element("i");
     this.age = element("span", { class: "age" }, this.bar);
@@ -57,7 +58,7 @@ export class GaugeRow {
     this.row.className = this.bad ? "bad" : reading.warning ? "warned" : "";
     this.age.classList.toggle("old", this.bad);
     this.bar.style.width = `${100 * Math.min(1, this.share)}%`;
-    const waits = reading.fault === "distrusted";
+    const waits = reading.fault === "distrusted" && this.mayAccept();
     if (waits && !this.button.isConnected) this.quality.prepend(this.button);
     if (!waits) this.button.remove();
     const warning = reading.warning ? `⚠ ${reading.warning}` : "";

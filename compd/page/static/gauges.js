@@ -9,12 +9,12 @@ const WRITE_EVERY_MS = 500;
 const PARTS_OF_AGE = 4;
 
 export class Gauges {
-  constructor(place, summary, { accept, select }) {
-    Object.assign(this, { place, summary, accept, select, open: false, faults: null });
+  constructor(place, summary, act) {
+    Object.assign(this, { place, summary, act, open: false, faults: null });
   }
 
   begin(machine) {
-    this.rows = machine.wiring.map((wire) => new GaugeRow(wire, { accept: this.accept, select: this.select }));
+    this.rows = machine.wiring.map((wire) => new GaugeRow(wire, this.act));
     this.traces = new Traces(this.rows.length);
     this.button = element("button", { type: "button", onclick: () => this.toggle() }, this.open ? "fold" : "show all");
     this.body = element("tbody");

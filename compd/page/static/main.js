@@ -2,7 +2,6 @@
 import { Age, LATE_S, SILENT_S } from "./age.js";
 import { showBanner } from "./banner.js";
 import { Budget } from "./budget.js";
-import { Drawer } from "./drawer.js";
 import { Gauges } from "./gauges.js";
 import { Hour } from "./hour.js";
 import { bindKeys } from "./keys.js";
@@ -16,12 +15,29 @@ export const page = { live: null, slow: null, machine: null, id: "", role: "view
 const age = new Age();
 const at = (id) => document.getElementById(id);
 
-const drawer = new Drawer(at("drawer"), page);
+// loaded when it is first opened: nothing of it is in sight before
+const drawer = {
+  made: null,
+  async make() {
+    const { Drawer } = await import("./drawer.js");
+    if (!this.made) {
+      this.made = new Drawer(at("drawer"), page);
+      if (page.slow) this.made.show(page.slow);
+    }
+    return this.made;
+  },
+  get open() {
+    return !at("drawer").hidden;
+  },
+  toggle: async () => (await drawer.make()).toggle(),
+  ask: async (name, subject) => (await drawer.make()).ask(name, subject),
+};
 const machine = new Machine(at("scene"), at("colours"), page);
 const links = new Links(at("strips"), page);
 const budget = new Budget(at("budget"));
 const gauges = new Gauges(at("gauge-table"), at("gauges-summary"), {
   accept: (channel) => drawer.ask("accept", channel),
+  mayAccept: () => page.role === "operate",
   select: (wire) => (wire.link ? links.select(wire.kind === "joint" ? machine.actuatorOf(wire.link) : wire.link) : machine.select(wire.distance)),
 });
 const hour = new Hour(at("tape"), at("hour-chart"), at("scrub"), links);
@@ -67,7 +83,7 @@ function take(message, late_s) {
 }
 
 function takeSlow(message) {
-  drawer.show(message);
+  drawer.made?.show(message);
   if (page.frozen || !message.status) return;
   showTiming(at("timing"), message.status);
   gauges.count(message.faults);

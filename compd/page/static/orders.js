@@ -1,13 +1,8 @@
 // Orders of a browser that is armed. An order is given in two steps: its consequence in numbers, then the order itself.
 import { CommandLine } from "./command_line.js";
 import { element } from "./format.js";
+import { nameOf } from "./order_names.js";
 import { post } from "./post.js";
-
-const WHAT_IS_ORDERED = { zero: "Take machine zero", accept: "Accept gauges", shadow: "Run as a shadow", adopt: "Adopt the shadow's model", "no-model": "Run without effects" };
-
-export function nameOf(order, subject) {
-  return order === "shadow" && !subject ? "End the shadow" : WHAT_IS_ORDERED[order];
-}
 
 export class Orders {
   // page: {id, role, armed_until} of this browser's connection; confirm: id of the button of the second step

@@ -44,6 +44,10 @@ async def _trial(request: Request, workbench: OpenWorkbench) -> Response:
     return _numbers(await workbench.ask("tried", request.path_params["effect"], request.path_params["variant"]))
 
 
+async def _doubt(request: Request, workbench: OpenWorkbench) -> Response:
+    return plain(await workbench.ask("doubt", request.path_params["effect"]))
+
+
 async def _step(request: Request, workbench: OpenWorkbench) -> Response:
     """`dry_run`: preview the step. Else make it; the answer is the summary."""
     keys: Any = await keys_of(request)
@@ -85,6 +89,7 @@ HANDLERS = (
     Handler("/effects", _effects),
     Handler("/effects/{effect}", _card),
     Handler("/effects/{effect}/{variant:int}", _trial),
+    Handler("/effects/{effect}/doubt", _doubt),
     Handler("/step", _step, "POST"),
     Handler("/exclusions", _exclude, "POST"),
 )

@@ -219,10 +219,14 @@ class Workbench:
             self._diagnoses[draft] = diagnose(self.opened.aligned, model.fitted, model.covariance, effects)
         return self._diagnoses[draft]
 
-    def _doubt_of(self, name: str) -> str:
-        """See `Diagnosis.doubt_of`.  name : as of `card`."""
+    def doubt(self, name: str) -> dict[str, Any]:
+        """`warning` : why the rows do not support an effect, in the words of the verdict; else "".
+
+        It takes a diagnosis, where none was made of these rows and this model.  name : as of `card`.
+        """
         candidates, effect = self.drafts.find(name)
-        return self._diagnosis("" if candidates is self.candidates else name).doubt_of(effect)
+        diagnosis = self._diagnosis("" if candidates is self.candidates else name)
+        return {"warning": diagnosis.doubt_of(effect)}
 
     def card(self, name: str) -> dict[str, Any]:
         """See `Candidates.card`; `named` is how a command line names the effect. name : an id, or that of a draft.
@@ -245,13 +249,8 @@ class Workbench:
         return self.trial(name, variant).pack(self.opened.pictured, {"revision": self.revision})
 
     def propose(self, kind: str, effect: str) -> dict[str, Any]:
-        """Preview of a step; no file is written. Raises CompdError for an impossible step.
-
-        `warning` : why the rows do not support the effect that would be added, in the words of the verdict; else "".
-        """
-        after = self._proposed(kind, effect)
-        doubt = self._doubt_of(effect) if kind == "add" else ""
-        return {**step_summary(self.opened, after), "warning": doubt}
+        """Preview of a step; no file is written. Raises CompdError for an impossible step."""
+        return step_summary(self.opened, self._proposed(kind, effect))
 
     def _proposed(self, kind: str, effect: str) -> OpenedRecording:
         """The recording after a step, which is fitted once."""

@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import signal
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
 from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
-from tests.support.other_process import is_alive
+from tests.support.other_process import family, is_alive
 from tests.support.workbench_page import open_recording, page_without_machine, workbench_tabs
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
@@ -152,7 +151,7 @@ def test_its_page_works_in_a_sandbox_of_its_own(open_tab):
 
 @contextmanager
 def diagnosing(directory, chromium):
-    """A page whose server runs a diagnosis; the server's process and that of the diagnosis."""
+    """A page whose server runs a diagnosis; the server's process, and those that it started."""
     with page_without_machine(directory) as (address, pid):
         context = chromium.new_context()
         try:
@@ -162,20 +161,11 @@ def diagnosing(directory, chromium):
             open_recording(tab, "end.model.yaml")
             tab.locator("#diagnose").click()
             until(tab, "document.querySelector('.stages .now')")
-            children = [child for child in children_of(pid) if "spawn_main" in command_of(child)]
-            assert children
+            children = family(pid) - {pid}
+            assert len(children) > 1, "what workers are forked from, and a worker"
             yield tab, pid, children
         finally:
             context.close()
-
-
-def children_of(pid):
-    text = "".join(path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children"))
-    return [int(word) for word in text.split()]
-
-
-def command_of(pid):
-    return Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace")
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from compd.setpoint_states import State
@@ -64,6 +66,19 @@ def test_a_remedy_that_an_order_is_has_its_button(tab, page):
     assert tab.get_by_role("banner").get_by_role("button", name="Take machine zero …").is_visible()
 
 
+def test_who_may_only_look_reads_the_remedy_and_who_can_do_it(chromium, page):
+    """No button of an order that would be refused, neither on top nor in the gauge's row."""
+    distrust(page.link)
+    viewer = replace(page, address=page.viewer)
+    with opened(chromium, viewer, viewport={"width": 1366, "height": 768}) as tab:
+        shown(tab, "FAULT")
+        until(tab, "document.querySelector('#gauge-table tr.bad')")
+        until(tab, "document.getElementById('remedy').textContent.includes('role operate')")
+        assert "Accept gauges …" in tab.locator("#remedy").inner_text()
+        assert tab.get_by_role("button", name="Accept").filter(visible=True).count() == 0
+    page.link.tell(State.OK, "")
+
+
 def test_a_remedy_of_hands_has_none_and_names_the_gauge(tab, page):
     lose(page.link, "scale 1 to 3: line_lost (no port)")
     shown(tab, "STOP")
@@ -76,7 +91,7 @@ def test_a_remedy_of_hands_has_none_and_names_the_gauge(tab, page):
 
 def test_orders_are_opened_by_a_button_of_that_name(tab):
     tab.get_by_role("button", name="Orders").click()
-    assert tab.get_by_role("heading", name="Orders").is_visible()
+    tab.get_by_role("heading", name="Orders").wait_for()
 
 
 def test_every_key_has_a_button(tab):

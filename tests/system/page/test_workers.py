@@ -14,7 +14,7 @@ import pytest
 from compd.page.broadcast import LIVE_HZ
 from tests.support.event_stream import EventStream, connected, cookie_of, host_of, request
 from tests.support.live_page import page_process, running_machine
-from tests.support.other_process import is_alive
+from tests.support.other_process import family, is_alive
 
 pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
 
@@ -43,24 +43,10 @@ class Page:
     def table(self, name):
         return self.ask("/join/table", {"export": name})
 
-    def family(self):
-        """Its own process and all that descend from it."""
-        parents = {}
-        for status in Path("/proc").glob("[0-9]*/stat"):
-            try:
-                fields = status.read_text().rpartition(")")[2].split()
-            except OSError:  # it has just ended
-                continue
-            parents[int(status.parent.name)] = int(fields[1])
-        family = {self.pid}
-        while more := {child for child, parent in parents.items() if parent in family} - family:
-            family |= more
-        return family
-
     def memory_mb(self):
         """Proportional, as workers share what their modules take."""
         total = 0.0
-        for pid in self.family():
+        for pid in family(self.pid):
             try:
                 lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
             except OSError:
@@ -178,12 +164,12 @@ def test_no_process_is_left_when_the_server_ends(tmp_path):
     with page_process(Path("/no/socket"), tmp_path / "recordings") as (address, pid):
         page = Page(address, pid, tmp_path)
         assert "there is no such export" in page.table("none").text
-        family = page.family()
-        assert len(family) >= 3
+        processes = family(page.pid)
+        assert len(processes) >= 3
     deadline_s = time.monotonic() + PATIENCE_S
-    while any(map(is_alive, family)) and time.monotonic() < deadline_s:
+    while any(map(is_alive, processes)) and time.monotonic() < deadline_s:
         threading.Event().wait(0.02)
-    assert not any(map(is_alive, family))
+    assert not any(map(is_alive, processes))
     assert "Traceback" not in (tmp_path / "page.log").read_text()
 
 
@@ -228,9 +214,9 @@ def test_a_question_ends_with_its_browser_and_another_person_does_not_wait(page)
         began_s = time.monotonic()
         assert "there is no such export" in page.table("none").text
         others_s = time.monotonic() - began_s
-        before = page.family()
+        before = family(page.pid)
     gone_s = time.monotonic()
-    while page.family() >= before and time.monotonic() < gone_s + PATIENCE_S:
+    while family(page.pid) >= before and time.monotonic() < gone_s + PATIENCE_S:
         pass
     ended_s = time.monotonic() - gone_s
     print(f"another's question took {others_s:.2f} s; the process ended {ended_s:.2f} s after its browser")

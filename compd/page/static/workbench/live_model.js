@@ -4,6 +4,7 @@ import { describe } from "../banner.js";
 import { scaleFor } from "../bar.js";
 import { causeColour, element } from "../format.js";
 import { listen } from "../live_events.js";
+import { firstStep } from "../order_names.js";
 import { Orders } from "../orders.js";
 
 const LOOK_EVERY_MS = 500;
@@ -24,12 +25,12 @@ export class LiveModel {
     this.orders = new Orders(this.page, "confirm-order");
     const button = (text, id, order) => element("button", { type: "button", id, onclick: order }, text);
     const ask = (name, subject) => this.bench.attempt(() => this.orders.ask(name, subject));
-    this.run = button("Run this model as a shadow", "live-shadow", () => ask("shadow", fileName(this.bench.summary.model)));
-    this.adopt = button("Adopt it", "live-adopt", () => ask("adopt", this.bench.summary.model_hash));
+    this.run = button("Run this model as a shadow …", "live-shadow", () => ask("shadow", fileName(this.bench.summary.model)));
+    this.adopt = button("Adopt it …", "live-adopt", () => ask("adopt", this.bench.summary.model_hash));
     this.state = element("p", { id: "live-state", "aria-live": "polite" });
     this.models = element("p", { id: "live-models" });
     this.why = element("p", { class: "note", id: "live-why" });
-    this.offered = element("div", {}, element("div", { class: "row" }, this.orders.arm, this.run, this.adopt, button("End the shadow", "live-no-shadow", () => ask("shadow", "")), button("Run without effects", "live-no-model", () => ask("no-model", ""))), this.why, this.orders.consequence, this.orders.answer);
+    this.offered = element("div", {}, element("div", { class: "row" }, this.orders.arm, this.run, this.adopt, button(firstStep("shadow", ""), "live-no-shadow", () => ask("shadow", "")), button(firstStep("no-model"), "live-no-model", () => ask("no-model", ""))), this.why, this.orders.consequence, this.orders.answer);
     this.bars = element("div", { id: "live-bars" });
     place.replaceChildren(element("h2", {}, "Machine ", element("small", {}, "the model on the machine that runs")), element("div", { class: "halves" }, element("div", {}, this.state, this.models, this.offered), this.bars));
     listen(this.page, this.age, { machine: (machine) => (this.page.machine = machine), live: () => {}, slow: () => this.hear() });

@@ -10,27 +10,45 @@ export class Proposal {
   }
 
   clear() {
+    this.shown = null;
     this.place.replaceChildren();
   }
 
-  // Show the preview of a step, and make it on confirmation.
+  // Show the preview of a step; it can be made once the rows left out have told whether they support what is added.
   show(bench, step, verb) {
+    this.shown = step;
     bench.attempt(async () => {
-      this.place.replaceChildren(element("p", { class: "note" }, `fitting on ${bench.summary.used} rows, and asking the rows left out …`));
+      this.place.replaceChildren(element("p", { class: "note" }, `fitting on ${bench.summary.used} rows …`));
       const outcome = await bench.post("step", { ...step, dry_run: true });
+      if (this.shown !== step) return;
       const rows = outcome.numbers.map((entry) => element("tr", { class: entry.plausible ? "" : "bad" }, element("td", {}, `${entry.effect.replaceAll("_", " ")} ${entry.parameter}`), element("td", { class: "number" }, number(entry.was)), element("td", { class: "number" }, `${number(entry.value)}${entry.standard_error === null ? "" : ` ± ${number(entry.standard_error, 2)}`}`), element("td", {}, micro(entry.unit))));
-      const confirm = element("button", { type: "button", id: "confirm", onclick: () => bench.attempt(() => bench.change("step", step)) }, outcome.warning ? `${verb} all the same` : verb);
+      const doubt = element("div");
+      const last = element("div", { class: "row" }, element("button", { type: "button", onclick: () => this.clear() }, "Leave it"));
       this.place.replaceChildren(
         element("div", { class: "consequence" },
-          ...(outcome.warning ? [element("p", { class: "warning", role: "alert" }, element("b", {}, "Not supported by these rows. "), units(outcome.warning))] : []),
+          doubt,
           element("p", {}, element("b", {}, `${outcome.rms[0].toFixed(2)} → ${outcome.rms[1].toFixed(2)} ${micro(outcome.unit)}`), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${units(outcome.verdict)}`),
           ...(outcome.differ ? [element("p", { class: "note" }, `Both errors are ${outcome.differ}.`)] : []),
           element("table", {}, element("thead", {}, element("tr", {}, ...["number", "was", "will be", "unit"].map((head) => element("th", {}, head)))), element("tbody", {}, ...rows)),
           ...(outcome.gone.length ? [element("p", {}, `Gone: ${outcome.gone.join(", ")}`)] : []),
-          element("div", { class: "row" }, confirm, element("button", { type: "button", onclick: () => this.clear() }, "Leave it"))),
+          last),
       );
-      if (outcome.warning) this.place.scrollIntoView({ block: "nearest" });
-      else confirm.focus();
+      this.place.scrollIntoView({ block: "nearest" });
+      const warning = step.kind === "add" ? await this.doubtOf(bench, step.effect, last) : "";
+      if (this.shown !== step) return;
+      if (warning) doubt.replaceChildren(element("p", { class: "warning", role: "alert" }, element("b", {}, "Not supported by these rows. "), units(warning)));
+      const confirm = element("button", { type: "button", id: "confirm", onclick: () => bench.attempt(() => bench.change("step", step)) }, warning ? `${verb} all the same` : verb);
+      last.prepend(confirm);
+      if (!warning) confirm.focus({ preventScroll: true });
+      this.place.scrollIntoView({ block: "nearest" });
     });
+  }
+
+  // Why the rows do not support the effect; it may take a diagnosis.
+  async doubtOf(bench, effect, row) {
+    const asking = element("span", { class: "note", role: "status" }, "asking the rows left out whether they support it …");
+    row.prepend(asking);
+    const { warning } = await bench.get(`effects/${effect}/doubt`).finally(() => asking.remove());
+    return warning;
   }
 }

@@ -104,16 +104,15 @@ def test_a_model_with_code_is_refused_and_the_code_does_not_run(path, tmp_path):
 
 def test_what_the_rows_support_is_added_without_a_warning_and_what_they_do_not_with_the_verdict(workbench):
     assert workbench.effects()["noise"] == ""
-    assert workbench.propose("add", "link_expansion")["warning"] == ""
+    assert workbench.doubt("link_expansion")["warning"] == ""
     assert (
-        "link_sag is not named. identified: What is missing is link_expansion"
-        in (workbench.propose("add", "link_sag")["warning"])
+        "link_sag is not named. identified: What is missing is link_expansion" in workbench.doubt("link_sag")["warning"]
     )
     workbench.make("add", "link_expansion", workbench.revision)
     offered = workbench.effects()
     assert offered["noise"].startswith("Nothing is missing")
     assert {effect["explained"] for effect in offered["effects"]} == {None}
-    warning = workbench.propose("add", offered["effects"][0]["effect"])["warning"]
+    warning = workbench.doubt(offered["effects"][0]["effect"])["warning"]
     assert warning.endswith(f"is not named. adequate: {offered['noise']}")
 
 
