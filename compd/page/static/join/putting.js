@@ -1,5 +1,4 @@
 // The way of joining rows, the result of its trial, and a picture of that.
-import { micro } from "../format.js";
 import { Check, Choice, Quantity } from "./fields.js";
 import { AgreementPicture } from "./agreement.js";
 import { OrderPicture } from "./order.js";
@@ -34,7 +33,7 @@ export class Putting {
     this.shown = trial;
     this.result.hidden = !trial;
     this.result.className = trial?.reason ? "refused" : "";
-    this.result.textContent = trial ? trial.reason || trial.lines.join("\n").replaceAll(/\bum\b/g, micro("um")) : "";
+    this.result.textContent = trial ? trial.reason || trial.lines.join("\n") : "";
     this.draw();
   }
 

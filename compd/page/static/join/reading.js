@@ -42,7 +42,7 @@ export class Reading extends Columns {
     if (!table) return;
     const { shape, unit, angle_unit, angles, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
     const { assumed } = table;
-    const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
+    const lengthUnit = /, (mm|µm|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
     shape.automatic(`detected: ${this.formats.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
     unit.automatic(lengthUnit && !choices.unit ? `detected: ${lengthUnit[1]}` : "as the file says");
     angle_unit.offer(table.roles.some((role) => /^r[xyz]$/.test(role)));
