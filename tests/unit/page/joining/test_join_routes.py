@@ -303,3 +303,15 @@ def test_an_export_never_goes_through_a_link(client, recordings, tmp_path):
     assert client.post("/join/exports", params={"name": "linked.txt"}, content=b"1\n").status_code == 409
     assert not Path(tmp_path / "elsewhere.txt").exists()
     link.unlink()
+
+
+def test_places_of_reflectors_are_those_of_the_command_line(client):
+    asked = client.post("/join/table", json={"export": POINTS, "reflectors": "left=1,-2.5,3; top=4,5,6e1"}).json()
+    words = shlex.split(asked["command"])
+    assert [words[k + 1] for k, word in enumerate(words) if word == "--reflector-place"] == [
+        "left=1,-2.5,3",
+        "top=4,5,6e1",
+    ]
+    refused = client.post("/join/table", json={"export": POINTS, "reflectors": "left=1,2"})
+    assert refused.status_code == 409
+    assert "left=1,2" in refused.json()["reason"]
