@@ -14,6 +14,8 @@ from compd.units import KNOWN_UNITS, REFERENCE_UNITS, conversion_text, unit_of
 AXES = ("x", "y", "z")
 ATTITUDES = ("rx", "ry", "rz")
 ID_COLUMNS = ("session", "visit", "point", "ball", "pin", "reflector")
+# Those whose ids may be texts.
+TEXT_ID_COLUMNS = ("point", "ball", "pin", "reflector")
 DISTANCE_COLUMN = "reference_distance_mm"
 SKEW_COLUMN = "skew_s"
 # What people read in place of time where none was recorded.

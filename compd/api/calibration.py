@@ -114,7 +114,8 @@ def write_built_machine(
     as-built.yaml
     """
     learned = [recordings] if isinstance(recordings, AlignedRecording) else list(recordings)
-    drawing = load_machine(learned[0].recording.machine if machine is None else machine)
+    recorded = learned[0].recording
+    drawing = load_machine(machine or recorded.sidecar.machine_file or recorded.machine)
     provenance = Provenance(
         "compd calibrate",
         datetime.now(UTC).isoformat(timespec="seconds"),

@@ -42,8 +42,8 @@ ColumnsOption = Annotated[
     str | None,
     typer.Option(
         "--columns",
-        help="Roles of the columns, in order: time, date, x, y, z, rx, ry, rz, length, name, group, collection, "
-        "or - for one that is not used: name,x,y,z,-. With a unit: time[ms],x[inch].",
+        help="Roles of the columns, in order: time, date, x, y, z, rx, ry, rz, length, name, visit, "
+        "reflector, group, collection, or - for one that is not used: name,x,y,z,-. With a unit: time[ms],x[inch].",
     ),
 ]
 UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the lengths, if the file has none.")]
@@ -88,15 +88,16 @@ def read_options(
     sheet: str | None,
     clock_set_back: bool = False,
     angles: str | None = None,
+    prefix: str = "--",
 ) -> ReadOptions:
     """The options of the reader. Raises typer.BadParameter for an invalid decimal mark.
 
-    names : role -> a column's name.
+    names : role -> a column's name.  prefix : of the options of this file.
     """
     from compd.instruments import ReadOptions
 
     if decimal not in (None, ".", ","):
-        raise typer.BadParameter("is . or ,", param_hint="--decimal")
+        raise typer.BadParameter("is . or ,", param_hint=f"{prefix}decimal")
     return ReadOptions(
         shape=shape.value if shape else None,
         columns=tuple(columns.split(",")) if columns else (),

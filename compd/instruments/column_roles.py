@@ -20,7 +20,8 @@ from compd.units import unit_named
 
 AXES = (*POSITION_AXES, *ATTITUDE_AXES, *LENGTH_AXES)
 # `collection` and `date` go with `group` and `time`; "-" is a column that is not used.
-ROLES = ("time", "date", *AXES, "name", "group", "collection", "-")
+ROLES = ("time", "date", *AXES, "name", "visit", "reflector", "group", "collection", "-")
+_NAMED_BY_OPTION = ("time", *POSITION_AXES, "length", "reflector")
 # Largest relative rms difference of the distances between rows of two triples: nominal and measured ones.
 _ALIKE = 0.1
 _HALF_DAY = frozenset(("AM", "PM"))
@@ -164,7 +165,7 @@ def _take_header(table: RawTable, options: ReadOptions, roles: Roles, problems: 
                 f"{len(places)} columns may be {role}",
                 ", ".join(header[k] for k in places),
                 "one",
-                f"name it with --{role}" if role in ("time", *POSITION_AXES, "length") else "give --columns",
+                f"name it with --{role}" if role in _NAMED_BY_OPTION else "give --columns",
             )
         elif places:
             roles.take(role, places[0], understood[places[0]].unit, "by its name")

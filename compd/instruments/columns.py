@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
@@ -85,8 +86,10 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     if not complete.all():
         left_out["with an empty cell"] = int((~complete).sum())
     complete = complete & ~markers
-    if not complete.all() and names is not None:
-        names = tuple(name for name, whole in zip(names, complete.tolist(), strict=True) if whole)
+
+    def texts(cells: Sequence[str] | None) -> tuple[str, ...] | None:
+        return None if cells is None else tuple(compress(cells, complete.tolist()))
+
     return InstrumentExport(
         path=table.path,
         shape=table.shape,
@@ -95,7 +98,9 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
         values=values[complete],
         time_s=None if time is None else time.time_s[complete],
         time_std_s=0.0 if time is None else time.std_s,
-        name=names,
+        name=texts(names),
+        visit=texts(_cells(table, roles, "visit")),
+        reflector=texts(_cells(table, roles, "reflector")),
         taken={**table.assumed, **assumptions},
         left_out=left_out,
     )
@@ -147,6 +152,11 @@ def group_labels(table: RawTable, roles: Roles) -> Sequence[str] | None:
             return table.columns[collection]
         return [f"{a}::{b}" for a, b in zip(table.columns[collection], table.columns[group], strict=True)]
     return table.columns[group]
+
+
+def _cells(table: RawTable, roles: Roles, role: str) -> Sequence[str] | None:
+    """The cells of the column that has this role; None without one."""
+    return table.columns[roles.column[role]] if role in roles.column else None
 
 
 def _names(table: RawTable, roles: Roles, assumptions: dict[str, str]) -> tuple[str, ...] | None:

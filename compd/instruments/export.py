@@ -17,8 +17,7 @@ class ReadOptions:
     Attributes
     ----------
     shape : name of the format (`--as`).
-    columns : roles of the columns in their order (`--columns`): time, x, y, z, rx, ry, rz, length, name, group, or `-`
-        for one that is not used.
+    columns : roles of the columns in their order (`--columns`): those of `ROLES`; `-` for one that is not used.
     names : role -> a column's name in the header (`--time`, `--x`, ...).
     unit : of the lengths (`--unit`). angle_unit : of the attitude (`--angle-unit`). decimal : "." or "," (`--decimal`).
     angles : what rx, ry, rz are, one of `ANGLE_ORDERS` (`--angles`).
@@ -56,6 +55,8 @@ class InstrumentExport:
     time_s : (N,) on the instrument's clock; None where rows have no time.
     time_std_s : standard uncertainty of one time, beside the offset of the clock, s; 0 for stamps as fine as needed.
     name : (N,) names of the points; None if they have none.
+    visit : (N,) which rows are repeats of one visit, where the file says it: those with the same text; None without.
+    reflector : (N,) names of the reflectors that were measured; None without.
     taken : what was taken for what, in words for a person: role -> "column 4 'X', mm by the header".
     left_out : reason -> rows that are not there.
     """
@@ -68,5 +69,7 @@ class InstrumentExport:
     time_s: FloatArray | None = None
     time_std_s: float = 0.0
     name: tuple[str, ...] | None = None
+    visit: tuple[str, ...] | None = None
+    reflector: tuple[str, ...] | None = None
     taken: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, int] = field(default_factory=dict)

@@ -23,6 +23,7 @@ _WORDS = {
     "name": "name target point punkt punktname pointname targetname label targetid pointid "
     "bezeichnung punktbezeichnung",
     "number": "id nr no num number nummer punktnummer index punktnr pointnumber",
+    "reflector": "reflector reflectorname reflectorid smr prism reflektor reflektorname prisma",
     "group": "group gruppe pointgroup punktgruppe",
     "collection": "collection sammlung",
     "angle": "roll pitch yaw a b c rollen nicken gieren",
@@ -38,8 +39,8 @@ _LINK = re.compile(r"link_?\d+")
 class HeaderName(NamedTuple):
     """A column's name, understood.
 
-    role : time, date, x, y, z, rx, ry, rz, length, name, number, group, collection; "angle" for one that may have any
-    of several meanings; "" for anything else. unit : as `compd.units` names it; "" for none.
+    role : time, date, x, y, z, rx, ry, rz, length, name, number, reflector, group, collection; "angle" for one that
+    may have any of several meanings; "" for anything else. unit : as `compd.units` names it; "" for none.
     """
 
     role: str

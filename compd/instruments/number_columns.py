@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray, IntArray, TextArray
 from compd.errors import RecordingError
 from compd.instruments.cells import is_number_column, numbers
 from compd.instruments.column_roles import Roles, column_text
@@ -61,6 +61,10 @@ class NumberColumns:
     def values(self, column: int) -> FloatArray:
         """(N,) numbers of a column, nan for an empty cell; a problem is added for each cell that is no number."""
         return numbers(self._table.columns[column], self.line, self.header[column], self.problems)
+
+    def texts(self, column: int) -> TextArray:
+        """(N,) texts of a column, "" for an empty cell."""
+        return np.array(self._table.columns[column], dtype=object)
 
     def time(self, column: int, unit: str, options: ReadOptions) -> StampedTime | None:
         """Times of a column of stamps, or of numbers in `unit`, as those of an export; None with a problem.

@@ -16,4 +16,5 @@ from .machine_log import machine_recording as machine_recording
 from .machine_log import named_columns as named_columns
 from .machine_log import problems_of_log as problems_of_log
 from .machine_log import read_machine_log as read_machine_log
+from .reflectors import reflector_places as reflector_places
 from .summary import summary_lines as summary_lines

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray, IntArray, TextArray
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.instruments import LENGTH_AXES, POSITION_AXES, InstrumentExport
@@ -18,12 +18,13 @@ from compd.joining.by_distance import assign_by_distance
 from compd.joining.by_name import assign_by_name, check_names
 from compd.joining.by_order import assign_by_order
 from compd.joining.by_time import Instrument
-from compd.joining.distances import lay_over
+from compd.joining.distances import distances_rms_mm, lay_over
 from compd.joining.dwells import Dwell, dwell_columns, find_dwells
 from compd.joining.expected_places import expected_places_mm
 from compd.joining.joined_rows import joined_columns, joined_sidecar
 from compd.joining.misplaced_names import lines_text, listed, name_problems
 from compd.joining.plan_points import dwell_of_plan_rows, read_plan_points
+from compd.joining.reflectors import SeenReflector, points_of, reflector_problems, seen_reflectors
 from compd.recording import Recording, write_recording
 from compd.units import UM_PER_MM
 
@@ -47,7 +48,7 @@ class RestJoin:
     of_lengths : whether the points are lengths along a link.
     """
 
-    columns: Mapping[str, FloatArray]
+    columns: Mapping[str, FloatArray | TextArray]
     sidecar: Mapping[str, Any]
     by: By
     dwells: tuple[Dwell, ...]
@@ -120,7 +121,8 @@ def match_at_rest(
         raise RecordingError(problems)
     assert configuration is not None
     dwells = find_dwells(recording)
-    expected_mm = expected_places_mm(configuration, dwell_columns(recording, [d.rows for d in dwells]), instrument.link)
+    readings = dwell_columns(recording, [d.rows for d in dwells])
+    expected_mm = expected_places_mm(configuration, readings, instrument.link)
     reachable = np.asarray(np.isfinite(expected_mm).all(axis=1))
     no_pose = int((~reachable).sum())
     if not reachable.any():
@@ -128,16 +130,20 @@ def match_at_rest(
     kept = [dwell for dwell, known in zip(dwells, reachable, strict=True) if known]
     places_mm = expected_mm[reachable]
     measured_mm = export.values[:, : places_mm.shape[1]]
-    sigma_mm = np.nan if instrument.sigma_um is None else instrument.sigma_um / UM_PER_MM
-    in_M = instrument.frame == "machine"
-    if by == "name":
-        assigned = _by_name(kept, places_mm, export, measured_mm, sigma_mm, plan, in_M)
-    elif by == "order":
-        assigned = _by_places(assign_by_order(places_mm, measured_mm, sigma_mm), kept, export)
-    else:
-        assigned = _by_places(assign_by_distance(places_mm, measured_mm, sigma_mm, in_M), kept, export)
+    reflectors = seen_reflectors(export, instrument.reflectors)
+    target_mm, each = np.full(measured_mm.shape, np.nan), list[_Assigned]()
+    for reflector in reflectors:
+        at_mm = places_mm
+        if reflector.place_P_mm is not None:
+            at_mm = expected_places_mm(configuration, readings, None, reflector.place_P_mm)[reachable]
+        assigned = _assigned(kept, at_mm, points_of(export, reflector.points), instrument, by, plan)
+        target_mm[reflector.points] = at_mm[assigned.dwell]
+        each.append(assigned)
+    assigned = each[0] if len(each) == 1 else _of_all(reflectors, each, measured_mm, target_mm)
+    if export.visit is not None:
+        assigned = replace(assigned, visit=_told_apart(assigned.visit, export.visit))
     points = np.flatnonzero(assigned.dwell >= 0)
-    columns = joined_columns(recording, kept, assigned.dwell, assigned.visit, places_mm, export, instrument.link)
+    columns = joined_columns(recording, kept, assigned.dwell, assigned.visit, places_mm, export, instrument)
     left_out = dict(assigned.left_out)
     if no_pose:
         left_out["dwells in which the gauges give no pose"] = str(no_pose)
@@ -148,7 +154,7 @@ def match_at_rest(
     pairs = [(int(export.line[j]), kept[assigned.dwell[j]]) for j in (points[0], points[-1])]
     dwell_number, residual_mm = np.zeros(len(export.line), dtype=np.int64), np.full(len(export.line), np.nan)
     dwell_number[points] = [kept[i].number for i in assigned.dwell[points]]
-    at_mm = places_mm[assigned.dwell[points]]
+    at_mm = target_mm[points]
     laid_over_mm = lay_over(measured_mm[points], at_mm)(measured_mm[points])
     residual_mm[points] = np.linalg.norm(laid_over_mm - at_mm, axis=1)
     return RestJoin(
@@ -177,7 +183,7 @@ def _problems(
     instrument: Instrument,
     by: By,
 ) -> list[Problem]:
-    problems = []
+    problems = reflector_problems(export, instrument.reflectors, at_rest=True)
 
     def add(where: Path, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
         problems.append(Problem(where=str(where), what=what, value=value, allowed=allowed, next_step=next_step))
@@ -224,6 +230,48 @@ def _problems(
     if len(export.line) == 0:
         add(export.path, "has no point")
     return problems
+
+
+def _assigned(
+    dwells: list[Dwell],
+    places_mm: FloatArray,
+    export: InstrumentExport,
+    instrument: Instrument,
+    by: By,
+    plan: Path | None,
+) -> _Assigned:
+    """The assignment of one reflector's points. places_mm : (D, d) where it is expected in each dwell."""
+    measured_mm = export.values[:, : places_mm.shape[1]]
+    sigma_mm = np.nan if instrument.sigma_um is None else instrument.sigma_um / UM_PER_MM
+    in_M = instrument.frame == "machine"
+    if by == "name":
+        return _by_name(dwells, places_mm, export, measured_mm, sigma_mm, plan, in_M)
+    if by == "order":
+        return _by_places(assign_by_order(places_mm, measured_mm, sigma_mm), dwells, export)
+    return _by_places(assign_by_distance(places_mm, measured_mm, sigma_mm, in_M), dwells, export)
+
+
+def _of_all(
+    reflectors: Sequence[SeenReflector], each: Sequence[_Assigned], measured_mm: FloatArray, target_mm: FloatArray
+) -> _Assigned:
+    """The assignments of several reflectors as one. target_mm : (G, 3) where each point is expected."""
+    dwell = np.full(len(measured_mm), -1, dtype=np.int64)
+    visit, left_out = dwell.copy(), dict[str, str]()
+    for k, (reflector, own) in enumerate(zip(reflectors, each, strict=True)):
+        dwell[reflector.points] = own.dwell
+        # repeats are of one reflector
+        visit[reflector.points] = np.where(own.visit < 0, -1, own.visit * len(each) + k)
+        left_out |= {f"reflector {reflector.name}: {reason}": which for reason, which in own.left_out.items()}
+    joined = dwell >= 0
+    next_best = [own.next_best for own in each if own.next_best is not None]
+    rms_mm = distances_rms_mm(target_mm[joined], measured_mm[joined])
+    return _Assigned(dwell, visit, rms_mm, min(next_best, key=lambda best: best[1], default=None), left_out)
+
+
+def _told_apart(visit: IntArray, told: Sequence[str]) -> IntArray:
+    """(G,) visits, of which the export tells some apart that one dwell holds; -1 for none."""
+    numbers = np.unique(np.array(told), return_inverse=True)[1]
+    return np.where(visit < 0, -1, visit * (int(numbers.max()) + 1) + numbers)
 
 
 def _by_places(result: Assignment | NoAssignment, dwells: list[Dwell], export: InstrumentExport) -> _Assigned:

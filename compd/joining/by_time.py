@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from compd.arrays import FloatArray
+from compd.arrays import FloatArray, TextArray
 from compd.columns import ATTITUDE_COLUMNS, DISTANCE_COLUMN, link_reference_column
 from compd.errors import Problem, RecordingError
 from compd.instruments import LENGTH, Track
 from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
+from compd.joining.reflectors import Place
 from compd.recording import Frame, Recording, sidecar_contents, write_recording
 
 # Largest motion (mm) in the instrument's data of a machine at rest, unless its own noise imitates more.
@@ -39,7 +40,7 @@ class JoinResult:
     still_mm : motion above which a row counts as in motion.
     """
 
-    columns: Mapping[str, FloatArray]
+    columns: Mapping[str, FloatArray | TextArray]
     sidecar: Mapping[str, Any]
     offset: ClockOffset
     matched: int
@@ -57,6 +58,7 @@ class Instrument:
     sigma_urad : standard uncertainty of an attitude about each axis; None if it is not known.
     link : for a length, the link that it measures (1-based). ball : for a length, the number of the fixed ball, or of
         another fixed end, from which it is measured to the tip.
+    reflectors : name -> place of each of several reflectors, from the tip along the axes of {P}, mm.
     """
 
     frame: Frame = "instrument"
@@ -64,6 +66,7 @@ class Instrument:
     link: int | None = None
     sigma_urad: float | None = None
     ball: int | None = None
+    reflectors: Mapping[str, Place] = field(default_factory=dict)
 
 
 def join_reference(
@@ -124,7 +127,8 @@ def match_by_time(
                 next_step="check the offset; rows in motion are taken with --moving",
             )
         )
-    columns = {**recording.columns, **dict(zip(_column_names(track, instrument), reference.T, strict=True))}
+    measured = dict(zip(_column_names(track, instrument), reference.T, strict=True))
+    columns = {**recording.with_texts(recording.columns), **measured}
     if instrument.ball is not None:
         columns["ball"] = np.where(np.isfinite(reference[:, 0]), float(instrument.ball), np.nan)
     sidecar = _sidecar(recording, track, instrument, offset, matched)

@@ -82,8 +82,9 @@ def find_dwells(recording: Recording) -> tuple[Dwell, ...]:
 def dwell_columns(recording: Recording, rows_of: Sequence[IntArray]) -> dict[str, FloatArray]:
     """Name -> (D,) the columns of the recording, averaged over each of D sets of rows; nan where all cells are empty.
 
-    Ids and directions are those of the first row. A recording whose dwells were found by its scales also has the
-    directions of approach, which rows of dwells alone could not tell.
+    Ids and directions are those of the first row; ids that are texts by their numbers in `Recording.labels`. A
+    recording whose dwells were found by its scales also has the directions of approach, which rows of dwells alone
+    could not tell.
     """
     columns = dict(recording.columns)
     if recording.point is None and recording.approach is not None:
@@ -135,7 +136,7 @@ def _stretches_of_points(recording: Recording) -> list[tuple[IntArray, str]]:
         point = int(recording.point[rows[0]]) if len(rows) else -1
         kept = rows[~recording.excluded[rows] & _has_scales(recording)[rows]]
         if point >= 0 and len(kept):
-            stretches.append((kept, recording.point_labels[point] if recording.point_labels else str(point)))
+            stretches.append((kept, recording.point_name(point)))
     return stretches
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -23,9 +23,13 @@ from compd.units import UM_PER_MM
 
 
 def expected_places_mm(
-    configuration: Configuration, columns: Mapping[str, FloatArray], link: int | None = None
+    configuration: Configuration,
+    columns: Mapping[str, FloatArray],
+    link: int | None = None,
+    place_P_mm: Sequence[float] | None = None,
 ) -> FloatArray:
-    """(D, 3) the tip in {M}, or with `link` (from 1) (D, 1) the change of that link; nan where there is no pose.
+    """(D, 3) the tip in {M}, or a reflector that is `place_P_mm` (3,) from it along the axes of {P}; or with `link`
+    (from 1) (D, 1) the change of that link. nan where there is no pose.
 
     columns : name with unit -> (D,) readings, as `dwell_columns` returns them. Comparators that were not recorded
         count as unmoved, as in a comparison.
@@ -54,7 +58,8 @@ def expected_places_mm(
     prediction = predict(model, rows, {})
     if link is not None:
         return np.asarray(prediction.link_length_mm[:, link - 1 : link] - model.zero.link_length_mm[link - 1])
-    return prediction.tip_mm
+    place = np.zeros(3) if place_P_mm is None else np.asarray(place_P_mm)
+    return np.asarray(prediction.tip_mm + prediction.rotation_M_P @ place)
 
 
 def _scales_mm(model: MachineModel, columns: Mapping[str, FloatArray]) -> FloatArray:

@@ -15,6 +15,7 @@ from compd.instruments import InstrumentExport, track_of
 from compd.joining.assignment import REPEAT_MM
 from compd.joining.at_rest import RestJoin, match_at_rest
 from compd.joining.by_time import Instrument, JoinResult, match_by_time
+from compd.joining.reflectors import of_points_at_rest
 from compd.recording import Recording, read_recording
 
 JoinBy = Literal["time", "order", "name", "distance"]
@@ -91,6 +92,8 @@ def match_export(gauges: Path, export: InstrumentExport, options: JoinOptions) -
     by = choose_by(options.by, export)
     if option := unfit_option(by, options):
         raise RecordingError(Problem(where=option, what=f"contradicts --by {by}", next_step="leave it out"))
+    if by == "time" and (problems := of_points_at_rest(export, options.instrument.reflectors)):
+        raise RecordingError(problems)
     if by == "time":
         configuration = None if options.machine is None else load_machine(options.machine)
         recording = _of_machine(read_recording(gauges, configuration, needs_reference=False), options.machine)

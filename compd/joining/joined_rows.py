@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray, IntArray, TextArray
 from compd.columns import ATTITUDE_COLUMNS, POSITION_COLUMNS, link_reference_column
 from compd.instruments import ATTITUDE_AXES, LENGTH_AXES, InstrumentExport
 from compd.joining.assignment import REPEAT_MM
@@ -29,8 +29,8 @@ def joined_columns(
     visit_of: IntArray,
     places_mm: FloatArray,
     export: InstrumentExport,
-    link: int | None,
-) -> dict[str, FloatArray]:
+    instrument: Instrument,
+) -> dict[str, FloatArray | TextArray]:
     """Name -> (R,) the columns, one row for each point with a dwell, in the order of the dwells.
 
     dwell_of : (G,) number of each point's dwell from 0, -1 for none. visit_of : (G,) the same for repeats,
@@ -52,15 +52,18 @@ def joined_columns(
         dwell_numbers += [i] * len(points)
         rows_of += [rows[k : k + 1] for k in range(len(rows))] if one_by_one else [rows] * len(points)
         times_s += recording.time_s[rows].tolist() if one_by_one else _times_s(recording, dwells[i], len(points))
-    columns = dwell_columns(recording, rows_of)
+    columns: dict[str, FloatArray | TextArray] = {**recording.with_texts(dwell_columns(recording, rows_of))}
     if recording.has_time:
         columns["time_s"] = np.array(times_s)
     if recording.point is None:
         columns["point"] = _place_numbers(places_mm, export, dwell_of)[dwell_numbers]
     columns["visit"] = _numbered(visit_of[order])
+    if instrument.reflectors:
+        assert export.reflector is not None
+        columns["reflector"] = np.array(export.reflector, dtype=object)[order]
     values = export.values[order]
-    if export.axes == LENGTH_AXES and link is not None:
-        columns[link_reference_column(link)] = values[:, 0]
+    if export.axes == LENGTH_AXES and instrument.link is not None:
+        columns[link_reference_column(instrument.link)] = values[:, 0]
     else:
         names = POSITION_COLUMNS + (ATTITUDE_COLUMNS if _has_attitude(export) else ())
         columns |= dict(zip(names, values.T, strict=True))
@@ -83,6 +86,8 @@ def joined_sidecar(
         reference = {"quantity": "tool_pose" if _has_attitude(export) else "tool_position", "frame": instrument.frame}
     if instrument.sigma_um is not None:
         reference["sigma_um"] = instrument.sigma_um
+    if instrument.reflectors:
+        reference["reflectors"] = {name: list(place) for name, place in instrument.reflectors.items()}
     joined: dict[str, Any] = {
         "by": by,
         "gauges": recording.path.name,

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.arrays import FloatArray
-from compd.columns import COMMANDED_ATTITUDE_COLUMNS
+from compd.arrays import FloatArray, TextArray
+from compd.columns import COMMANDED_ATTITUDE_COLUMNS, TEXT_ID_COLUMNS
 from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.instruments import (
@@ -27,7 +27,7 @@ from compd.units import unit_factor, unit_named, unit_of
 # "X [mm]", "A (deg)", "X / mm", "X_mm": the name and its unit.
 _WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(]\s*(?P<in>[^\])]+?)\s*[\])]|/\s*(?P<after>\w+)|[_ ](?P<end>\w+))$")
 _FORM = '--log "X [mm]=commanded_x_mm", or with the unit --log X=commanded_x_mm:mm'
-_OWN_NAME = re.compile(r"(scale|commanded|temperature|force)_\w+|time_s|point")
+_OWN_NAME = re.compile(r"(scale|commanded|temperature|force)_\w+|time_s|point|visit|session")
 _TIME = "time_s"
 # Options of the reader that `join` has for the export, and once more for the log.
 _READ_OPTION = re.compile(r"--(?=(?:as|sheet|decimal|dates|clock-set-back|angles)\b)")
@@ -50,10 +50,11 @@ class LogOptions:
 class MachineLog:
     """A log that is read.
 
-    columns : name -> (N,) in the units of a recording.  shape, taken, left_out : as of an instrument's export.
+    columns : name -> (N,) in the units of a recording; ids may be texts.
+    shape, taken, left_out : as of an instrument's export.
     """
 
-    columns: Mapping[str, FloatArray]
+    columns: Mapping[str, FloatArray | TextArray]
     shape: str
     taken: Mapping[str, str]
     left_out: Mapping[str, int]
@@ -120,7 +121,7 @@ def _read(table: NumberColumns, options: LogOptions) -> MachineLog:
     if not wanted and not problems.problems:
         allowed = "scale_1_mm ..., or commanded_x_mm ..., under any name: " + _FORM
         problems.add(0, "no column is one of a recording", ", ".join(table.header), allowed)
-    taken, left_out, columns = dict(table.taken), dict[str, int](), dict[str, FloatArray]()
+    taken, left_out, columns = dict(table.taken), dict[str, int](), dict[str, FloatArray | TextArray]()
     rows = np.ones(len(table.line), dtype=bool)
     for k, (name, stated) in wanted.items():
         unit = unit_named(stated) or stated or _header_unit(table.header[k])
@@ -130,6 +131,9 @@ def _read(table: NumberColumns, options: LogOptions) -> MachineLog:
             if time is not None:
                 columns[name], rows = time.time_s, np.isfinite(time.time_s)
                 taken[name] = f"{table.column_text(k)}, {time.assumed}"
+            continue
+        if name in TEXT_ID_COLUMNS and not table.numbers[k]:
+            columns[name], taken[name] = table.texts(k), table.column_text(k)
             continue
         if not table.numbers[k]:
             problems.add(0, f"column {table.header[k]!r} has no numbers", name, "numbers, or stamps for time_s")
@@ -197,7 +201,7 @@ def _in_unit(table: NumberColumns, k: int, name: str, unit: str) -> tuple[FloatA
 def _turn(
     table: NumberColumns,
     wanted: Mapping[int, tuple[str, str]],
-    columns: dict[str, FloatArray],
+    columns: dict[str, FloatArray | TextArray],
     taken: dict[str, str],
     options: LogOptions,
 ) -> None:
@@ -221,7 +225,7 @@ def _turn(
         value = ", ".join(headers) if order is None else order
         problems.add(0, what, value, ", ".join(ANGLE_ORDERS), "say it with --angles, such as --angles xyz")
     elif set(COMMANDED_ATTITUDE_COLUMNS) <= set(columns):
-        angles = np.column_stack([columns[name] for name in COMMANDED_ATTITUDE_COLUMNS])
+        angles = np.column_stack([columns[name] for name in COMMANDED_ATTITUDE_COLUMNS]).astype(np.float64)
         columns |= dict(zip(COMMANDED_ATTITUDE_COLUMNS, rotation_vectors(angles, order).T, strict=True))
         for name in COMMANDED_ATTITUDE_COLUMNS:
             taken[name] += ", of a rotation vector" if order == "vector" else f", in the order {order}"

@@ -18,6 +18,7 @@ from compd.page.history import History, Traces
 from compd.page.model_effects import ModelEffects
 from compd.page.recordings import Recordings
 from compd.page.scene import scene
+from compd.page.shown_texts import shown
 
 Message = Mapping[str, Any]
 
@@ -224,8 +225,8 @@ def gauges(readings: Event, columns: list[dict[str, Any]], status: Event | None 
 
 
 def plain(event: Event) -> bytes:
-    """An event as JSON."""
-    return orjson.dumps(event)
+    """An event as JSON, `shown`."""
+    return orjson.dumps(shown(event))
 
 
 def encoded(name: str, data: bytes) -> bytes:

@@ -11,6 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Scope
 
+from compd.page.shown_texts import shown
 from compd.text import nan_to_null
 
 MAX_BODY_BYTES = 8192
@@ -62,8 +63,8 @@ def one_line(text: str) -> str:
 
 
 def answer(data: Any) -> Response:
-    """Plain data as ASCII JSON, since typed text may not be encodable; null for non-finite numbers."""
-    return Response(json.dumps(nan_to_null(data)), media_type="application/json")
+    """Plain data as ASCII JSON, since typed text may not be encodable; `shown`, with null for non-finite numbers."""
+    return Response(json.dumps(nan_to_null(shown(data))), media_type="application/json")
 
 
 def refused(reason: str, code: int, value: str = "") -> Response:

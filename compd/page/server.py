@@ -32,7 +32,7 @@ from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders, explained
 from compd.page.qr_code import svg_qr_code
 from compd.page.recordings import Recordings
-from compd.page.requests import LOOKS_ONLY, asked_by, keys_of, may_change, note_change, refused
+from compd.page.requests import LOOKS_ONLY, answer, asked_by, keys_of, may_change, note_change, refused
 from compd.page.workbench.routes import WorkbenchRoutes
 from compd.page.workers.workers import Workers
 from compd.report import AXES_CSS
@@ -160,7 +160,7 @@ class Server:
         if name not in self._orders:
             return refused("there is no such order", 404)
         consequence = self._orders.consequence(name, request.query_params.get("subject", ""))
-        return JSONResponse(asdict(consequence))
+        return answer(asdict(consequence))
 
     async def _order(self, request: Request) -> Response:
         note_change(request)
@@ -171,10 +171,10 @@ class Server:
         if self._browsers.armed(id, token) is None:
             return refused(self._browsers.why_not(id, token) or "this browser is not armed", 403)
         try:
-            answer = await self._orders.do(name, str(keys.get("subject", "")), asked_by(request.scope))
+            done = await self._orders.do(name, str(keys.get("subject", "")), asked_by(request.scope))
         except DaemonError as error:
             return refused(explained(error), 409, error.problems[0].value)
-        return JSONResponse({"answer": answer})
+        return answer({"answer": done})
 
     async def _list_models(self, request: Request) -> Response:
         directory = self._models.directory

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from compd.columns import number_text
+from compd.columns import TEXT_ID_COLUMNS, number_text
 from compd.errors import Problem, RecordingError
 from compd.files import Content
 from compd.recording.open_part import ARROW, OpenPart
@@ -22,8 +22,6 @@ from compd.recording.writer import write_recording_files
 from compd.table_file import CSV, PARQUET, SUFFIXES, row_count, table_blocks, table_path
 from compd.tables import FIRST_ROW, Table
 
-# Columns that may hold text; a reader knows whether they do.
-_ID_COLUMNS = ("point", "ball", "pin", "reflector")
 # Rows held as text at once: a cell takes 60 bytes then.
 _TEXT_ROWS = 4096
 
@@ -149,7 +147,7 @@ def _blocks(source: Path) -> Iterator[Table]:
     Raises RecordingError with what is wrong in a block.
     """
     next_row = FIRST_ROW
-    for table, problems in table_blocks(source, _ID_COLUMNS, ROW_GROUP_ROWS):
+    for table, problems in table_blocks(source, TEXT_ID_COLUMNS, ROW_GROUP_ROWS):
         if problems.problems or table is None:
             raise RecordingError(problems.problems)
         row = np.arange(next_row, table.row[-1] + 1 if len(table.row) else next_row)

@@ -24,6 +24,7 @@ from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
 from compd.recording.reference import Reference
 from compd.recording.sidecar import Sidecar
+from compd.tables import id_texts
 from compd.units import UM_PER_MM
 
 # Without a `session` column, cross-validation leaves out blocks of time (the recording format).
@@ -67,7 +68,7 @@ class Recording:
     begin_s : the file's first time, of a block or of chosen rows too; effects and descriptions count from it.
     has_time : whether the file has the time of each row; an external model's rows may be in order without it.
     session, visit, point : (N,) int or None if the column is absent; -1 where the cell is empty.
-        Text ids of points are numbered in sorted order; `point_labels` has the texts, empty where ids are numbers.
+        Text ids are numbered in sorted order; `labels` has the texts.
     scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
         None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
     commanded_mm, commanded_rotation_rad : (N, 3) or None: the pose that the controller of a machine without scales was
@@ -85,7 +86,7 @@ class Recording:
     ball : (N,) int or None, -1 where empty; text names of fixed ends are numbered in sorted order. plate : the ball
         plate.
     pin : (N,) int or None: the fixed pin in which the tip was; -1 where empty, text numbered in sorted order.
-    end_names : the text names of fixed ends or pins, by number; empty where these are numbers.
+    labels : column of ids -> its texts, by number; columns whose ids are numbers are not among them.
     model_mm, model_rotation_rad, model_link_mm : with `machine: external` the user's own model's prediction, column
         for column as the reference's.
     excluded : (N,) bool, by the person; the reasons are in `sidecar.excluded`.
@@ -120,7 +121,7 @@ class Recording:
     ball: IntArray | None
     plate: BallPlate | None
     pin: IntArray | None
-    end_names: tuple[str, ...]
+    labels: Mapping[str, tuple[str, ...]]
     model_mm: FloatArray | None
     model_rotation_rad: FloatArray | None
     model_link_mm: FloatArray | None
@@ -129,7 +130,6 @@ class Recording:
     columns: Mapping[str, FloatArray]
     warnings: tuple[Problem, ...] = ()
     has_time: bool = True
-    point_labels: tuple[str, ...] = ()
     commanded_mm: FloatArray | None = None
     commanded_rotation_rad: FloatArray | None = None
     begin_s: float = 0.0
@@ -233,7 +233,15 @@ class Recording:
     def end_name(self, number: int) -> str:
         """The fixed ball or pin of this number as the file names it: "pin 2", "ball post"."""
         kind = "pin" if self.pin is not None else "ball"
-        return f"{kind} {self.end_names[number] if self.end_names else number}"
+        return f"{kind} {self.labels[kind][number] if kind in self.labels else number}"
+
+    def point_name(self, number: int) -> str:
+        """The id of this point as the file has it."""
+        return self.labels["point"][number] if "point" in self.labels else str(number)
+
+    def with_texts(self, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray | TextArray]:
+        """Columns with the ids as the file has them: texts where these are texts, "" for an empty cell."""
+        return {name: id_texts(v, self.labels[name]) if name in self.labels else v for name, v in columns.items()}
 
     @property
     def model_columns(self) -> tuple[str, ...]:

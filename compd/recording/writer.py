@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from compd.arrays import FloatArray
-from compd.columns import decimals, is_covariate, number_text, parse_name
+from compd.columns import TEXT_ID_COLUMNS, decimals, is_covariate, number_text, parse_name
 from compd.errors import Problem, RecordingError
 from compd.files import Content, write_files
 from compd.recording.parquet_writer import arrow_batch, arrow_schema, write_parquet
@@ -26,7 +28,8 @@ def write_recording(
 
     Parameters
     ----------
-    columns : name with unit -> (N,) numbers in that unit, nan (an empty cell) where nothing was measured.
+    columns : name with unit -> (N,) numbers in that unit, nan (an empty cell) where nothing was measured; of ids of
+        points, balls, pins and reflectors texts as well, "" for an empty cell.
     sidecar : what the YAML file is to hold, as `sidecar_contents` returns it.
     overwrite : whether existing files are replaced.
 
@@ -36,11 +39,13 @@ def write_recording(
         For names that are not the format's, unequal lengths, infinite numbers, a time_s that does not rise, an
         existing file without `overwrite`, a disk that does not take the files, and Parquet without pyarrow.
     """
-    arrays = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()}
-    if problems := _problems(path, arrays, overwrite):
+    texts = {name: values for name, values in columns.items() if name in TEXT_ID_COLUMNS and _is_text(values)}
+    arrays = {name: np.asarray(v, dtype=np.float64) for name, v in columns.items() if name not in texts}
+    lengths = {name: np.zeros(np.shape(values)) for name, values in texts.items()}
+    if problems := _problems(path, {**arrays, **lengths}, overwrite):
         raise RecordingError(problems)
-    rounded = {name: _rounded(name, values) for name, values in arrays.items()}
-    table = _parquet(path, rounded) if path.suffix == PARQUET else _csv_text(rounded)
+    cells = {name: np.asarray(texts[name]) if name in texts else _rounded(name, arrays[name]) for name in columns}
+    table = _parquet(path, cells, texts) if path.suffix == PARQUET else _csv_text(cells)
     write_recording_files({path.with_suffix(".yaml"): sidecar_text(sidecar, path.parent), path: table})
 
 
@@ -86,23 +91,34 @@ def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> 
     return problems
 
 
+def _is_text(values: ArrayLike) -> bool:
+    return np.asarray(values).dtype.kind in "OU"
+
+
 def _rounded(name: str, values: FloatArray) -> FloatArray:
     """Values with the decimals of their column."""
     places = decimals(name)
     return values if places is None else np.round(values, places)
 
 
-def _parquet(path: Path, columns: Mapping[str, FloatArray]) -> Content:
-    """The writer of the columns as Parquet."""
-    schema = arrow_schema(path, columns)
-    return lambda file: write_parquet(file, path, schema, [arrow_batch(path, schema, columns)])
+def _parquet(path: Path, columns: Mapping[str, NDArray[Any]], texts: Collection[str]) -> Content:
+    """The writer of the columns as Parquet. texts : names of those that are text."""
+    schema = arrow_schema(path, columns, texts)
+    block = {name: [cell or None for cell in v.tolist()] if name in texts else v for name, v in columns.items()}
+    return lambda file: write_parquet(file, path, schema, [arrow_batch(path, schema, block)])
 
 
-def _csv_text(columns: Mapping[str, FloatArray]) -> str:
+def _csv_text(columns: Mapping[str, NDArray[Any]]) -> str:
     """The columns as CSV; a cell is empty for nan."""
-    cells = [_cells(values) for values in columns.values()]
-    return "\n".join([",".join(columns), *map(",".join, zip(*cells, strict=True))]) + "\n"
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*map(_cells, columns.values()), strict=True))
+    return text.getvalue()
 
 
-def _cells(values: FloatArray) -> list[str]:
-    return ["" if math.isnan(value) else number_text(value) for value in values.tolist()]
+def _cells(values: NDArray[Any]) -> list[str]:
+    cells: list[Any] = values.tolist()
+    if _is_text(values):
+        return cells
+    return ["" if math.isnan(value) else number_text(value) for value in cells]

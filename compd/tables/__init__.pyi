@@ -9,4 +9,5 @@ from .problem_list import values_text as values_text
 from .table import FIRST_ROW as FIRST_ROW
 from .table import Table as Table
 from .table import TableBlock as TableBlock
+from .table import id_texts as id_texts
 from .table_format import TableFormat as TableFormat

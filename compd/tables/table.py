@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray, IntArray, TextArray
 from compd.tables.problem_list import ProblemList
 
 # The header is row 1, also of a file that has none.
@@ -58,3 +58,8 @@ def id_codes(cells: Sequence[str], labels: Sequence[str]) -> FloatArray:
     """(N,) each cell's index among `labels`, nan where it is empty."""
     code = {label: float(i) for i, label in enumerate(labels)}
     return np.array([code.get(cell, np.nan) for cell in cells], dtype=np.float64)
+
+
+def id_texts(codes: FloatArray, labels: Sequence[str]) -> TextArray:
+    """(N,) the text of each code, "" for nan: what `id_codes` read."""
+    return np.array(["" if np.isnan(code) else labels[int(code)] for code in codes.tolist()], dtype=object)

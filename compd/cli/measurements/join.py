@@ -67,6 +67,20 @@ def join(
             min=1, help="For a length, of a ballbar or a tracer: the fixed ball from which it goes to the tip."
         ),
     ] = None,
+    visit: Annotated[
+        str | None,
+        typer.Option(help="The export's column that tells visits apart: rows with one text in it are repeats."),
+    ] = None,
+    reflector: Annotated[
+        str | None, typer.Option(help="The export's column of the reflectors' names; default: by its name.")
+    ] = None,
+    reflector_place: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=X,Y,Z",
+            help="Of several reflectors: where one is, from the tip along the axes of {P}, mm. Once for each.",
+        ),
+    ] = None,
     shape: ShapeOption = None,
     columns: ColumnsOption = None,
     unit: UnitOption = None,
@@ -135,21 +149,35 @@ def join(
         log_as_recording,
         machine_recording,
         match_export,
+        reflector_places,
         summary_lines,
         unfit_option,
     )
     from compd.recording import write_recording
 
-    roles = {"time": time, "x": x, "y": y, "z": z, "length": length}
+    roles = {"time": time, "x": x, "y": y, "z": z, "length": length, "visit": visit, "reflector": reflector}
     read_as = read_options(
         shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet, clock_set_back, angles
     )
     log_read = read_options(
-        log_as, None, {}, None, None, log_decimal, log_dates, None, None, log_sheet, log_clock_set_back, log_angles
+        log_as,
+        None,
+        {},
+        None,
+        None,
+        log_decimal,
+        log_dates,
+        None,
+        None,
+        log_sheet,
+        log_clock_set_back,
+        log_angles,
+        prefix="--log-",
     )
     exported = read_export(export, read_as)
     echo_taken(export, exported.shape, exported.taken, exported.left_out)
-    instrument = Instrument(frame.value, sigma_um, link, sigma_urad, ball)
+    places = reflector_places(reflector_place or ())
+    instrument = Instrument(frame.value, sigma_um, link, sigma_urad, ball, places)
     options = JoinOptions(instrument, by.value if by else None, offset, moving, machine, plan)
     chosen = choose_by(options.by, exported)
     if option := unfit_option(chosen, options):

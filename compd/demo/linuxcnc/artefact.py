@@ -118,12 +118,14 @@ def write_probed_recording(path: Path, gauges: Sequence[Path], rounds: Sequence[
     origin_s = rows[0]["time_s"] if rows else 0.0
     columns = {name: [row.get(name, np.nan) for row in rows] for name in (rows[0] if rows else {})}
     columns["time_s"] = [row["time_s"] - origin_s for row in rows]
+    of_gauges = _sidecar(gauges[0]) if gauges else {}
     sidecar = sidecar_contents(
         "hexapod",
         {"quantity": "tool_position", "frame": "machine", "sigma_um": SIGMA_um},
         folds=["session"],
         # machine zero is taken once, before the first part
-        quantities_at_zero=_sidecar(gauges[0]).get("quantities_at_zero") if gauges else None,
+        quantities_at_zero=of_gauges.get("quantities_at_zero"),
+        machine_file=gauges[0].parent / of_gauges["machine_file"] if "machine_file" in of_gauges else None,
     )
     write_recording(path, columns, sidecar, overwrite=True)
     return len(rows)

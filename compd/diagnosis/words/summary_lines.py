@@ -92,7 +92,8 @@ def _heading(diagnosis: Diagnosis, fall: ErrorFall) -> str:
     be = "is" if len(ids) == 1 else "are"
     match diagnosis.verdict:
         case "adequate" if fall.noise_known and diagnosis.constant is not None:
-            text = "nothing is missing but a constant; what varies is noise"
+            near = "" if too_small(diagnosis) is None else "near the "
+            text = f"nothing is missing but a constant; what varies is {near}noise"
         case "adequate" if fall.noise_known:
             error, only_noise = number_text(fall.before, fall.unit), too_small(diagnosis) is None
             rest = (

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from compd.errors import CompdError, Problem
 from compd.instruments import ANGLE_ORDERS, ReadLimits, ReadOptions, instrument_formats
-from compd.joining import JOIN_BY, Instrument, JoinOptions, LogOptions
+from compd.joining import JOIN_BY, Instrument, JoinOptions, LogOptions, reflector_places
 
 Value = TypeVar("Value", str, float, int)
 
@@ -29,6 +29,7 @@ _FRAMES = ("instrument", "machine")
 @dataclass(frozen=True)
 class Choices:
     """read : options of the export's reader. join : options for matching its rows with the gauges.
+    reflectors : where each of several is, as a person wrote it, NAME=X,Y,Z.
     log : of the machine's own log, whose columns are named by `log_roles` in their order; None where a recording of
         the gauges is joined.
     """
@@ -36,6 +37,7 @@ class Choices:
     read: ReadOptions
     join: JoinOptions
     log: LogOptions | None = None
+    reflectors: tuple[str, ...] = ()
     log_roles: tuple[str, ...] = ()
 
     def command(self, gauges: Path, export: Path, out: Path) -> str:
@@ -67,6 +69,7 @@ class Choices:
         for option, value in options.items():
             if value is not None:
                 words += [option, repr(value) if isinstance(value, float) else str(value)]
+        words += [word for text in self.reflectors for word in ("--reflector-place", text)]
         flags = {"--moving": join.moving, "--clock-set-back": read.clock_set_back}
         words += [flag for flag, is_set in flags.items() if is_set]
         return shlex.join([*words, *([] if self.log is None else _log_words(self.log))])
@@ -142,12 +145,19 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
         sheet=text("sheet"),
         limits=LIMITS,
     )
+    reflectors = tuple(filter(None, map(str.strip, (text("reflectors") or "").split(";"))))
+    places: Mapping[str, Any] = {}
+    try:
+        places = reflector_places(reflectors)
+    except CompdError as error:
+        problems += error.problems
     instrument = Instrument(
         frame="machine" if text("frame", _FRAMES) == "machine" else "instrument",
         sigma_um=choice("sigma_um", float, "a number, um"),
         link=choice("link", int, "the number of a link"),
         sigma_urad=choice("sigma_urad", float, "a number, urad"),
         ball=_positive("ball", choice("ball", int, "the number of a ball, from 1"), problems),
+        reflectors=places,
     )
     by = text("by", JOIN_BY)
     join = JoinOptions(
@@ -161,7 +171,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
     log_roles = roles("log_columns")
     if problems:
         raise CompdError(problems)
-    return Choices(read, join, log, log_roles)
+    return Choices(read, join, log, reflectors, log_roles)
 
 
 def _is(value: Any, kind: type) -> bool:

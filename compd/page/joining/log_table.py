@@ -96,7 +96,7 @@ def without_machine() -> RecordingError:
 
 
 def _names(configuration: Configuration) -> Iterator[str]:
-    yield from ("time_s", "point")
+    yield from ("time_s", "point", "visit", "session")
     yield from COMMANDED_COLUMNS + COMMANDED_ATTITUDE_COLUMNS
     yield from scale_columns(len(configuration.wiring.scale) or configuration.geometry.links)
     yield from joint_columns(len(configuration.wiring.joint))

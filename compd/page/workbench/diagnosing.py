@@ -38,10 +38,10 @@ class Diagnosing:
         self._diagnosis: Diagnosis | None = None
 
     def outcome(self, progress: Callable[[str], None]) -> dict[str, Any]:
-        """The findings: `text`, `result` and `evidence`. progress : called with each step as it begins."""
+        """The findings: `printed`, `result` and `evidence`. progress : called with each step as it begins."""
         self._diagnosis = diagnose(self._aligned, self._model, effects=self._effects, progress=progress)
         return {
-            "text": _text(self._diagnosis),
+            "printed": _printed(self._diagnosis),
             "result": self._diagnosis.as_json(),
             "evidence": evidence(self._diagnosis),
         }
@@ -58,7 +58,7 @@ class Diagnosing:
             return gzip.compress(path.read_bytes())
 
 
-def _text(diagnosis: Diagnosis) -> str:
+def _printed(diagnosis: Diagnosis) -> str:
     from rich.console import Console
 
     from compd.report import print_diagnosis

@@ -15,6 +15,7 @@ from compd.clock import Clock, MonotonicClock
 from compd.diagnosis import ONLY_WHERE_NEEDED, STAGES
 from compd.page.workers.limits import WorkerLimits
 from compd.page.workers.workers import Workers
+from compd.text import typeset
 
 if TYPE_CHECKING:
     from compd.configuration import Machine
@@ -38,8 +39,8 @@ class DiagnosisJob:
     revision : of the model and the rows that it is of.
     state : how far it is. Its pictures are drawn after it is "done".
     steps : text and time (s from the start) of each step that has begun.
-    text, result, evidence : what the command prints, what it prints with ``--json``, and the same for a browser; empty
-        before the end.
+    printed, result, evidence : what the command prints, what it prints with ``--json``, and the same for a browser;
+        empty before the end.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class DiagnosisJob:
         self.path, self.revision = path, revision
         self.state: State = "running"
         self.steps: list[tuple[str, float]] = []
-        self.text = ""
+        self.printed = ""
         self.result: dict[str, Any] = {}
         self.evidence: dict[str, Any] = {}
         self._page = b""
@@ -109,7 +110,7 @@ class DiagnosisJob:
 
     def outcome(self) -> dict[str, Any]:
         """The findings as plain data."""
-        return {"text": self.text, "result": self.result, "evidence": self.evidence}
+        return {"printed": self.printed, "result": self.result, "evidence": self.evidence}
 
     def _note_step(self, text: str) -> None:
         self.steps.append((text, self._clock.monotonic() - self._start_s))
@@ -119,11 +120,11 @@ class DiagnosisJob:
         failure = None if answer.cancelled() else answer.exception()
         if self.state != "running" or answer.cancelled() or failure is not None:
             if self.state == "running":
-                self.text, self.state = str(failure), "failed"
+                self.printed, self.state = typeset(str(failure)), "failed"
             self._ended.set()
             return
         outcome = json.loads(answer.result())
-        self.text, self.result, self.evidence = outcome["text"], outcome["result"], outcome["evidence"]
+        self.printed, self.result, self.evidence = outcome["printed"], outcome["result"], outcome["evidence"]
         self.state = "done"
         self._worker.submit(f"{_STATE}.page", seconds=PAGE_S).answer.add_done_callback(self._note_page)
 

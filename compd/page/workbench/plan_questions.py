@@ -85,6 +85,7 @@ def _plan_contents(plan: MeasurementPlan, workbench: Workbench, asked: PlanReque
         "instructions": plan.instructions,
         "before": plan.before,
         "separation": plan.separation,
+        "enough": plan.criteria.min_separation,
         "tells_apart": plan.tells_apart,
         "alike": plan.alike,
         "columns": columns,

@@ -27,6 +27,7 @@ from weakref import WeakSet
 
 from compd.errors import CompdError
 from compd.live.system import limit_memory
+from compd.page.shown_texts import shown
 from compd.page.workers.limits import WorkerLimits, too_many
 from compd.page.workers.worker import Worker
 from compd.text import nan_to_null
@@ -68,8 +69,8 @@ def serve(messages: Connection, opening: str, arguments: Sequence[Any], kept: An
 
 
 def ready_to_send(answer: Any) -> bytes:
-    """Bytes as they are; other plain data as JSON in ASCII, with null for what is not finite."""
-    return answer if isinstance(answer, bytes) else json.dumps(nan_to_null(answer)).encode()
+    """Bytes as they are; other plain data as JSON in ASCII, `shown`, with null for what is not finite."""
+    return answer if isinstance(answer, bytes) else json.dumps(nan_to_null(shown(answer))).encode()
 
 
 def end_with_the_parent() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.configuration import Configuration
+from compd.configuration import Configuration, shipped_configuration, shipped_names
 from compd.recording import sidecar_contents
 from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import CampaignPlan, draw_campaign_plan
@@ -111,7 +111,14 @@ def simulate_recording(
     if balls_M is not None:
         reference_block["balls"] = plate_file
     logged = campaign.run()
-    sidecar = sidecar_contents(configuration.machine, reference_block, quantities_at_zero=logged.quantities_at_zero)
+    shipped = {shipped_configuration(f"{name}.yaml").resolve() for name in shipped_names()}
+    sidecar = sidecar_contents(
+        configuration.machine,
+        reference_block,
+        quantities_at_zero=logged.quantities_at_zero,
+        # a shipped one is found by its name
+        machine_file=None if configuration.path.resolve() in shipped else configuration.path,
+    )
     return SimulatedRecording(logged.columns, sidecar, balls_M, sized, tuple(weak))
 
 

@@ -106,12 +106,18 @@ def test_a_probed_recording_has_the_gauges_of_each_mark_and_the_calibrated_place
 @pytest.mark.parametrize("at_zero", [None, {"temperature_link_1_degC": 23.5, "pressure_hPa": 987.0}])
 def test_a_probed_recording_counts_from_where_its_gauges_do(tmp_path: Path, at_zero: dict[str, float] | None) -> None:
     write_log(tmp_path / "motion.log", ((1002.5, 1002.9),))
-    sidecar = sidecar_contents("hexapod", provenance={"started_at_monotonic_s": 1000.0}, quantities_at_zero=at_zero)
+    sidecar = sidecar_contents(
+        "hexapod",
+        provenance={"started_at_monotonic_s": 1000.0},
+        quantities_at_zero=at_zero,
+        machine_file=tmp_path / "machine.yaml",
+    )
     columns = {"time_s": np.arange(0.0, 5.0, 0.1), "scale_1_mm": np.zeros(50)}
     write_recording(tmp_path / "gauges-0001.csv", columns, sidecar)
     samples = read_motion_log(tmp_path / "motion.log")
     assert write_probed_recording(tmp_path / "probed.csv", [tmp_path / "gauges-0001.csv"], [samples]) == 1
-    assert yaml.safe_load((tmp_path / "probed.yaml").read_text()).get("quantities_at_zero") == at_zero
+    probed = yaml.safe_load((tmp_path / "probed.yaml").read_text())
+    assert (probed.get("quantities_at_zero"), probed["machine_file"]) == (at_zero, "machine.yaml")
 
 
 def test_a_feed_that_was_held_counts_as_no_error_and_gives_no_row(tmp_path: Path) -> None:

@@ -189,3 +189,35 @@ def test_a_join_that_fails_leaves_no_file(measured: tuple[Path, np.ndarray], tmp
     failed = CliRunner().invoke(app, list(map(str, [*arguments, "--machine", directory / "6-ups.yaml"])))
     assert failed.exit_code != 0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ids_of_points_that_are_texts_stay_texts(measured: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    """The log and the instrument name the points alike; the joined recording has the names, in either format."""
+    directory, readings_mm = measured
+    names = [f"P{k}, {'left' if k % 2 else 'right'}" for k in range(1, len(readings_mm) + 1)]
+    rows = [f"{name};" + ";".join(map(repr, row)) for name, row in zip(names, readings_mm.tolist(), strict=True)]
+    log = tmp_path / "log.txt"
+    log.write_text("\n".join(["Where;" + ";".join(f"L{i} [mm]" for i in LEGS), *rows]) + "\n", encoding="utf-8")
+    points = (directory / "points.csv").read_text(encoding="utf-8").splitlines()[1:]
+    moved = [f"{name};" + ";".join(row.split(",")[1:]) for name, row in zip(names, points, strict=True)]
+    export = tmp_path / "points.txt"
+    # in another order than the log has
+    export.write_text("\n".join(["name;x [mm];y [mm];z [mm]", *reversed(moved)]) + "\n", encoding="utf-8")
+    named = [part for i in LEGS for part in ("--log", f"L{i} [mm]=scale_{i}_mm")]
+    for out in (tmp_path / "joined.csv", tmp_path / "joined-too.parquet"):
+        arguments = ["join", log, export, out, "--by", "name", *named, "--log", "Where=point"]
+        arguments += ["--machine", directory / "6-ups.yaml"]
+        done = CliRunner().invoke(app, list(map(str, arguments)))
+        assert done.exit_code == 0, (done.output, done.exception)
+        joined = read_recording(out)
+        assert joined.point is not None
+        assert [joined.point_name(number) for number in joined.point.tolist()] == names
+    again = read_recording(tmp_path / "joined-machine.csv", needs_reference=False)
+    assert set(again.labels["point"]) == set(names)
+
+
+def test_an_option_of_the_log_is_refused_under_its_own_name(measured: tuple[Path, np.ndarray]) -> None:
+    directory, _ = measured
+    done = join(directory, "log.txt", "wrong.csv", "--log-decimal", "x")
+    assert done.exit_code == 2
+    assert "--log-decimal" in done.output

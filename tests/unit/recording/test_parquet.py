@@ -88,11 +88,11 @@ def test_text_names_points_and_nothing_else(tmp_path: Path, kind: Any) -> None:
     csv = write_recording_files(tmp_path, csv_text())
     names = pa.array([f"P{i % 3}" if i else None for i in range(20)]).cast(kind)
     recording = read_recording(as_parquet(csv, point=names))
-    assert recording.point_labels == ("P0", "P1", "P2")
+    assert recording.labels == {"point": ("P0", "P1", "P2")}
     assert recording.point is not None
     assert recording.point[:5].tolist() == [-1, 1, 2, 0, 1]
     numbers = read_recording(as_parquet(csv, point=pa.array([str(i) for i in range(20)])))
-    assert (numbers.point_labels, numbers.point.tolist()) == ((), list(range(20)))  # type: ignore[union-attr]
+    assert (numbers.labels, numbers.point.tolist()) == ({}, list(range(20)))  # type: ignore[union-attr]
     assert "column visit: holds no numbers" in problems_of(as_parquet(csv, visit=names))
 
 

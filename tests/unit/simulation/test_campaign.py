@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from compd.cli.app import app
 from compd.configuration import load
 from compd.errors import CompdError
 from compd.recording import Recording, read_recording
+from compd.simulation import simulate_campaign
 from compd.simulation.campaign.campaign import Campaign, steady_speed_mm_per_s
 from compd.simulation.campaign.campaign_plan import GAP_S, SESSIONS, draw_campaign_plan
 from compd.simulation.campaign.row_log import LoggedRows
@@ -257,3 +259,13 @@ def _expansion_ppm_per_K(recording: Recording) -> float:
     length_mm = Mechanism(tripod()).lengths0_mm[0] + columns["scale_1_mm"]
     slope, *_ = np.linalg.lstsq((length_mm * warm_K * 1e-3)[:, None], grown_um, rcond=None)
     return float(slope[0])
+
+
+def test_a_campaign_remembers_the_machine_that_only_a_file_describes(tmp_path: Path) -> None:
+    own = tmp_path / "own.yaml"
+    own.write_text(TRIPOD.read_text(encoding="utf-8"), encoding="utf-8")
+    for machine, name in ((own, "own.yaml"), (TRIPOD, None)):
+        out = tmp_path / f"of-{machine.stem}.csv"
+        simulate_campaign(machine, out)
+        sidecar = yaml.safe_load(out.with_suffix(".yaml").read_text(encoding="utf-8"))
+        assert sidecar.get("machine_file") == name

@@ -57,6 +57,12 @@ export class Quantity extends Field {
   }
 }
 
+export class Text extends Field {
+  constructor(wizard, key, label, placeholder = "") {
+    super(wizard, key, label, element("input", { type: "text", placeholder, spellcheck: false }));
+  }
+}
+
 export class Check extends Field {
   constructor(wizard, key, label) {
     super(wizard, key, label, element("input", { type: "checkbox" }));

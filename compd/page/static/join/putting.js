@@ -1,6 +1,5 @@
 // The way of joining rows, the result of its trial, and a picture of that.
-import { micro } from "../format.js";
-import { Check, Choice, Quantity } from "./fields.js";
+import { Check, Choice, Quantity, Text } from "./fields.js";
 import { AgreementPicture } from "./agreement.js";
 import { OrderPicture } from "./order.js";
 
@@ -17,6 +16,7 @@ export class Putting {
       sigma_urad: new Quantity(wizard, "sigma_urad", "… of the attitude, µrad", "not known"),
       link: new Quantity(wizard, "link", "The link that it measures", "1 …", 1),
       ball: new Quantity(wizard, "ball", "or the fixed ball, from 1", "1 …", 1),
+      reflectors: new Text(wizard, "reflectors", "Places of the reflectors from the tip, mm", "A=60,0,-15; B=…"),
       offset_s: new Quantity(wizard, "offset_s", "Clock offset, s", "from the motion"),
       moving: new Check(wizard, "moving", "rows in motion too"),
     };
@@ -34,12 +34,12 @@ export class Putting {
     this.shown = trial;
     this.result.hidden = !trial;
     this.result.className = trial?.reason ? "refused" : "";
-    this.result.textContent = trial ? trial.reason || trial.lines.join("\n").replaceAll(/\bum\b/g, micro("um")) : "";
+    this.result.textContent = trial ? trial.reason || trial.lines.join("\n") : "";
     this.draw();
   }
 
   offer(table, choices) {
-    const { by, plan, frame, sigma_urad, link, ball, offset_s, moving } = this.fields;
+    const { by, plan, frame, sigma_urad, link, ball, reflectors, offset_s, moving } = this.fields;
     const chosen = choices.by || table.by;
     const length = table.axes.includes("length");
     by.automatic(table.by ? `detected: ${BY[table.by]}` : "choose …");
@@ -49,6 +49,7 @@ export class Putting {
     sigma_urad.offer(table.axes.includes("rx") && chosen === "time");
     link.offer(length);
     ball.offer(length && chosen === "time");
+    reflectors.offer(table.roles.includes("reflector") && chosen !== "time");
     offset_s.offer(chosen === "time");
     moving.offer(chosen === "time");
     const sigma = choices.sigma_um == null ? "Without a standard uncertainty, the noise floor is that of repeated rows; where no row is repeated, it is only estimated." : "";

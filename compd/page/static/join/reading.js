@@ -3,7 +3,7 @@ import { element } from "../format.js";
 import { Columns } from "./columns.js";
 import { Check, Choice, Quantity } from "./fields.js";
 
-const ROLES = [["time", "time"], ["time[s]", "time, s"], ["time[ms]", "time, ms"], ["time[min]", "time, min"], ["time[h]", "time, h"], ["time[day]", "time, days"], ["date", "date"], ["x", "x"], ["y", "y"], ["z", "z"], ["rx", "rx"], ["ry", "ry"], ["rz", "rz"], ["length", "length"], ["name", "name"], ["group", "group"], ["collection", "collection"], ["-", "unused"]];
+const ROLES = [["time", "time"], ["time[s]", "time, s"], ["time[ms]", "time, ms"], ["time[min]", "time, min"], ["time[h]", "time, h"], ["time[day]", "time, days"], ["date", "date"], ["x", "x"], ["y", "y"], ["z", "z"], ["rx", "rx"], ["ry", "ry"], ["rz", "rz"], ["length", "length"], ["name", "name"], ["visit", "visit"], ["reflector", "reflector"], ["group", "group"], ["collection", "collection"], ["-", "unused"]];
 const LENGTHS = ["mm", "um", "m", "cm", "inch", "ft"];
 const ANGLES = ["rad", "mrad", "deg", "arcsec"];
 const each = (values) => values.map((value) => [value, value]);
@@ -25,7 +25,10 @@ export class Reading extends Columns {
       sheet: new Choice(wizard, "sheet", "Sheet"),
     };
     this.guess = element("button", { type: "button", id: "guess", onclick: () => wizard.change({ columns: null }) }, "Guess the columns again");
-    fields.replaceChildren(...Object.values(this.fields).map((field) => field.label), this.guess);
+    // a role, as those in the table are
+    this.visits = element("select", { id: "choice-visits", onchange: () => this.chooseVisits() });
+    this.visitsLabel = element("label", {}, "Visits", this.visits);
+    fields.replaceChildren(...Object.values(this.fields).map((field) => field.label), this.visitsLabel, this.guess);
   }
 
   show({ sources, table, choices }) {
@@ -39,10 +42,12 @@ export class Reading extends Columns {
     if (table === this.shown) return;
     this.shown = table;
     this.showWhole(table, "choose an export");
+    this.visitsLabel.hidden = !table;
     if (!table) return;
+    this.showVisits(table, choices.by || table.by);
     const { shape, unit, angle_unit, angles, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
     const { assumed } = table;
-    const lengthUnit = /, (mm|um|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
+    const lengthUnit = /, (mm|µm|nm|m|cm|inch|ft)( |$)/.exec(assumed.x ?? assumed.y ?? assumed.z ?? assumed.length ?? "");
     shape.automatic(`detected: ${this.formats.find(([name]) => name === table.shape)?.[1] ?? "not known"}`);
     unit.automatic(lengthUnit && !choices.unit ? `detected: ${lengthUnit[1]}` : "as the file says");
     angle_unit.offer(table.roles.some((role) => /^r[xyz]$/.test(role)));
@@ -57,6 +62,21 @@ export class Reading extends Columns {
     group.options([...each(table.groups), ["all", "all of them"]], table.groups.length > 1 ? "choose …" : "the only one");
     sheet.offer(table.sheets.length > 1);
     sheet.options(each(table.sheets), "the one with numbers");
+  }
+
+  // The column by which rows of one visit are known; none: those in one dwell are.
+  showVisits(table, by) {
+    const roles = this.columns(table);
+    const columns = roles.map((_, k) => [String(k), table.header[k] || `column ${k + 1}`]);
+    this.visitsLabel.hidden = by === "time";
+    this.visits.replaceChildren(...[["", "the repeats in a dwell"], ...columns].map(([value, text]) => element("option", { value }, text)));
+    this.visits.value = roles.includes("visit") ? String(roles.indexOf("visit")) : "";
+  }
+
+  chooseVisits() {
+    const now = this.columns(this.wizard.table).indexOf("visit");
+    if (this.visits.value) this.change(Number(this.visits.value), "visit");
+    else if (now >= 0) this.change(now, "-");
   }
 
   roleOf(role, k) {

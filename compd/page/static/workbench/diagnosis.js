@@ -80,11 +80,11 @@ export class Diagnosis {
     }
   }
 
-  showOutcome({ id, state, text, result, evidence: parts }) {
+  showOutcome({ id, state, printed, result, evidence: parts }) {
     Object.assign(this, { shown: id, result });
     this.outcome.replaceChildren(...(state === "done" ? [summaryLines(parts.verdict, parts.lines), ...evidence(parts, this.act)] : []));
-    this.text.textContent = text;
-    this.whole.hidden = !text;
+    this.text.textContent = printed;
+    this.whole.hidden = !printed;
     this.whole.open = state === "failed";
   }
 

@@ -1,11 +1,9 @@
 // The findings of a diagnosis below its verdict: each effect with its numbers, other findings, what to measure.
 import { CommandLine } from "../command_line.js";
 import { copyButton } from "../copy.js";
-import { element, micro } from "../format.js";
+import { element } from "../format.js";
 
 const plain = (name) => name.replaceAll("_", " ");
-// Units within a text.
-export const units = (text) => String(text).replace(/(^|[\s/(])u(m|rad)\b/g, "$1µ$2").replaceAll("+-", "±").replaceAll("->", "→").replaceAll("degC", "°C");
 
 // Advice names the buttons of this page for the commands of the terminal; the commands may be wrapped.
 const BUTTONS = [
@@ -23,7 +21,7 @@ export function evidence(diagnosis, act) {
     ...effects.map((effect, k) => folded(`${k + 1}. ${plain(effect.effect)}`, effectParts(effect, act), true)),
     follows && folded("What the rest follows: descriptions, no causes; on rows left out", [table(follows), ...formulas.map((formula) => formulaPart(formula, act))], !effects.length),
     constant && folded("A constant in every row, which no effect is judged by", [table(constant)]),
-    gross && folded("What is wrong with the data", [element("p", {}, units(gross))]),
+    gross && folded("What is wrong with the data", [element("p", {}, gross)]),
     next && folded("What to measure next", [table(next)], true),
     tried && folded("Effects that were tried, each alone, on rows left out", [table(tried)]),
     without_gain.length && folded(`Without gain (${without_gain.length})`, [element("p", {}, without_gain.map(plain).join(", "))]),
@@ -34,7 +32,7 @@ export function evidence(diagnosis, act) {
 
 function effectParts(effect, act) {
   const { numbers, facts, rivals, separated_by, plan_command } = effect;
-  const rows = numbers.map(({ name, text, range, plausible }) => element("tr", { class: plausible ? "" : "bad" }, element("td", {}, name), element("td", {}, units(text)), element("td", {}, `${plausible ? "plausible" : "IMPLAUSIBLE: usual is"} ${micro(range.split(" ").slice(0, -1).join(" "))} ${micro(range.split(" ").at(-1))}`)));
+  const rows = numbers.map(({ name, text, range, plausible }) => element("tr", { class: plausible ? "" : "bad" }, element("td", {}, name), element("td", {}, text), element("td", {}, `${plausible ? "plausible" : "IMPLAUSIBLE: usual is"} ${range}`)));
   const together = [effect.effect, ...rivals.map((rival) => rival.effect)];
   return [
     element("p", {}, effect.physics),
@@ -63,12 +61,12 @@ function button(text, act, subject, attributes) {
 }
 
 function pair([name, text]) {
-  return [element("dt", {}, name), element("dd", {}, units(text))];
+  return [element("dt", {}, name), element("dd", {}, text)];
 }
 
 function table({ head, rows, caption }) {
-  const named = head.some(Boolean) ? [element("thead", {}, element("tr", {}, ...head.map((cell) => element("th", {}, units(cell)))))] : [];
-  return element("div", { class: "wide", tabindex: 0, role: "region", "aria-label": head.filter(Boolean).join(", ") || "table" }, element("table", {}, ...named, element("tbody", {}, ...rows.map((row) => element("tr", {}, ...row.map((cell) => element("td", {}, units(cell))))))), ...(caption ? [element("p", { class: "note" }, units(caption))] : []));
+  const named = head.some(Boolean) ? [element("thead", {}, element("tr", {}, ...head.map((cell) => element("th", {}, cell))))] : [];
+  return element("div", { class: "wide", tabindex: 0, role: "region", "aria-label": head.filter(Boolean).join(", ") || "table" }, element("table", {}, ...named, element("tbody", {}, ...rows.map((row) => element("tr", {}, ...row.map((cell) => element("td", {}, cell)))))), ...(caption ? [element("p", { class: "note" }, caption)] : []));
 }
 
 function folded(title, parts, open = false) {
@@ -85,5 +83,5 @@ export function summaryLines(verdict, lines) {
     else if (entries.length) entries.at(-1)[1] += `\n${line.trim()}`;
   }
   const word = element("b", { class: "word", "data-verdict": verdict }, plain(verdict));
-  return element("div", { class: "summary-lines" }, element("p", { class: "heading" }, word, " ", units(heading.slice(heading.indexOf(":") + 2))), element("dl", { class: "facts" }, ...entries.flatMap(([name, text]) => pair([name, advice(text)]))));
+  return element("div", { class: "summary-lines" }, element("p", { class: "heading" }, word, " ", heading.slice(heading.indexOf(":") + 2)), element("dl", { class: "facts" }, ...entries.flatMap(([name, text]) => pair([name, advice(text)]))));
 }

@@ -155,7 +155,7 @@ export class Plan {
     this.measurement = plan;
     const alike = plan.alike.map(([first, second]) => element("li", {}, `${first} and ${second} cannot be told apart within these limits`));
     this.words.replaceChildren(
-      element("p", { class: "separation" }, element("b", {}, `${plan.before.toFixed(1)} → ${plan.separation.toFixed(1)}`), " times the noise, before and after"),
+      element("p", { class: "separation" }, element("b", {}, `${plan.before.toFixed(1)} → ${plan.separation.toFixed(1)}`), ` times the noise: ${plan.rivals.length > 1 ? "the difference of the rivals" : "the effect"} on this recording → with these rows as well. It is what is left over all rows when ${plan.rivals.length > 1 ? "one rival imitates the other" : "the model imitates it"} as well as it can; from ${plan.enough} on ${plan.rivals.length > 1 ? "they are told apart" : "it is seen"}.`),
       element("p", { id: "plan-summary" }, plan.summary), ...(alike.length ? [element("ul", {}, ...alike)] : []), element("p", {}, plan.instructions));
     this.rows.replaceChildren(element("table", { id: "plan-table" }, element("thead", {}, element("tr", {}, ...plan.columns.map((name) => element("th", {}, name)))), element("tbody", {}, ...plan.rows.map((row) => element("tr", {}, ...row.map((value) => element("td", { class: typeof value === "number" ? "number" : "" }, String(value))))))));
     this.files.replaceChildren(...Object.keys(plan.files).map((shape) => element("button", { type: "button", "data-format": shape, onclick: () => this.download(shape) }, `Download: ${FILES[shape]}`)));

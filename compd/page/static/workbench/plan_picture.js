@@ -1,8 +1,13 @@
 // The rows of a plan in space: numbered, coloured by a setting, with the difference of the rivals.
 import { element, ink, prepared } from "../format.js";
 import { Turn } from "../orbit_control.js";
+import { drawBox } from "./box.js";
+import { bounds } from "./space_view.js";
+import { scaleBar } from "./ticks.js";
 
 const NO_COLOUR = "purpose";
+// The longest arrow is this share of the picture's radius.
+const LONGEST = 0.3;
 const SETTLED = ["row", "purpose", "tip_x_mm", "tip_y_mm", "tip_z_mm"];
 
 export class PlanPicture {
@@ -28,8 +33,9 @@ export class PlanPicture {
     const { context, width, height } = prepared(this.canvas);
     if (!this.plan?.place.length) return;
     const { place, columns, rows, difference_um: difference, rivals } = this.plan;
-    const project = this.turn.projector(place.flat(), width, 0.85 * height);
+    const project = this.turn.projector(place.flat(), width, height);
     const at = place.map(project);
+    drawBox(context, project, bounds(place.flat()), "mm", 1);
     context.font = "11px system-ui";
     context.strokeStyle = ink("--rule");
     context.beginPath();
@@ -38,11 +44,12 @@ export class PlanPicture {
     const arrows = difference.length && difference[0].length === 3;
     const largest = Math.max(...difference.map((row) => Math.hypot(...row)), 1e-9);
     if (arrows) {
+      scaleBar(context, { x: 12, y: 14, per_px: largest / (LONGEST * project.radius * project.px_per_mm), unit: "µm", longest_px: 90, colour: "--bad" });
       context.strokeStyle = ink("--bad");
       context.beginPath();
       place.forEach((point, k) => {
         context.moveTo(...at[k]);
-        context.lineTo(...project(point.map((value, i) => value + (0.3 * project.radius * difference[k][i]) / largest)));
+        context.lineTo(...project(point.map((value, i) => value + (LONGEST * project.radius * difference[k][i]) / largest)));
       });
       context.stroke();
     }

@@ -1,6 +1,5 @@
 // Preview of a step of the model: the table old -> new, before it is written.
 import { element, micro } from "../format.js";
-import { units } from "./evidence.js";
 
 const number = (value, digits = 4) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(digits))).replace("-", "−"));
 
@@ -27,7 +26,7 @@ export class Proposal {
       this.place.replaceChildren(
         element("div", { class: "consequence" },
           doubt,
-          element("p", {}, element("b", {}, `${outcome.rms[0].toFixed(2)} → ${outcome.rms[1].toFixed(2)} ${micro(outcome.unit)}`), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${units(outcome.verdict)}`),
+          element("p", {}, element("b", {}, `${outcome.rms[0].toFixed(2)} → ${outcome.rms[1].toFixed(2)} ${micro(outcome.unit)}`), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${outcome.verdict}`),
           ...(outcome.differ ? [element("p", { class: "note" }, `Both errors are ${outcome.differ}.`)] : []),
           element("table", {}, element("thead", {}, element("tr", {}, ...["number", "was", "will be", "unit"].map((head) => element("th", {}, head)))), element("tbody", {}, ...rows)),
           ...(outcome.gone.length ? [element("p", {}, `Gone: ${outcome.gone.join(", ")}`)] : []),
@@ -36,7 +35,7 @@ export class Proposal {
       this.place.scrollIntoView({ block: "nearest" });
       const warning = step.kind === "add" ? await this.doubtOf(bench, step.effect, last) : "";
       if (this.shown !== step) return;
-      if (warning) doubt.replaceChildren(element("p", { class: "warning", role: "alert" }, element("b", {}, "Not supported by these rows. "), units(warning)));
+      if (warning) doubt.replaceChildren(element("p", { class: "warning", role: "alert" }, element("b", {}, "Not supported by these rows. "), warning));
       const confirm = element("button", { type: "button", id: "confirm", onclick: () => bench.attempt(() => bench.change("step", step)) }, warning ? `${verb} all the same` : verb);
       last.prepend(confirm);
       if (!warning) confirm.focus({ preventScroll: true });

@@ -1,7 +1,6 @@
 // The large numbers on top: the fall of the error from the machine without any effect to the model and to the trial,
 // the error on rows left out, and the noise.
 import { element, micro } from "../format.js";
-import { units } from "./evidence.js";
 
 // Most quantities listed as followed by the residual.
 const MAX_TRENDS = 3;
@@ -20,7 +19,7 @@ export class Strip {
     this.left_out_rms = null;
     const { verdict, trends, rows, recorded_rows } = bench.summary;
     const sample = rows < recorded_rows ? [element("p", { class: "note", id: "sample" }, `Too long to be shown whole: everything here, also what is fitted, is of a sample of ${rows} of its ${recorded_rows} rows, spread evenly. The command lines go through all rows.`)] : [];
-    this.said = element("p", {}, units(verdict));
+    this.said = element("p", {}, verdict);
     this.verdict.replaceChildren(this.said, ...sample, ...(trends.length ? [element("p", { class: "note" }, `${trends.slice(0, MAX_TRENDS).join("; ")}.`)] : []));
     this.try();
   }
@@ -29,7 +28,7 @@ export class Strip {
   // noise: the verdict in words where only noise is left
   measured({ left_out_rms, noise }) {
     this.left_out_rms = left_out_rms;
-    if (noise) this.said.textContent = units(noise);
+    if (noise) this.said.textContent = noise;
     this.try();
   }
 

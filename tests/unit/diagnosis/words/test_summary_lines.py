@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
+from compd.diagnosis.findings import CandidateResult
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.summary_lines import summary_lines
 from tests.support.diagnosis_situations import (
@@ -191,3 +193,10 @@ def test_what_is_left_has_limits_for_another_day_where_they_are_known() -> None:
     lines = summary_lines(replace(one_effect(), left_interval_um=(0.16, 0.21)))
     left = " ".join(" ".join(lines).split())
     assert "Left: 0.18 um (another day: 0.16 to 0.21 um with 90 %); noise 0.16 um (repeats): only noise" in left
+
+
+def test_an_effect_that_is_too_small_for_a_name_is_in_the_heading_beside_a_constant() -> None:
+    small = CandidateResult("backlash", "too_small", "takes 0.02 um", 0.164, math.nan, 1e-6, ())
+    heading, *lines = summary_lines(replace(constant_alone(), candidates=(small,)))
+    assert heading == "adequate: nothing is missing but a constant; what varies is near the noise"
+    assert "backlash may act, too little for a name" in " ".join(" ".join(lines).split())

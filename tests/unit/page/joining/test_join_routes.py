@@ -17,6 +17,7 @@ from compd.page.guard import Guard, Token, hashed
 from compd.page.joining import exports
 from compd.page.recordings import Recordings
 from compd.page.server import Server
+from compd.text import typeset
 from tests.support.command import run_in_process
 from tests.support.join_files import GAUGES, GAUGES_WITH_PLACES, GERMAN_TRACK, POINTS, TRACK, write_join_files
 from tests.support.paths import CONFIG
@@ -140,7 +141,7 @@ def test_what_is_written_is_what_the_command_line_writes(client, recordings, nam
     printed = run_in_process(*shlex.split(command)[1:])
     assert [(recordings / f"{name}{ending}").read_bytes() for ending in (".csv", ".yaml")] == by_page
     for line in written["lines"]:
-        assert line in printed
+        assert line in typeset(printed)
 
 
 def test_a_trial_by_time_has_the_offset_in_a_curve(client):
@@ -302,3 +303,15 @@ def test_an_export_never_goes_through_a_link(client, recordings, tmp_path):
     assert client.post("/join/exports", params={"name": "linked.txt"}, content=b"1\n").status_code == 409
     assert not Path(tmp_path / "elsewhere.txt").exists()
     link.unlink()
+
+
+def test_places_of_reflectors_are_those_of_the_command_line(client):
+    asked = client.post("/join/table", json={"export": POINTS, "reflectors": "left=1,-2.5,3; top=4,5,6e1"}).json()
+    words = shlex.split(asked["command"])
+    assert [words[k + 1] for k, word in enumerate(words) if word == "--reflector-place"] == [
+        "left=1,-2.5,3",
+        "top=4,5,6e1",
+    ]
+    refused = client.post("/join/table", json={"export": POINTS, "reflectors": "left=1,2"})
+    assert refused.status_code == 409
+    assert "left=1,2" in refused.json()["reason"]

@@ -29,13 +29,13 @@ def test_its_steps_its_result_and_its_page(path):
     job = DiagnosisJob(path, None, None)
     job.join(PATIENCE_S)
     answer, outcome = job.summary(), job.outcome()
-    assert answer["state"] == "done", outcome["text"]
+    assert answer["state"] == "done", outcome["printed"]
     assert [stage["text"] for stage in answer["stages"]] == list(STAGES)
     assert answer["steps"][0]["text"] == STAGES[0]
     assert {step["text"] for step in answer["steps"]} <= set(STAGES)
     assert [step["at_s"] for step in answer["steps"]] == sorted(step["at_s"] for step in answer["steps"])
     assert outcome["result"]["verdict"] == outcome["evidence"]["verdict"] == "identified"
-    assert "link_expansion" in outcome["text"]
+    assert "link_expansion" in outcome["printed"]
     assert answer["page"] is True
     page = job.page.decode()
     assert page.startswith("<!doctype html>")
@@ -63,14 +63,14 @@ def test_a_person_ends_it(path):
     job.join(PATIENCE_S)
     assert job.summary()["state"] == "cancelled"
     assert job.summary()["page"] is False
-    assert job.outcome()["text"] == ""
+    assert job.outcome()["printed"] == ""
 
 
 def test_what_cannot_be_opened_is_told(tmp_path):
     job = DiagnosisJob(tmp_path / "none.csv", None, None)
     job.join(PATIENCE_S)
     assert job.summary()["state"] == "failed"
-    assert "none.csv" in job.outcome()["text"]
+    assert "none.csv" in job.outcome()["printed"]
 
 
 def test_more_than_a_few_at_once_are_refused_and_there_is_room_after_an_end(path):
