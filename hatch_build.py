@@ -56,7 +56,7 @@ class BuildHook(BuildHookInterface):
         """The files below `directory` that fit a pattern, but for hidden ones and locks."""
         for path in sorted(path for pattern in patterns for path in directory.glob(pattern)):
             name = path.relative_to(directory)
-            if path.is_file() and path.name != "lock" and not any(part.startswith(".") for part in name.parts):
+            if path.is_file() and path.suffix != ".lock" and not any(part.startswith(".") for part in name.parts):
                 build_data["force_include"][str(path)] = f"{target}/{name.as_posix()}"
 
 
