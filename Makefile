@@ -158,6 +158,7 @@ wheel: $(STAMP) docs
 	build/wheel-test/bin/pip install --quiet --disable-pip-version-check dist/compd-*.whl
 	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
+	$(PYTEST) tests/system/test_wheel.py
 
 SAMPLE := kinematics cycle diagnose
 BENCH := $(SAMPLE) compare loop latency flood throughput page gateway stream fleet kilohertz targets
