@@ -8,26 +8,61 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-from compd.jit import kernel_sources
+from compd import jit
 from compd.kernel_target import LEVELS
 
 
 def kernel_modules() -> list[str]:
     """The names of all modules with kernels or helpers."""
     root = Path(__file__).parent.parent
-    names = [".".join(file.relative_to(root).with_suffix("").parts) for file in kernel_sources()]
+    names = [".".join(file.relative_to(root).with_suffix("").parts) for file in jit.kernel_sources()]
     return [name.removesuffix(".__init__") for name in names]
 
 
-def compile_all(backwards: bool = False) -> None:
-    """Compile all kernels that are not compiled yet, in this process; another one may begin at the other end."""
-    names = kernel_modules()
-    for name in reversed(names) if backwards else names:
-        import_module(name)
+def compile_all(claims: str = "", smallest_first: bool = False) -> None:
+    """Compile all kernels, those of the largest modules first.
+
+    claims : a directory in which processes that share the work mark what they take. One of them begins with the
+    largest, which takes half of the time, and the other with the smallest.
+    """
+    declared = _declared()
+    for name, compile_ in reversed(declared) if smallest_first else declared:
+        if claims:
+            try:
+                (Path(claims) / name).mkdir()
+            except FileExistsError:
+                continue
+        compile_()
+
+
+def _declared() -> list[tuple[str, Callable[[], Any]]]:
+    """Every kernel by name, with what compiles it: modules are imported without compiling anything."""
+    declared: list[tuple[int, str, Callable[[], Any]]] = []
+
+    def postponed(maker: Callable[..., Any]) -> Callable[..., Any]:
+        def declare(*declaration: Any) -> Callable[..., Any]:
+            def keep(function: Any) -> Any:
+                python = getattr(function, "py_func", function)
+                size = Path(python.__code__.co_filename).stat().st_size
+                name = f"{python.__module__}.{python.__qualname__}"
+                declared.append((size, name, partial(maker(*declaration), function)))
+                return function
+
+            return keep
+
+        return declare
+
+    jit.kernel, jit.loop = postponed(jit.kernel), postponed(jit.loop)
+    for module in kernel_modules():
+        import_module(module)
+    return [(name, compile_) for _, name, compile_ in sorted(declared, key=lambda kernel: kernel[:2], reverse=True)]
 
 
 def compile_for_levels(directory: str) -> list[str]:
@@ -46,6 +81,7 @@ def _started(call: str, environment: Mapping[str, str]) -> subprocess.Popen[byte
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         sys.exit(" ".join(f"not compiled for {level}" for level in compile_for_levels(sys.argv[1])) or 0)
-    other = _started("compile_all(backwards=True)", {})
-    compile_all()
-    sys.exit(other.wait())
+    with tempfile.TemporaryDirectory(prefix="compd-kernels-") as claims:
+        other = _started(f"compile_all({claims!r}, smallest_first=True)", {})
+        compile_all(claims)
+        sys.exit(other.wait())
