@@ -72,16 +72,18 @@ def compile_for_levels(directory: str) -> list[str]:
     return [level for level, process in started.items() if process.wait() != 0]
 
 
-def _started(call: str, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+def _started(call: str, environment: Mapping[str, str], stderr: int | None = None) -> subprocess.Popen[bytes]:
     """Another process in which one of these functions is called."""
     code = f"from compd.compile_kernels import *; {call}"
-    return subprocess.Popen([sys.executable, "-c", code], env=os.environ | environment)
+    return subprocess.Popen([sys.executable, "-c", code], env=os.environ | environment, stderr=stderr)
 
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         sys.exit(" ".join(f"not compiled for {level}" for level in compile_for_levels(sys.argv[1])) or 0)
     with tempfile.TemporaryDirectory(prefix="compd-kernels-") as claims:
-        other = _started(f"compile_all({claims!r}, smallest_first=True)", {})
+        other = _started(f"compile_all({claims!r}, smallest_first=True)", {}, stderr=subprocess.PIPE)
         compile_all(claims)
-        sys.exit(other.wait())
+        _, said = other.communicate()
+        # that it compiles has been said once
+        sys.exit(said.decode() if other.returncode else 0)
