@@ -2,13 +2,15 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-INSTALLED := $(VENV)/.installed
-# with the kernels compiled
-STAMP  := $(VENV)/.compiled
+# compd with what the demo needs, and its kernels compiled
+COMPILED := $(VENV)/.compiled
+# with the tools of development, too
+STAMP  := $(VENV)/.installed
 PIP    := $(BIN)/pip install --quiet --disable-pip-version-check
-# what compiling the kernels needs, a line each
-KERNEL_PACKAGES := import tomllib; build = tomllib.load(open("pyproject.toml", "rb"))["tool"]["hatch"]["build"]; \
-  print(*build["targets"]["wheel"]["hooks"]["custom"]["dependencies"], sep="\n")
+# what a build and compiling the kernels need, a line each
+BUILD_PACKAGES := import tomllib; project = tomllib.load(open("pyproject.toml", "rb")); \
+  hooks = project["tool"]["hatch"]["build"]["targets"]["wheel"]["hooks"]; \
+  print(*project["build-system"]["requires"], *hooks["custom"]["dependencies"], sep="\n")
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -37,32 +39,38 @@ help:
 	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench, faults, three hours of soak, the scoreboard"
 	@echo "tests/README.md says what each takes and what .ci/run runs"
 
-# The kernels are compiled beside the installation of most of the packages: numba and what the kernels import come first.
-$(STAMP) $(INSTALLED) &: pyproject.toml
+# numba and what the kernels import come first. Then two processes compile, beside the installation of the other
+# packages, which needs no build environment of its own: it would have numba once more.
+$(COMPILED): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "compd needs Python >= 3.11; this is $$($(PYTHON) --version). Try: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || \
 	  { echo "Python cannot make a virtual environment; on Debian and Ubuntu: apt-get install python3-venv"; exit 1; }
-	@echo "Installing compd and what it needs into $(VENV), and compiling the kernels (two minutes at most, once) ..."
-	@$(PYTHON) -c '$(KERNEL_PACKAGES)' | $(PIP) --requirement /dev/stdin
+	@echo "Installing compd and what it needs into $(VENV), and compiling the kernels (one minute, once) ..."
+	@$(PYTHON) -c '$(BUILD_PACKAGES)' | $(PIP) --requirement /dev/stdin
 	@$(BIN)/python -m compd.compile_kernels & compiling=$$!; \
-	  $(PIP) --editable '.[dev]'; installed=$$?; wait $$compiling && exit $$installed
-	@touch $(INSTALLED) $(STAMP)
+	  $(PIP) --no-build-isolation --editable '.[page]'; installed=$$?; wait $$compiling && exit $$installed
+	@touch $@
 
-demo: $(STAMP)
+$(STAMP): $(COMPILED)
+	@echo "Installing the tools of development into $(VENV) ..."
+	@$(PIP) --no-build-isolation --editable '.[dev]'
+	@touch $@
+
+demo: $(COMPILED)
 	@$(BIN)/compd demo
 
 # A hidden effect, to be found in the browser: out/workbench has the recording, and its answer under seal.
-workbench: $(STAMP)
+workbench: $(COMPILED)
 	@mkdir -p out/workbench
 	@$(BIN)/compd campaign config/tripod-cmm.yaml --hidden 8 --out out/workbench/hidden.csv --overwrite
 	@$(BIN)/compd page --recordings out/workbench --models out/workbench --workbench hidden
 
-live: $(STAMP)
+live: $(COMPILED)
 	@$(BIN)/compd demo --live
 
 # Needs Debian's linuxcnc-uspace.
-demo-linuxcnc: $(STAMP)
+demo-linuxcnc: $(COMPILED)
 	@$(BIN)/compd demo --linuxcnc
 
 # A hidden cause is found on wires, in real time: two minutes each, so they have a target of their own. Each takes a
@@ -132,14 +140,14 @@ hidden: $(STAMP)
 hidden-sample: $(STAMP)
 	$(PYTEST) -m sample $(HIDDEN)
 
-lint: $(INSTALLED)
+lint: $(STAMP)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
 # As git runs it before a commit, on all files.
-pre-commit: $(INSTALLED)
+pre-commit: $(STAMP)
 	$(BIN)/pre-commit run --all-files --show-diff-on-failure
 
 wheel: $(STAMP) docs
@@ -150,9 +158,10 @@ wheel: $(STAMP) docs
 	build/wheel-test/bin/pip install --quiet --disable-pip-version-check dist/compd-*.whl
 	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
+	$(PYTEST) tests/system/test_wheel.py
 
 SAMPLE := kinematics cycle diagnose
-BENCH := $(SAMPLE) compare loop latency flood throughput page gateway stream fleet kilohertz
+BENCH := $(SAMPLE) compare loop latency flood throughput page gateway stream fleet kilohertz targets
 
 bench: $(STAMP)
 	@for name in $(BENCH); do $(BIN)/python -m tests.benchmarks.bench_$$name || exit 1; done

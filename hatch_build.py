@@ -3,8 +3,8 @@
 The kernels of each level of x86-64 go in as compd/compiled_kernels/. They fit the Python, numba and LLVM of the build;
 elsewhere the first start compiles. Another architecture's wheel has none.
 
-`make docs` builds pages into docs/_build/html; they go in as compd/documentation/, and into the sdist. A wheel that is
-built without them works; `compd docs` then says so.
+`make docs` builds pages into docs/_build/html; they go in as compd/documentation/, and into the sdist. Without them the
+pages go in as they are written, in Markdown.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 PAGES, INSTALLED_PAGES = "docs/_build/html", "compd/documentation"
+# below docs/: the pages as they are written, without what builds make
+WRITTEN_PAGES = ("*.md", "[a-z]*/*.md", "pictures/*.svg", "pictures/*.png")
 KERNELS = "compd/compiled_kernels"
 
 
@@ -30,8 +32,14 @@ class BuildHook(BuildHookInterface):
         """Called by hatchling before a wheel or an sdist is built; files that git ignores are included by force."""
         if version == "editable":
             return
-        # in an sdist the pages stay where they are, so that a wheel built from it has them too
-        self._include(Path(self.root) / PAGES, PAGES if self.target_name == "sdist" else INSTALLED_PAGES, build_data)
+        pages = Path(self.root) / PAGES
+        if self.target_name == "sdist":
+            # where they are, so that a wheel built from it has them too
+            self._include(pages, PAGES, build_data)
+        elif pages.is_dir():
+            self._include(pages, INSTALLED_PAGES, build_data)
+        else:
+            self._include(Path(self.root) / "docs", INSTALLED_PAGES, build_data, WRITTEN_PAGES)
         if self.target_name == "wheel" and platform.machine() in ("x86_64", "AMD64"):
             self._compiled = tempfile.TemporaryDirectory(prefix="compd-kernels-")
             _compile(Path(self.root), self._compiled.name)
@@ -42,10 +50,13 @@ class BuildHook(BuildHookInterface):
         if hasattr(self, "_compiled"):
             self._compiled.cleanup()
 
-    def _include(self, directory: Path, target: str, build_data: dict[str, Any]) -> None:
-        for path in sorted(directory.rglob("*")):
+    def _include(
+        self, directory: Path, target: str, build_data: dict[str, Any], patterns: tuple[str, ...] = ("**/*",)
+    ) -> None:
+        """The files below `directory` that fit a pattern, but for hidden ones and locks."""
+        for path in sorted(path for pattern in patterns for path in directory.glob(pattern)):
             name = path.relative_to(directory)
-            if path.is_file() and path.name != "lock" and not any(part.startswith(".") for part in name.parts):
+            if path.is_file() and path.suffix != ".lock" and not any(part.startswith(".") for part in name.parts):
                 build_data["force_include"][str(path)] = f"{target}/{name.as_posix()}"
 
 

@@ -129,8 +129,8 @@ class KernelLocator:
 def _kept(function: Callable[..., Any]) -> Iterator[bool]:
     """Within, numba takes the code of `function` from the installation or our directory, and keeps it there.
 
-    Gives whether it is kept at all. One process at a time compiles: numba stores a kernel and its wrapper one after the
-    other, and a kernel of one process with the wrapper of another crashes whoever loads them.
+    Gives whether it is kept at all. One process at a time compiles a function: numba stores a kernel and its wrapper
+    one after the other, and a kernel of one process with the wrapper of another crashes whoever loads them.
     """
     built = KernelLocator(Path(__file__).parent / BUILT / _directory_name(), function)
     if built.index.is_file():
@@ -141,9 +141,10 @@ def _kept(function: Callable[..., Any]) -> Iterator[bool]:
         with _said(function):
             yield False
         return
-    with (Path(CACHE_DIRECTORY) / "lock").open("w") as lock:
+    locator = KernelLocator(Path(CACHE_DIRECTORY), function)
+    locator.ensure_cache_path()
+    with locator.index.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        locator = KernelLocator(Path(CACHE_DIRECTORY), function)
         with _located(locator), nullcontext() if locator.index.is_file() else _said(function):
             yield True
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from numpy.typing import NDArray
 
 from compd.errors import CompdError, Problem
+from compd.extras import install_line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,7 +39,7 @@ def data_frame(columns: Columns) -> pd.DataFrame:
             Problem(
                 where="to_dataframe",
                 what="pandas is not installed",
-                next_step="python -m pip install pandas, or `compd[notebook]` instead of `compd`",
+                next_step=install_line("notebook"),
             )
         ) from error
     return pd.DataFrame(dict(columns))

@@ -1,7 +1,13 @@
 """The command line: one file per command."""
 
+from __future__ import annotations
+
 import os
 import sys
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from compd.errors import Problem
 
 # One thread of linear algebra: matrices are small, and more threads wait for each other, at up to ten times the cost
 # beside other programs. numpy reads it at its import; a person's own setting takes precedence.
@@ -21,9 +27,20 @@ def main() -> None:
     try:
         app()
     except CompdError as error:
-        from compd.cli.problems import print_problems
+        _refuse(error.problems)
+    except ModuleNotFoundError as error:
+        from compd.extras import missing_package
 
-        print_problems(error.problems)
-        count = len(error.problems)
-        print(f"{count} problem{'s' * (count != 1)}", file=sys.stderr)
-        sys.exit(2)
+        problem = missing_package(" ".join(["compd", *sys.argv[1:2]]), error)
+        if problem is None:
+            raise
+        _refuse((problem,))
+
+
+def _refuse(problems: tuple[Problem, ...]) -> NoReturn:
+    """Print the problems and end with exit code 2."""
+    from compd.cli.problems import print_problems
+
+    print_problems(problems)
+    print(f"{len(problems)} problem{'s' * (len(problems) != 1)}", file=sys.stderr)
+    sys.exit(2)

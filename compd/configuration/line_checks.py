@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from compd.configuration.sections import Sections
 from compd.documents import Location
 from compd.errors import Problem
+from compd.extras import install_line
 from compd.lines import kinds_that_carry, readable_definition
 from compd.text import join_words
 
@@ -93,7 +94,7 @@ def _library_problems(sections: Sections) -> Iterator[Problem]:
                 where=sections.document.where(("lines", name, "kind")),
                 what=f"needs the package {library.package}, which is not installed",
                 value=line.kind,
-                next_step=f"pip install 'compd[{library.extra}]'",
+                next_step=install_line(library.extra),
             )
 
 

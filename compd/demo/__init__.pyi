@@ -6,10 +6,10 @@ from .linuxcnc.page import summarise_linuxcnc as summarise_linuxcnc
 from .linuxcnc.page import write_linuxcnc_page as write_linuxcnc_page
 from .live import LIVE_SPEEDUP as LIVE_SPEEDUP
 from .live import run_live as run_live
-from .page import progress as progress
-from .page import summarise as summarise
-from .page import verdict as verdict
 from .page import write_demo_page as write_demo_page
 from .session import SPEEDUP as SPEEDUP
 from .session import DemoSession as DemoSession
 from .session import run_demo as run_demo
+from .summary import progress as progress
+from .summary import summarise as summarise
+from .summary import verdict as verdict

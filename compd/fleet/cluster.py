@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from compd.errors import CompdError, Problem
+from compd.extras import install_line
 from compd.release import __version__
 
 if TYPE_CHECKING:
@@ -27,13 +28,14 @@ def check_installed() -> None:
     """Raise CompdError if packages for fleets are missing."""
     try:
         import distributed  # noqa: F401
+        import plotly  # noqa: F401
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise CompdError(
             Problem(
                 where="compd fleet",
                 what=f"needs the package {error.name}, which is not installed",
-                next_step="python -m pip install 'compd[fleet]'",
+                next_step=install_line("fleet"),
             )
         ) from error
 

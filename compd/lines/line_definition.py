@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from compd.clock import Clock
+from compd.extras import install_line
 from compd.gauge import LineFault, LineKind, Quality
 from compd.line_settings import BROADCAST, WRITE_REGISTERS, LineSettings, TriggerBytes, TriggerWrite
 from compd.lines.port_arguments import PortArguments
@@ -168,5 +169,5 @@ class PushedDefinition(LineDefinition):
         except ImportError as error:
             if self.library is None:
                 raise
-            text = f"{error.name} is not installed: pip install 'compd[{self.library.extra}]'"
+            text = f"{error.name} is not installed: {install_line(self.library.extra)}"
             raise LineFault(Quality.LINE_LOST, text) from error

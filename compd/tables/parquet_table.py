@@ -16,6 +16,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.errors import Problem, RecordingError
+from compd.extras import install_line
 from compd.tables.csv_table import plain_numbers
 from compd.tables.problem_list import ProblemList, rows_text, values_text
 from compd.tables.table import FIRST_ROW, Table, TableBlock, id_codes, id_labels
@@ -40,7 +41,7 @@ def arrow_modules(path: Path) -> tuple[Any, Any]:
             Problem(
                 where=str(path),
                 what="is a Parquet file, and pyarrow is not installed",
-                next_step="pip install 'compd[parquet]'",
+                next_step=install_line("parquet"),
             )
         ) from error
     return pyarrow, pyarrow.parquet

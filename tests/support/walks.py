@@ -129,8 +129,8 @@ class Copy:
             assert _without_blank_lines(self.directory / name) == lines, f"{name}: not as the formatter would have it"
 
     def changed(self) -> set[str]:
-        """Files that differ from what was copied, and new ones."""
-        return {line[3:] for line in self.run("git status --porcelain -uall").splitlines()}
+        """Files that differ from what was copied, and new ones, but for the pages that `docs.generate` writes."""
+        return {line[3:] for line in self.run("git status --porcelain -uall -- . :^docs/reference").splitlines()}
 
     def show(self, console: str) -> None:
         """Run a console block, and compare what it prints with what it shows."""

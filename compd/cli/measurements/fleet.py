@@ -153,10 +153,12 @@ def report(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Write the page: effects by machine, drifts, differing machines, unreadable recordings."""
-    from compd.fleet import check_installed, examination, is_table, read_table, write_fleet_page
-    from compd.report import check_page_path
+    from compd.fleet import check_installed
 
     check_installed()
+    from compd.fleet import examination, is_table, read_table, write_fleet_page
+    from compd.report import check_page_path
+
     if not all(is_table(Path(place)) for place in places):
         wanted = examination("diagnose", machine or (), model or (), effects or ())
         _examine(wanted, places, machines_by, out, scheduler, html, fresh, overwrite)

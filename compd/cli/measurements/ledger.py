@@ -24,7 +24,7 @@ def ledger(
     from rich.table import Table
 
     from compd.model_file import read_stored
-    from compd.report import LEDGER_HEAD, check_page_path, keep_words_whole, ledger_rows, write_ledger_page
+    from compd.report import LEDGER_HEAD, keep_words_whole, ledger_rows
 
     stored = read_stored(model)
     steps = stored.steps
@@ -48,6 +48,8 @@ def ledger(
         table.add_row(*cells)
     console.print(keep_words_whole(table, console.width))
     if html is not None:
+        from compd.report import check_page_path, write_ledger_page
+
         check_page_path(html, overwrite)
         write_ledger_page(html, stored)
         typer.echo(f"The falling error as a picture: {html}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -45,11 +46,15 @@ def demo(
     from rich.live import Live as LiveText
 
     from compd.configuration import load, shipped_configuration
-    from compd.demo import SPEEDUP, progress, run_demo, summarise, verdict, write_demo_page
-    from compd.report import check_page_path
+    from compd.demo import SPEEDUP, progress, run_demo, summarise, verdict
+    from compd.extras import EXTRAS, install_line
 
-    page.parent.mkdir(parents=True, exist_ok=True)
-    check_page_path(page)
+    drawn = all(find_spec(package) for package in EXTRAS["report"])
+    if drawn:
+        from compd.report import check_page_path
+
+        page.parent.mkdir(parents=True, exist_ok=True)
+        check_page_path(page)
     console = Console()
     configuration = load(config or shipped_configuration("tripod-cmm.yaml"))
     console.print(
@@ -66,6 +71,11 @@ def demo(
         session = run_demo(configuration, seconds, seed, show)
     console.print(summarise(session))
     console.print(verdict(session))
+    if not drawn:
+        console.print(f"The same as pictures, with one package more: {install_line('report')}", markup=False)
+        return
+    from compd.demo import write_demo_page
+
     write_demo_page(page, session)
     console.print(f"The same as pictures: {page}")
 

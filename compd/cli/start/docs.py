@@ -10,8 +10,10 @@ import typer
 from compd.errors import CompdError, Problem
 
 _ROOT = Path(__file__).parents[3]
-# Directories in an installed package, and in a checkout.
-_PLACES = (_ROOT / "compd" / "documentation", _ROOT / "docs" / "_build" / "html")
+# Directories in an installed package, and in a checkout with and without `make docs`.
+_PLACES = (_ROOT / "compd" / "documentation", _ROOT / "docs" / "_build" / "html", _ROOT / "docs")
+# Built pages, and pages as they are written.
+_SUFFIXES = (".html", ".md")
 
 
 def docs(
@@ -33,15 +35,15 @@ def docs(
 
 
 def documentation_directory() -> Path:
-    """The directory of the built pages. Raises CompdError if there are none."""
+    """The directory of the pages, built ones first. Raises CompdError if there are none."""
     for place in _PLACES:
-        if (place / "index.html").is_file():
+        if any((place / f"index{suffix}").is_file() for suffix in _SUFFIXES):
             return place
     raise CompdError(
         Problem(
-            where=str(_PLACES[-1]),
-            what="the documentation is not built",
-            next_step="run `make docs` in a checkout of compd; the wheels that are published have it",
+            where=str(_PLACES[0]),
+            what="the documentation is not there",
+            next_step="install compd again: every wheel has it",
         )
     )
 
@@ -52,10 +54,12 @@ def find_page(directory: Path, name: str) -> Path:
     A folder's page may be named by the folder: `tutorials` is `tutorials/index`. Raises CompdError with the names that
     are near where no page or more than one has this name.
     """
+    suffix = next(suffix for suffix in _SUFFIXES if (directory / f"index{suffix}").is_file())
     pages = {
         file.relative_to(directory).with_suffix("").as_posix(): file
-        for file in sorted(directory.rglob("*.html"))
-        if file.relative_to(directory).parts[0] != "_static"
+        for file in sorted(directory.rglob(f"*{suffix}"))
+        # what Sphinx adds, and what it made of Markdown
+        if not file.relative_to(directory).parts[0].startswith("_")
     }
     wanted = name.strip("/").removesuffix(".html").removesuffix(".md")
     for exact in (wanted, f"{wanted}/index"):

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from compd.cli.start import docs as command
 from compd.errors import CompdError
+from tests.support.paths import ROOT
 
 PAGES = ("index", "tutorials/index", "reference/index", "reference/effects", "how-to/add-an-effect", "gallery/index")
 
@@ -94,7 +95,16 @@ def test_a_name_of_several_pages_lists_them(site: Path) -> None:
         run("effects")
 
 
-def test_a_checkout_without_pages_says_how_to_build_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", ["recording", "reference/recording.md", "protocol", "run-under-systemd"])
+def test_a_checkout_and_a_wheel_without_built_pages_have_the_written_ones(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setattr(command, "_PLACES", (ROOT / "compd" / "documentation", ROOT / "docs"))
+    (page,) = [path for path in (ROOT / "docs").glob("*/*.md") if path.stem == Path(name).stem]
+    assert run(name, "--path").strip() == str(page)
+
+
+def test_an_installation_without_pages_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command, "_PLACES", (tmp_path / "a", tmp_path / "b"))
-    with pytest.raises(CompdError, match="make docs"):
+    with pytest.raises(CompdError, match="install compd again"):
         run()

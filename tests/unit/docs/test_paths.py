@@ -13,9 +13,6 @@ from tests.support.paths import ROOT
 
 DOCS = ROOT / "docs"
 PICTURES = sorted((DOCS / "pictures").glob("*.svg"))
-# Pages that are made from the code: docs/generate/NAME.py writes docs/reference/NAME.md.
-GENERATED = {f"docs/reference/{path.stem.replace('_', '-')}.md" for path in (DOCS / "generate").glob("[a-z]*.py")}
-
 FENCE = re.compile(r"^(`{3,}).*?^\1`*$", re.MULTILINE | re.DOTALL)
 TREES = ("compd/", "drivers/", "tests/", "docs/", "config/", "systemd/")
 # In backticks and not in a role such as {term}`...`: a path from the root, or from compd/ where that is a package.
@@ -28,10 +25,10 @@ PLACEHOLDER = re.compile(r"[A-Z]{3,}")
 
 
 def pages() -> list[Path]:
-    """README, CONTRIBUTING and every written page."""
+    """README, CONTRIBUTING and every page, but those that `make docs` makes of pictures."""
     written = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts)
     top = [ROOT / name for name in ("README.md", "CONTRIBUTING.md") if (ROOT / name).exists()]
-    return top + [path for path in written if name_of(path) not in GENERATED]
+    return top + [path for path in written if name_of(path) in tracked()]
 
 
 def name_of(path: Path) -> str:
@@ -53,7 +50,7 @@ def tracked() -> frozenset[str]:
     else:
         files = [name for name in listed.stdout.splitlines() if (ROOT / name).exists()]
     folders = {parent.as_posix() for name in files for parent in Path(name).parents}
-    return frozenset({*files, *folders, *GENERATED})
+    return frozenset({*files, *folders})
 
 
 def exists(path: str) -> bool:

@@ -78,6 +78,26 @@ def described(kind: Any) -> dict[str, str]:
     return {f"{name}.{key.name}": key.meaning for name in ["", *inside] for key in schema.keys(name)}
 
 
+def without_examples(name: str, text: str) -> str:
+    """The page; that of the protocol without what a daemon and its clients said."""
+    examples = r"(?:^(?:For example(?:, a client sends|:)|and the daemon)\n\n)?^```json\n.*?^```\n\n*"
+    return re.sub(examples, "", text, flags=re.MULTILINE | re.DOTALL) if name == generate.PROTOCOL else text
+
+
+@pytest.mark.parametrize("name", generate.page_names())
+def test_the_page_in_the_checkout_is_as_the_code_makes_it(name: str) -> None:
+    kept = generate.file_of(name).read_text(encoding="utf-8")
+    same = without_examples(name, kept) == without_examples(name, page(name))
+    assert same, f"{generate.file_of(name)} is of other code: run `.venv/bin/python -m docs.generate`"
+
+
+def test_other_values_of_a_daemon_are_no_other_page_and_another_key_is() -> None:
+    said = '{"time_s": 14178.235854, "mm": [-1e-07], "path": "/tmp/compd-x/a", "config_hash": "695e2a839c7df9ce"}'
+    later = '{"time_s": 9.2, "mm": [2.96e-05], "path": "/tmp/compd-ab_/a", "config_hash": "222dfbd8e56afdc8"}'
+    assert generate.without_values(said) == generate.without_values(later)
+    assert generate.without_values(said) != generate.without_values(later.replace("time_s", "at_s"))
+
+
 @pytest.mark.parametrize("name", generate.page_names())
 def test_a_page_has_a_title_and_tables_of_few_columns(name: str) -> None:
     text = page(name)

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from compd import jit
-from compd.compile_kernels import kernel_modules
+from compd import jit, kernel_target
+from compd.compile_kernels import compile_for_levels, kernel_modules
 from compd.kernel_target import LEVELS
 from tests.support.paths import ROOT
 
@@ -92,12 +92,20 @@ sys.stdout.buffer.write(R.tobytes() + rotation_vector(R).tobytes() + compose(R, 
 """
 
 
-def _computed(installation: Path, **environment: str) -> tuple[bytes, str]:
-    """What the rotations' kernels give in a new process of the installation, and what it says."""
+_ROTATIONS = ("-c", _COMPUTE)
+_ALL_KERNELS = ("-m", "tests.support.kernel_results")
+
+
+def _computed(program: tuple[str, str], installation: Path, **environment: str) -> tuple[bytes, str]:
+    """What the program prints in a new process that imports this installation, and what is said beside it."""
     inherited = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
     done = subprocess.run(
-        [sys.executable, "-c", _COMPUTE],
-        env={**inherited, "PYTHONPATH": str(installation), **environment},
+        [sys.executable, *program],
+        env={
+            **inherited,
+            "PYTHONPATH": os.pathsep.join(map(str, (installation, ROOT, ROOT / "drivers"))),
+            **environment,
+        },
         cwd=installation,
         capture_output=True,
         check=True,
@@ -105,27 +113,99 @@ def _computed(installation: Path, **environment: str) -> tuple[bytes, str]:
     return done.stdout, done.stderr.decode()
 
 
+def _copy_installation(place: Path) -> None:
+    """A copy without what was compiled."""
+    shutil.copytree(ROOT / "compd", place / "compd", ignore=shutil.ignore_patterns("__pycache__", jit.BUILT))
+
+
 @pytest.mark.parametrize("level", [*LEVELS])
 def test_built_kernels_run_elsewhere_and_give_what_a_new_compilation_gives(tmp_path: Path, level: str) -> None:
     target = {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": ""}
     here, there = tmp_path / "here", tmp_path / "there"
     for place in (here, there):
-        shutil.copytree(ROOT / "compd", place / "compd", ignore=shutil.ignore_patterns("__pycache__"))
+        _copy_installation(place)
     # times differ: they are those of the copies
     for file in there.rglob("*.py"):
         os.utime(file, (1e9, 1e9))
-    compiled, said = _computed(here, NUMBA_CACHE_DIR=str(there / "compd" / jit.BUILT), **target)
+    compiled, said = _computed(_ROTATIONS, here, NUMBA_CACHE_DIR=str(there / "compd" / jit.BUILT), **target)
     assert said.count("\n") == 1
     assert re.match(rf"compd compiles kernels \(1 to 2 min\): none fit py.*-numba.*-llvm.*-{level}; kept in ", said)
     unwritable = tmp_path / "file"
     unwritable.write_text("")
-    assert _computed(there, NUMBA_CACHE_DIR=str(unwritable), **target) == (compiled, "")
+    assert _computed(_ROTATIONS, there, NUMBA_CACHE_DIR=str(unwritable), **target) == (compiled, "")
     # another change of the sources: nothing fits, and that is said
     changed = there / "compd" / "linear.py"
     changed.write_text(changed.read_text() + "# changed\n")
-    again, said = _computed(there, NUMBA_CACHE_DIR=str(tmp_path / "fresh"), **target)
+    again, said = _computed(_ROTATIONS, there, NUMBA_CACHE_DIR=str(tmp_path / "fresh"), **target)
     assert again == compiled
     assert said.startswith("compd compiles kernels")
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1800)
+def test_every_kernel_of_a_build_gives_what_a_new_compilation_gives(tmp_path: Path) -> None:
+    """To the last bit, by a hash of all that each kernel is given and gives in jobs that use all of them."""
+    built, fresh, unwritable = tmp_path / "built", tmp_path / "fresh", tmp_path / "file"
+    _copy_installation(built)
+    _copy_installation(fresh)
+    unwritable.write_text("")
+    assert compile_for_levels(str(built / "compd" / jit.BUILT)) == []
+    for level in LEVELS:
+        target = {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": ""}
+        of_build, said = _computed(_ALL_KERNELS, built, NUMBA_CACHE_DIR=str(unwritable), **target)
+        assert said == ""
+        calls = {name: int(count) for name, count, _ in map(str.split, of_build.decode().splitlines())}
+        assert len(calls) > 20
+        assert [name for name, count in calls.items() if not count] == []
+        new, said = _computed(_ALL_KERNELS, fresh, NUMBA_CACHE_DIR=str(tmp_path / level), **target)
+        assert said.startswith("compd compiles kernels")
+        assert new == of_build
+
+
+@pytest.mark.parametrize(
+    ("machine", "features", "level"),
+    [("x86_64", "v3", "x86-64-v3"), ("x86_64", "v2", "x86-64-v2"), ("aarch64", "neon", None), ("x86_64", "none", None)],
+)
+def test_the_level_is_that_of_the_processor_and_another_architecture_has_none(
+    monkeypatch: pytest.MonkeyPatch, machine: str, features: str, level: str | None
+) -> None:
+    present = {"v3": LEVELS["x86-64-v3"], "v2": LEVELS["x86-64-v2"]}.get(features, {features})
+    monkeypatch.setattr(kernel_target.platform, "machine", lambda: machine)
+    monkeypatch.setattr(kernel_target.llvmlite.binding, "get_host_cpu_features", lambda: dict.fromkeys(present, True))
+    monkeypatch.setattr(kernel_target._config, "CPU_NAME", None)
+    monkeypatch.setattr(kernel_target._config, "CPU_FEATURES", None)
+    kernel_target.choose_target()
+    assert level == kernel_target._config.CPU_NAME
+
+
+# Runs a command where the processor is said to be of another architecture: numba compiles for what is there.
+_ON_AARCH64 = """
+import platform
+import sys
+platform.machine = lambda: "aarch64"
+from compd.cli import main
+sys.argv[0] = "compd"
+main()
+"""
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+def test_a_check_on_another_architecture_says_that_it_compiles_and_works(tmp_path: Path) -> None:
+    """The kernels of an installation are for x86-64: there a first start compiles, with one line that says so."""
+    command = [sys.executable, "-c", _ON_AARCH64, "check", str(ROOT / "config" / "tripod-cmm.yaml")]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    first, second = (
+        subprocess.run(
+            command, env={**environment, "NUMBA_CACHE_DIR": str(tmp_path)}, capture_output=True, text=True, check=True
+        )
+        for _ in range(2)
+    )
+    assert re.fullmatch(
+        rf"compd compiles kernels \(1 to 2 min\): none fit py\S+; kept in {tmp_path}\S+\n", first.stderr
+    )
+    assert "x86-64" not in first.stderr
+    assert (second.stdout, second.stderr) == (first.stdout, "")
 
 
 @pytest.mark.long
