@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from compd.cli.app import app
 from compd.cli.commands import make_app
-from docs.generate.commands import CommandEntry, entries
+from docs.generate.command_entries import CommandEntry, entries
 
 
 def test_a_command_that_is_named_is_loaded_alone():
