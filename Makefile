@@ -12,7 +12,7 @@ KERNEL_PACKAGES := import tomllib; build = tomllib.load(open("pyproject.toml", "
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help gallery docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
+.PHONY: help gallery docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel deb bench bench-sample costs soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -24,6 +24,7 @@ help:
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
+	@echo "make deb     Debian packages for Debian 12 and 13, in dist/ (root; debootstrap, systemd-container; 12 min)"
 	@echo "make pages   every command and piece of Python of README and docs, run (15 min; make pages-sample 6)"
 	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (8 min; make walks-sample 1)"
 	@echo "make service the daemon under systemd in a container: sandbox, restart, watchdog, reload, stop (root; 3 min)"
@@ -150,6 +151,14 @@ wheel: $(STAMP) docs
 	build/wheel-test/bin/pip install --quiet --disable-pip-version-check dist/compd-*.whl
 	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
+
+# A Debian package for each release, in dist/, judged by lintian; root, and the packages debootstrap and systemd-container.
+RELEASES ?= bookworm trixie
+
+deb: $(STAMP) docs
+	rm -rf build/deb
+	$(BIN)/python -m build --sdist --outdir build/deb .
+	for release in $(RELEASES); do debian/build $$release build/deb/compd-*.tar.gz || exit 1; done
 
 SAMPLE := kinematics cycle diagnose
 BENCH := $(SAMPLE) compare loop latency flood throughput page gateway stream fleet kilohertz
