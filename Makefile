@@ -92,16 +92,16 @@ test: $(STAMP)
 	$(PYTEST) -rs $(IN_REAL_TIME) $(HIDDEN) $(REAL_TIME)
 
 long: $(STAMP)
-	$(PYTEST) -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) --ignore=$(SERVICE)
+	$(PYTEST) -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) $(SERVICE:%=--ignore=%)
 
 # Of the long ones those that .ci/run runs, but for the targets below. Attacks and browsers have the computer for themselves.
 sample: $(STAMP)
 	$(PYTEST) -m sample -n 2 $(COMPUTED) $(DOCUMENTED:%=--ignore=%)
 	$(PYTEST) -m sample $(REAL_TIME)
 
-# The unit under systemd, in a container; -rP prints the times of restart and stop. Skipped but for root with the
+# The unit under systemd, in a container, and the packages that `make deb` has built; -rP prints the times of restart and stop. Skipped but for root with the
 # packages debootstrap and systemd-container.
-SERVICE := tests/system/test_service_in_container.py
+SERVICE := tests/system/test_service_in_container.py tests/system/test_debian_package.py
 
 service: $(STAMP)
 	$(PYTEST) -m long -rsP $(SERVICE)
@@ -221,7 +221,7 @@ docs: gallery
 	@echo "docs/_build/html/index.html"
 
 # Hours of faults, and other examples of every fuzzer than yesterday's.
-nightly: lint wheel demo test pages walks long service hidden bench
+nightly: lint wheel deb demo test pages walks long service hidden bench
 	$(MAKE) faults OPTIONS=--fresh
 	for hour in 1 2 3; do $(BIN)/python -m tests.soak --minutes 60 --together 0.6 --seed $$(date +%j)$$hour || exit 1; done
 	$(BIN)/python -m tests.soak --without-faults --hours 24
