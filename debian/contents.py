@@ -55,7 +55,7 @@ def main() -> None:
     built = datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), UTC)
     (DEBIAN / "changelog").write_text(changelog(Path("CHANGELOG.md").read_text(), built))
     (DEBIAN / "copyright").write_text(copyright_text(Path("LICENSE").read_text()))
-    (DEBIAN / "compd.substvars").write_text(f"python3:Depends={python_dependency()}\n")
+    (DEBIAN / "python-dependency").write_text(python_dependency())
 
 
 def removed_directories() -> list[str]:
