@@ -127,6 +127,7 @@ def test_a_machine_lives_with_the_package(container: Container) -> None:
     said = container.run("sh", "-ec", f"cd /; {PROGRAM} service install {MACHINE}")
     assert "systemctl enable --now compd compd-page" in said
     assert "sysusers" not in said
+    assert " is complete: " in said, "what the check of the configuration says"
     service.wait_for_ok()
     assert service.zero() == zero, "the state has been kept"
     assert container.run("systemctl", "is-active", "compd", "compd-page") == "active\nactive\n"

@@ -59,12 +59,16 @@ def upgrade(daemon: DaemonOption = DEFAULT_SOCKET) -> None:
     Call it by the path of the new environment, as in `/opt/compd-0.3/bin/compd service upgrade`. The new release checks
     the configuration and compiles what it needs while the old one goes on.
     """
-    from compd.installation import own_program
+    from compd.installation import is_packaged, own_program
     from compd.installation import upgrade as upgrade_to
 
     _require_root()
     typer.echo("The new release checks the configuration, while the old one goes on ...")
-    _report(upgrade_to(unix_address(daemon), own_program()), "compd service back: the release before")
+    program = own_program()
+    before = (
+        "The version before: install its package" if is_packaged(program) else "compd service back: the release before"
+    )
+    _report(upgrade_to(unix_address(daemon), program), before)
 
 
 @service.command()
