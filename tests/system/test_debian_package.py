@@ -148,7 +148,8 @@ def what_belongs_to_the_system(container: Container) -> None:
         assert container.path(f"/usr/share/man/man1/{page}").exists()
     completed = ". /usr/share/bash-completion/completions/compd; COMP_WORDS=(compd servi) COMP_CWORD=1"
     assert run("bash", "-c", f'{completed}; _compd_completion compd; echo "$COMPREPLY"') == "service\n"
-    assert run("systemd-analyze", "verify", "--man=no", "compd.service", "compd-page.service") == ""
+    units = [f"/usr/lib/systemd/system/{unit}.service" for unit in ("compd", "compd-page")]
+    assert run("systemd-analyze", "verify", "--man=no", *units) == ""
 
 
 @contextmanager
