@@ -14,7 +14,7 @@ BUILD_PACKAGES := import tomllib; project = tomllib.load(open("pyproject.toml", 
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help gallery docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel bench bench-sample costs soak scoreboard sensitivity nightly clean
+.PHONY: help gallery docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel deb bench bench-sample costs soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -26,6 +26,7 @@ help:
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make docs    the documentation with its gallery; compd docs opens it"
 	@echo "make wheel   build sdist and wheel, check them, install the wheel in a clean environment, run it"
+	@echo "make deb     Debian packages for Debian 12 and 13, in dist/ (root; debootstrap, systemd-container; 12 min)"
 	@echo "make pages   every command and piece of Python of README and docs, run (15 min; make pages-sample 6)"
 	@echo "make walks   the examples of CONTRIBUTING.md, applied to a copy of the tree (8 min; make walks-sample 1)"
 	@echo "make service the daemon under systemd in a container: sandbox, restart, watchdog, reload, stop (root; 3 min)"
@@ -99,16 +100,16 @@ test: $(STAMP)
 	$(PYTEST) -rs $(IN_REAL_TIME) $(HIDDEN) $(REAL_TIME)
 
 long: $(STAMP)
-	$(PYTEST) -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) --ignore=$(SERVICE)
+	$(PYTEST) -m long $(HIDDEN:%=--ignore=%) $(DOCUMENTED:%=--ignore=%) $(SERVICE:%=--ignore=%)
 
 # Of the long ones those that .ci/run runs, but for the targets below. Attacks and browsers have the computer for themselves.
 sample: $(STAMP)
 	$(PYTEST) -m sample -n 2 $(COMPUTED) $(DOCUMENTED:%=--ignore=%)
 	$(PYTEST) -m sample $(REAL_TIME)
 
-# The unit under systemd, in a container; -rP prints the times of restart and stop. Skipped but for root with the
+# The unit under systemd, in a container, and the packages that `make deb` has built; -rP prints the times of restart and stop. Skipped but for root with the
 # packages debootstrap and systemd-container.
-SERVICE := tests/system/test_service_in_container.py
+SERVICE := tests/system/test_service_in_container.py tests/system/test_debian_package.py
 
 service: $(STAMP)
 	$(PYTEST) -m long -rsP $(SERVICE)
@@ -159,6 +160,14 @@ wheel: $(STAMP) docs
 	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
 	$(PYTEST) tests/system/test_wheel.py
+
+# A Debian package for each release, in dist/, judged by lintian; root, and the packages debootstrap and systemd-container.
+RELEASES ?= bookworm trixie
+
+deb: $(STAMP) docs
+	rm -rf build/deb
+	$(BIN)/python -m build --sdist --outdir build/deb .
+	for release in $(RELEASES); do debian/build $$release build/deb/compd-*.tar.gz || exit 1; done
 
 SAMPLE := kinematics cycle diagnose
 BENCH := $(SAMPLE) compare loop latency flood throughput page gateway stream fleet kilohertz targets
@@ -221,7 +230,7 @@ docs: gallery
 	@echo "docs/_build/html/index.html"
 
 # Hours of faults, and other examples of every fuzzer than yesterday's.
-nightly: lint wheel demo test pages walks long service hidden bench
+nightly: lint wheel deb demo test pages walks long service hidden bench
 	$(MAKE) faults OPTIONS=--fresh
 	for hour in 1 2 3; do $(BIN)/python -m tests.soak --minutes 60 --together 0.6 --seed $$(date +%j)$$hour || exit 1; done
 	$(BIN)/python -m tests.soak --without-faults --hours 24

@@ -10,14 +10,13 @@ from collections.abc import Iterator, Sequence
 from itertools import permutations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
-from scipy.spatial.transform import Rotation
 
 from compd.arrays import FloatArray
 from compd.configuration import Geometry, ToolOnPlatformSettings
 from compd.documents import Document, Location
 from compd.errors import Problem
 from compd.model import MachineModel
+from compd.rotation import rotation_matrix, rotation_vector
 
 # Squared lengths that are smaller by a hundredth: points as drawn are the nearest to their own, exactly.
 _CLEARLY = 0.99
@@ -44,10 +43,8 @@ def slips(document: Document, geometry: Geometry, model: MachineModel) -> Iterat
         yield from _far_joints(document, geometry)
         yield from _base_beside_plate(document, geometry)
     yield from axes_along_links(document, geometry)
-    upright = Rotation.from_rotvec(geometry.base.rotation_B0_in_M_rad).inv() * Rotation.from_matrix(
-        model.zero.rotation_M_P
-    )
-    tilted_rad = float(np.arccos(min(abs(upright.as_matrix()[2, 2]), 1.0)))
+    upright = rotation_matrix(geometry.base.rotation_B0_in_M_rad).T @ model.zero.rotation_M_P
+    tilted_rad = float(np.arccos(min(abs(upright[2, 2]), 1.0)))
     if tilted_rad > _TILTED_RAD:
         yield Problem(
             where=document.where(("geometry", "tool", "zero_rotation_P_in_M_rad")),
@@ -55,8 +52,8 @@ def slips(document: Document, geometry: Geometry, model: MachineModel) -> Iterat
             value=f"{tilted_rad:.3g} rad",
             next_step="in degrees? Rotation vectors are in rad",
         )
-    drawn = Rotation.from_rotvec(geometry.tool.zero_rotation_P_in_M_rad)
-    turned_rad = (drawn.inv() * Rotation.from_matrix(model.zero.rotation_M_P)).magnitude()
+    drawn = rotation_matrix(geometry.tool.zero_rotation_P_in_M_rad)
+    turned_rad = float(np.linalg.norm(rotation_vector(drawn.T @ model.zero.rotation_M_P)))
     if turned_rad > _TURNED_RAD:
         yield Problem(
             where=document.where(("geometry", "platform")),
@@ -70,15 +67,16 @@ def _crossed_links(document: Document, model: MachineModel) -> Iterator[Problem]
     base_mm = model.zero.base_joints_M_mm
     platform_mm = model.zero.platform_origin_M_mm + model.platform_joints_P_mm @ model.zero.rotation_M_P.T
     squares = _squares(base_mm, platform_mm)
-    rows, order = linear_sum_assignment(squares)
-    if squares[rows, order].sum() < _CLEARLY * np.trace(squares):
+    links = range(len(squares))
+    order = min(permutations(links), key=lambda order: sum(squares[k, order[k]] for k in links))
+    if squares[links, order].sum() < _CLEARLY * np.trace(squares):
         location = ("geometry", "platform", "joints_P_mm")
-        yield _in_another_order(document, location, "the links cross one another", order.tolist())
+        yield _in_another_order(document, location, "the links cross one another", order)
 
 
 def _crossed_rods(document: Document, geometry: Geometry) -> Iterator[Problem]:
-    turned = Rotation.from_rotvec(geometry.base.rotation_B0_in_M_rad)
-    supports_mm = geometry.base.origin_B0_in_M_mm + turned.apply(geometry.base.supports_B_mm)
+    turned = rotation_matrix(geometry.base.rotation_B0_in_M_rad)
+    supports_mm = geometry.base.origin_B0_in_M_mm + np.array(geometry.base.supports_B_mm) @ turned.T
     squares = _squares(supports_mm, np.array(geometry.plate_points_M_mm))
     sums = {order: sum(squares[b, order[m]] for b, m in _RODS) for order in permutations(range(3))}
     order = min(sums, key=sums.__getitem__)
@@ -132,13 +130,13 @@ def axes_along_links(document: Document, geometry: Geometry) -> Iterator[Problem
     tool, base, platform = geometry.tool, geometry.base, geometry.platform
     if not platform.revolute_axes_P or not isinstance(tool, ToolOnPlatformSettings):
         return
-    turned = Rotation.from_rotvec(base.rotation_B0_in_M_rad)
-    base_mm = base.origin_B0_in_M_mm + turned.apply(base.joints_B_mm)
-    upright = Rotation.from_rotvec(tool.zero_rotation_P_in_M_rad)
-    joints_mm = tool.zero_tip_M_mm + upright.apply(np.array(platform.joints_P_mm) - tool.at_P_mm)
+    turned = rotation_matrix(base.rotation_B0_in_M_rad)
+    base_mm = base.origin_B0_in_M_mm + np.array(base.joints_B_mm) @ turned.T
+    upright = rotation_matrix(tool.zero_rotation_P_in_M_rad)
+    joints_mm = tool.zero_tip_M_mm + (np.array(platform.joints_P_mm) - tool.at_P_mm) @ upright.T
     for k, axis in enumerate(platform.revolute_axes_P):
         link = (base_mm[k] - joints_mm[k]) / np.linalg.norm(base_mm[k] - joints_mm[k])
-        along = abs(float(upright.apply(axis) @ link))
+        along = abs(float(upright @ axis @ link))
         if along > _ALONG:
             yield Problem(
                 where=document.where(("geometry", "platform", "revolute_axes_P", k)),

@@ -7,6 +7,7 @@ has to be edited. Commands import what they need when they run, so that `compd -
 
 from __future__ import annotations
 
+import os
 import pkgutil
 from importlib import import_module
 
@@ -23,11 +24,15 @@ PANELS = {
     "Learn from measurements": measurements,
     "A simulated machine": simulated,
 }
+# Set by a shell that completes a command, and where its script is asked for: `_COMPD_COMPLETE=source_bash compd`.
+_COMPLETION = "_COMPD_COMPLETE"
 
 
 def make_app(wanted: str = "") -> typer.Typer:
     """The command line. Where `wanted` is the name of a command it has this one alone, and is made sooner."""
-    app = typer.Typer(cls=PlainGroup, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+    app = typer.Typer(
+        cls=PlainGroup, no_args_is_help=True, add_completion=_COMPLETION in os.environ, pretty_exceptions_enable=False
+    )
     app.callback(cls=PlainGroup)(_options)
     modules = [
         (title, package.__name__, module.name)

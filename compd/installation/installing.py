@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
 from compd.configuration import Configuration
 from compd.errors import Problem
-from compd.installation.shipped_units import program_problems, shipped_file
+from compd.installation.shipped_units import (
+    DAEMON,
+    PAGE,
+    UNIT_DIRECTORY,
+    is_packaged,
+    program_problems,
+    shipped_file,
+)
 from compd.installation.system_command import SystemCommand, installed_file
 
 MACHINE = Path("/etc/compd/machine.yaml")
-UNIT_DIRECTORY = Path("/etc/systemd/system")
 _TOKENS = Path("/etc/compd/page-tokens.yaml")
 # What the units give the daemon: RuntimeDirectory= and StateDirectory= of compd.service.
 _RUNTIME, _STATE = Path("/run/compd"), Path("/var/lib/compd")
 # The daemon as its unit runs it, for commands that are to see what it sees.
 _AS_THE_DAEMON = ("setpriv", "--reuid=compd", "--regid=compd", "--init-groups", "--reset-env", "--")
 _KERNELS = "NUMBA_CACHE_DIR=/var/cache/compd"
-DAEMON, PAGE = "compd", "compd-page"
-
-
-def unit_path(unit: str) -> Path:
-    """The file of a unit, "compd" or "compd-page", as it is installed."""
-    return UNIT_DIRECTORY / f"{unit}.service"
 
 
 def install_problems(configuration: Configuration, program: Path, page: bool) -> list[Problem]:
@@ -57,7 +58,7 @@ def install_problems(configuration: Configuration, program: Path, page: bool) ->
 
 
 def install_steps(configuration: Configuration, program: Path, page: bool) -> list[SystemCommand]:
-    """The steps, in their order; each may be done again.
+    """The steps, in their order; each may be done again. Those that a Debian package has done are not among them.
 
     Parameters
     ----------
@@ -66,25 +67,21 @@ def install_steps(configuration: Configuration, program: Path, page: bool) -> li
     page : whether the page in the browser is installed, too. A file of its tokens that is there is kept.
     """
     text = configuration.path.read_text(encoding="utf-8")
-    steps = [
-        installed_file("/etc/sysusers.d/compd.conf", shipped_file("compd.sysusers", program), "name the users"),
-        SystemCommand("make the users", ("systemd-sysusers",)),
+    units = (DAEMON, PAGE) if page else (DAEMON,)
+    packaged = is_packaged(program)
+    steps = [] if packaged else _user_steps(program)
+    steps += [
         installed_file(str(MACHINE), text, "the machine's configuration"),
         SystemCommand(
             "a directory for what is compiled",
             ("install", "-d", "-m", "700", "-o", DAEMON, "-g", DAEMON, "/var/cache/compd"),
         ),
         check_step(program),
-        installed_file(
-            "/etc/udev/rules.d/70-compd.rules", shipped_file("compd.rules", program), "permit processors to stay awake"
-        ),
-        _unit_step(program, DAEMON),
     ]
-    if page:
-        steps.append(_unit_step(program, PAGE))
-        if not _TOKENS.exists():
-            steps.append(installed_file(str(_TOKENS), "", "an empty file of tokens", "600", (PAGE, PAGE)))
-    units = (DAEMON, PAGE) if page else (DAEMON,)
+    if not packaged:
+        steps += _system_steps(program, units)
+    if page and not _TOKENS.exists():
+        steps.append(installed_file(str(_TOKENS), "", "an empty file of tokens", "600", (PAGE, PAGE)))
     return [
         *steps,
         SystemCommand("systemd reads the units", ("systemctl", "daemon-reload")),
@@ -92,9 +89,22 @@ def install_steps(configuration: Configuration, program: Path, page: bool) -> li
     ]
 
 
-def _unit_step(program: Path, unit: str) -> SystemCommand:
-    name = f"{unit}.service"
-    return installed_file(str(unit_path(unit)), shipped_file(name, program), f"the unit {name}")
+def _user_steps(program: Path) -> list[SystemCommand]:
+    return [
+        installed_file("/etc/sysusers.d/compd.conf", shipped_file("compd.sysusers", program), "name the users"),
+        SystemCommand("make the users", ("systemd-sysusers",)),
+    ]
+
+
+def _system_steps(program: Path, units: Sequence[str]) -> list[SystemCommand]:
+    rules = shipped_file("compd.rules", program)
+    return [
+        installed_file("/etc/udev/rules.d/70-compd.rules", rules, "permit processors to stay awake"),
+        *(
+            installed_file(str(UNIT_DIRECTORY / name), shipped_file(name, program), f"the unit {name}")
+            for name in (f"{unit}.service" for unit in units)
+        ),
+    ]
 
 
 def check_step(program: Path) -> SystemCommand:

@@ -12,8 +12,16 @@ from compd.client import Message, connect
 from compd.clock import Clock, MonotonicClock
 from compd.errors import CompdError, DaemonError, Problem
 from compd.files import write_files
-from compd.installation.installing import DAEMON, PAGE, check_step, unit_path
-from compd.installation.shipped_units import program_problems, shipped_file
+from compd.installation.installing import check_step
+from compd.installation.shipped_units import (
+    DAEMON,
+    PAGE,
+    UNIT_DIRECTORY,
+    is_packaged,
+    program_problems,
+    shipped_file,
+    unit_path,
+)
 from compd.installation.system_command import SystemCommand
 from compd.setpoint_states import State, state_named
 
@@ -61,13 +69,19 @@ def upgrade(socket: str, program: Path, clock: Clock | None = None) -> Replaceme
     ------
     CompdError
         Where nothing is installed, the new release refuses the configuration, a model would be lost with the restart,
-        or the machine did not become ok again; the release before runs then.
+        or the machine did not become ok again; the release before runs then, where it was kept.
     """
+    clock = clock or MonotonicClock()
     if problems := [*program_problems(program), *_restart_problems(socket)]:
         raise CompdError(problems)
     check_step(program).run()
+    if is_packaged(program):
+        came = _restart(socket, clock)
+        if came.is_worse:
+            raise CompdError(_worse(came, "install the version of the package before"))
+        return came
     new = {unit: shipped_file(f"{unit}.service", program) for unit in _installed_units()}
-    return _exchange(socket, new, clock or MonotonicClock())
+    return _exchange(socket, new, clock)
 
 
 def go_back(socket: str, clock: Clock | None = None) -> Replacement:
@@ -122,7 +136,7 @@ def _installed_units() -> tuple[str, ...]:
 
 def _before(unit: str) -> Path:
     """Where the unit of the release before is kept; systemd reads no file of that suffix."""
-    return Path(f"{unit_path(unit)}.before")
+    return UNIT_DIRECTORY / f"{unit}.service.before"
 
 
 def _exchange(socket: str, new: Mapping[str, str], clock: Clock) -> Replacement:
@@ -132,21 +146,24 @@ def _exchange(socket: str, new: Mapping[str, str], clock: Clock) -> Replacement:
     if came.is_worse:
         _write(old, new)
         back = _restart(socket, clock, State.OK)
-        raise CompdError(
-            Problem(
-                where="the release that replaced the one before",
-                what=f"did not come as far as the one before within {PATIENCE_S:g} s",
-                value=came.after,
-                allowed=f"{State.OK}, or {came.before} as before",
-                next_step=f"the release before runs again ({back.after}); look at `journalctl --unit {DAEMON}`",
-            )
-        )
+        raise CompdError(_worse(came, f"the release before runs again ({back.after})"))
     return came
+
+
+def _worse(came: Replacement, next_step: str) -> Problem:
+    return Problem(
+        where="the release that replaced the one before",
+        what=f"did not come as far as the one before within {PATIENCE_S:g} s",
+        value=came.after,
+        allowed=f"{State.OK}, or {came.before} as before",
+        next_step=f"{next_step}; look at `journalctl --unit {DAEMON}`",
+    )
 
 
 def _write(units: Mapping[str, str], before: Mapping[str, str]) -> None:
     kept = {_before(unit): text for unit, text in before.items()}
-    write_files({unit_path(unit): text for unit, text in units.items()} | kept, 0o644)
+    own = {UNIT_DIRECTORY / f"{unit}.service": text for unit, text in units.items()}
+    write_files(own | kept, 0o644)
 
 
 def _restart(socket: str, clock: Clock, wanted: str = "") -> Replacement:
@@ -155,7 +172,8 @@ def _restart(socket: str, clock: Clock, wanted: str = "") -> Replacement:
     before = next(setpoints)
     SystemCommand("systemd reads the units", ("systemctl", "daemon-reload")).run()
     # without waiting: a start that fails is tried again for ever
-    SystemCommand("start the other release", ("systemctl", "restart", "--no-block", *_installed_units())).run()
+    SystemCommand("start the other release", ("systemctl", "restart", "--no-block", DAEMON)).run()
+    SystemCommand("and its page, where it runs", ("systemctl", "try-restart", "--no-block", PAGE)).run()
     wanted = wanted or before.get("state", "")
     state, has_ended, valid_s, without_s = _SILENT, not before, before.get("time_s", math.nan), 0.0
     for setpoint in setpoints:

@@ -13,6 +13,10 @@ from compd.files import trust_problem
 _PLACES = (Path(__file__).parents[1] / "shipped_systemd", Path(__file__).parents[2] / "systemd")
 # The program that the shipped units start.
 _SHIPPED_PROGRAM = "/opt/compd/bin/compd"
+UNIT_DIRECTORY = Path("/etc/systemd/system")
+# Of units that a Debian package brings; one of the same name in UNIT_DIRECTORY precedes.
+PACKAGE_UNIT_DIRECTORY = Path("/usr/lib/systemd/system")
+DAEMON, PAGE = "compd", "compd-page"
 # Directories that the units hide from the daemon: ProtectHome=yes and PrivateTmp=yes of systemd.exec(5).
 _HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
 
@@ -31,6 +35,18 @@ def shipped_file(name: str, program: Path) -> str:
     raise CompdError(
         Problem(where=str(_PLACES[0]), what="the shipped units are missing", value=name, next_step="reinstall compd")
     )
+
+
+def unit_path(unit: str) -> Path:
+    """The file of a unit, "compd" or "compd-page": the package's where there is no other; it need not be there."""
+    own, packaged = (directory / f"{unit}.service" for directory in (UNIT_DIRECTORY, PACKAGE_UNIT_DIRECTORY))
+    return packaged if packaged.exists() and not own.exists() else own
+
+
+def is_packaged(program: Path) -> bool:
+    """Whether units of a Debian package start a program: then users, units and rules are the package's."""
+    unit = unit_path(DAEMON)
+    return unit.is_relative_to(PACKAGE_UNIT_DIRECTORY) and f"ExecStart={program} " in unit.read_text("utf-8")
 
 
 def own_program() -> Path:

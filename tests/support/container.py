@@ -82,11 +82,13 @@ class Container:
 
 
 @contextmanager
-def booted(read_only: Mapping[Path, Path]) -> Iterator[Container]:
+def booted(read_only: Mapping[Path, Path], root: Path | None = None) -> Iterator[Container]:
     """Boot a container in which `read_only` (outside -> inside) is mounted; it is gone after the block.
 
-    It is also gone with this process, however that ends.
+    It is also gone with this process, however that ends. root : its system, which it changes; `debian()` and only read
+    where there is none.
     """
+    system = [f"--directory={debian()}", "--volatile=overlay"] if root is None else [f"--directory={root}"]
     with tempfile.TemporaryDirectory(prefix="compd-container-") as directory:
         notified = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         address, log = Path(directory) / "notify", Path(directory) / "log"
@@ -96,7 +98,7 @@ def booted(read_only: Mapping[Path, Path]) -> Iterator[Container]:
             process = subprocess.Popen(
                 [
                     *("setpriv", "--pdeathsig=TERM", "--"),
-                    *("systemd-nspawn", "--quiet", "--boot", f"--directory={debian()}", "--volatile=overlay"),
+                    *("systemd-nspawn", "--quiet", "--boot", *system),
                     *(f"--machine=compd-test-{os.getpid()}", "--private-network", "--notify-ready=yes"),
                     # where systemd does not run outside, nobody makes a scope for the container
                     *("--register=no", *([] if Path("/run/systemd/system").is_dir() else ["--keep-unit"])),
@@ -146,25 +148,15 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-def debian() -> Path:
-    """The minimal system, of this computer's release, so that this environment's interpreter runs in it. Made once."""
-    system = platform.freedesktop_os_release()
-    release = system.get("VERSION_CODENAME", "bookworm")
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "compd-tests"
-    root = cache / "-".join((release, *PACKAGES))
-    if not root.is_dir():
-        cache.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=cache, prefix="unfinished-") as unfinished:
-            new = Path(unfinished) / "root"
-            done = subprocess.run(
-                ["debootstrap", "--variant=minbase", f"--include={','.join(PACKAGES)}", release, str(new)],
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            assert done.returncode == 0, done.stdout[-4000:] + done.stderr
-            new.rename(root)
-    return root
+def debian(release: str = "") -> Path:
+    """The minimal system, made once. release : of Debian; this computer's where it is "".
+
+    This environment's interpreter runs in this computer's release alone.
+    """
+    release = release or platform.freedesktop_os_release().get("VERSION_CODENAME", "bookworm")
+    done = subprocess.run([ROOT / "debian" / "root", release, *PACKAGES], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr[-4000:]
+    return Path(done.stdout.strip())
 
 
 def install_compd(directory: Path) -> dict[Path, Path]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -27,5 +29,7 @@ def run(config: Annotated[Path, typer.Argument(help="The machine's configuration
             configuration = load_whole(config)
         require_descriptors(len(configuration.lines))
         failed = run_daemon(configuration)
-    if failed:
-        raise typer.Exit(1)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # Python's own way to the end unloads every kernel first: a fifth of a second more without setpoints in a restart
+    os._exit(int(failed))

@@ -26,8 +26,9 @@ def install(
 ) -> None:
     """Install users, units, the udev rule and the configuration; start the daemon, and with it the page.
 
-    The services start the environment whose compd this is. Each step is a command that is printed; all of them may be
-    done again, and a file of tokens is kept. It needs root's rights.
+    The services start the environment whose compd this is. Each step is a command that is printed, with what it says;
+    all of them may be done again, and a file of tokens is kept. Of a Debian package users, units and rule are there
+    already. It needs root's rights.
     """
     from compd.errors import CompdError
     from compd.installation import install_problems, install_steps, own_program
@@ -40,8 +41,8 @@ def install(
         _require_root()
     for step in install_steps(configuration, program, page):
         typer.echo(f"# {step.purpose}\n{step}")
-        if not dry_run:
-            step.run()
+        if not dry_run and (said := step.run().rstrip()):
+            typer.echo(said)
     if not dry_run:
         typer.echo("The daemon runs. At its zero position, take machine zero: compd zero")
         typer.echo("Who takes it without being root: usermod --append --groups compd NAME, then log in again")
@@ -58,12 +59,16 @@ def upgrade(daemon: DaemonOption = DEFAULT_SOCKET) -> None:
     Call it by the path of the new environment, as in `/opt/compd-0.3/bin/compd service upgrade`. The new release checks
     the configuration and compiles what it needs while the old one goes on.
     """
-    from compd.installation import own_program
+    from compd.installation import is_packaged, own_program
     from compd.installation import upgrade as upgrade_to
 
     _require_root()
     typer.echo("The new release checks the configuration, while the old one goes on ...")
-    _report(upgrade_to(unix_address(daemon), own_program()), "compd service back: the release before")
+    program = own_program()
+    before = (
+        "The version before: install its package" if is_packaged(program) else "compd service back: the release before"
+    )
+    _report(upgrade_to(unix_address(daemon), program), before)
 
 
 @service.command()

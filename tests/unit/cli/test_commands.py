@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 import subprocess
 import sys
 
@@ -11,7 +12,7 @@ from typer.testing import CliRunner
 
 from compd.cli.app import app
 from compd.cli.commands import make_app
-from docs.generate.commands import CommandEntry, entries
+from docs.generate.command_entries import CommandEntry, entries
 
 
 def test_a_command_that_is_named_is_loaded_alone():
@@ -21,6 +22,18 @@ def test_a_command_that_is_named_is_loaded_alone():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "['compd.cli.live.run']"
+
+
+@pytest.mark.parametrize(
+    ("typed", "number", "completed"), [("compd che", 1, "check"), ("compd service u", 2, "upgrade")]
+)
+def test_a_shell_completes_commands(typed: str, number: int, completed: str) -> None:
+    asked = {"_COMPD_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(number)}
+    code = "import sys; sys.argv = ['compd']; from compd.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | asked, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.split() == [completed]
 
 
 def test_a_command_alone_is_still_called_by_its_name():

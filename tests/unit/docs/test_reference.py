@@ -36,7 +36,7 @@ from compd.recording.sidecar import Exclusion
 from compd.setpoint_states import Mode, State
 from compd.threshold import thresholds
 from docs.generate import __main__ as generate
-from docs.generate.commands import CommandEntry, entries
+from docs.generate.command_entries import CommandEntry, entries
 from docs.generate.live_examples import Exchange
 from docs.generate.protocol import c_struct, packet_rows
 from docs.generate.schema import ModelSchema, key_unit

@@ -8,7 +8,7 @@ import pytest
 
 from compd.configuration import load, shipped_configuration
 from compd.errors import CompdError
-from compd.installation import Replacement, SystemCommand, install_problems, install_steps
+from compd.installation import Replacement, SystemCommand, install_problems, install_steps, shipped_file, shipped_units
 
 PROGRAM = Path("/opt/another/bin/compd")
 
@@ -22,6 +22,35 @@ def test_units_start_the_program_and_the_check_comes_before_the_start() -> None:
     checked = next(k for k, command in enumerate(commands) if f"{PROGRAM} check" in command)
     assert checked < len(commands) - 1
     assert commands[-1] == "systemctl enable --now compd compd-page"
+
+
+@pytest.fixture
+def packaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A directory with the package's unit, which starts PROGRAM, and none in /etc."""
+    directory = tmp_path / "package"
+    directory.mkdir()
+    (directory / "compd.service").write_text(shipped_file("compd.service", PROGRAM))
+    monkeypatch.setattr(shipped_units, "PACKAGE_UNIT_DIRECTORY", directory)
+    monkeypatch.setattr(shipped_units, "UNIT_DIRECTORY", tmp_path / "etc")
+    return directory
+
+
+def test_of_a_package_users_units_and_rule_are_there_already(packaged: Path) -> None:
+    steps = install_steps(load(shipped_configuration("tripod-cmm.yaml")), PROGRAM, page=True)
+    written = [step.command[-1] for step in steps if step.text is not None]
+    assert written == ["/etc/compd/machine.yaml", "/etc/compd/page-tokens.yaml"]
+    assert str(steps[-1]) == "systemctl enable --now compd compd-page"
+
+
+@pytest.mark.parametrize("another", ["program", "unit"])
+def test_another_environment_beside_the_package_installs_units_of_its_own(packaged: Path, another: str) -> None:
+    if another == "unit":
+        own = packaged.with_name("etc")
+        own.mkdir()
+        (own / "compd.service").write_text(shipped_file("compd.service", PROGRAM))
+    program = PROGRAM if another == "unit" else Path("/opt/third/bin/compd")
+    steps = install_steps(load(shipped_configuration("tripod-cmm.yaml")), program, page=False)
+    assert "/etc/systemd/system/compd.service" in [step.command[-1] for step in steps]
 
 
 def test_without_the_page_nothing_of_it_is_installed() -> None:

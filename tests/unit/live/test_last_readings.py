@@ -68,6 +68,14 @@ def test_every_gauge_must_show_what_it_showed_however_long_the_daemon_was_away(t
     assert not found.power_lost.any()
 
 
+def test_under_a_unit_that_hides_the_kernels_files_the_start_of_the_computer_is_the_same_one(tmp_path, monkeypatch):
+    monkeypatch.setenv("COMPD_BOOT_ID", last_readings.boot_id().replace("-", ""))
+    monkeypatch.setattr(last_readings, "_BOOT_ID", tmp_path / "hidden")
+    written(tmp_path)
+    monkeypatch.undo()
+    assert not recalled(tmp_path).power_lost.any()
+
+
 def test_where_the_computer_was_started_anew_the_gauges_may_have_been_without_power(tmp_path, monkeypatch):
     written(tmp_path)
     monkeypatch.setattr(last_readings, "boot_id", lambda: "another one")
