@@ -86,7 +86,7 @@ def calibrate(
         if chosen
     )
     said("uncertainty over the workspace")
-    prediction = prediction_map(model, fit, whole)
+    prediction = prediction_map(model, fit)
     prior = whole.result.scale[parameters.block_of]
     noise_um, noise_urad = _noise_um(fit)
     registered = any(one.registration is not None for one in recordings)

@@ -65,7 +65,7 @@ class MachineFit:
         return np.asarray(self.result.C * np.outer(prior, prior))
 
     def about(self, joint: PriorFit) -> MachineFit:
-        """The same numbers, their covariance the mean square of their errors by an average over more sets."""
+        """The same numbers, their covariance the mean square of their errors by another fit of the same poses."""
         off = joint.x - self.result.x
         return replace(self, result=self.result._replace(C=joint.C + np.outer(off, off)))
 
