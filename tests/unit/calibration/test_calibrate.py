@@ -91,6 +91,7 @@ def at_one_height(world: World) -> Iterator[tuple[FloatArray, FloatArray]]:
             yield (place, np.zeros(3)) if fixed[0] else (np.zeros(3), turn)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [31, 32])
 @pytest.mark.parametrize("pose", [True, False], ids=["poses", "positions"])
 @pytest.mark.parametrize("kind", ["6-pus", "6-rus", "3-spr", "3-rps", "3-prs", "linear-delta", "rotary-delta"])
