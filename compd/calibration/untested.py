@@ -88,12 +88,12 @@ def _steps_away(model: MachineModel, places_mm: FloatArray, turns_rad: FloatArra
     for k in range(3):
         largest = int(np.abs(directions[k]).argmax())
         if spread_mm[k] < CalibrationCriteria.thin_share * widest_mm and fixed[largest]:
-            words = f"all poses lie within {4 * spread_mm[k]:.2g} mm along {'xyz'[largest]}"
+            words = f"all poses lie within {round(4 * spread_mm[k], 6):.2g} mm along {'xyz'[largest]}"
             steps.append(_Away(directions[k] * widest_mm, np.zeros(3), words, f"{widest_mm:.2g} mm"))
     for k, spread_rad in enumerate(turned_rad):
         if fixed[3 + k] and spread_rad * radius_mm < CalibrationCriteria.thin_share * widest_mm:
             turn_rad = min(widest_mm / radius_mm, CalibrationCriteria.farthest_turn)
-            words = f"all poses lie within {np.degrees(4 * spread_rad):.2g} deg about {'xyz'[k]}"
+            words = f"all poses lie within {round(np.degrees(4 * spread_rad), 6):.2g} deg about {'xyz'[k]}"
             steps.append(_Away(np.zeros(3), turn_rad * np.eye(3)[k], words, f"{np.degrees(turn_rad):.2g} deg"))
     return steps
 

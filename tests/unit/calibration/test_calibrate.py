@@ -174,6 +174,17 @@ def test_another_day_holds_and_a_rod_that_was_changed_is_named(tmp_path: Path) -
     assert changed.changes[0].change == pytest.approx(0.1, abs=4 * changed.changes[0].std)
 
 
+def test_another_day_may_have_another_instrument_and_gross_rows(tmp_path: Path) -> None:
+    world, rng = world_of(tmp_path, "6-ups", seed=10)
+    learned = opened(record(tmp_path / "poses.csv", world, rng, POSES))
+    later = opened(record(tmp_path / "positions.csv", world, rng, 40, pose=False, gross_mm={4: 0.5}))
+    check = check_calibration(compd.calibrate(learned), [learned], later)
+    assert check.holds, check.verdict
+    # the header is row 1
+    assert check.gross == (6,)
+    assert "without row 6" in check.verdict
+
+
 def test_the_result_is_plain_data(tmp_path: Path) -> None:
     world, rng = world_of(tmp_path, "3-spr", seed=8)
     result = compd.calibrate(opened(record(tmp_path / "monday.csv", world, rng, POSES)))
