@@ -18,14 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.calibration.criteria import CalibrationCriteria
 from compd.calibration.parameters import Block
 from compd.calibration.prior_fit import Normal, PriorFit
-
-# Probability, before anything is measured, that a block is off which a drawing states with a tolerance, and that a
-# block is which no drawing states: a choice.
-_OFF, _OFF_UNDRAWN = 0.75, 0.25
-# Share of the probability of the likeliest set below which a set is left out of the machine as built.
-_LIKELY_SHARE = 0.01
 
 
 class BlockSets(NamedTuple):
@@ -81,7 +76,7 @@ class BlockSets(NamedTuple):
     def likely(self, normal: Normal) -> BlockSets:
         """Those sets that the poses leave likely."""
         weight, _ = self._fits(normal)
-        kept = weight >= _LIKELY_SHARE * weight.max()
+        kept = weight >= CalibrationCriteria.likely_share * weight.max()
         return self._replace(inside=self.inside[kept], log_prior=self.log_prior[kept])
 
     def _fits(self, normal: Normal) -> tuple[FloatArray, list[tuple[IntArray, FloatArray, FloatArray]]]:
@@ -107,6 +102,6 @@ def block_sets(
     out = np.isin(np.arange(count), list(refused))
     inside = (np.arange(2**count)[:, None] >> np.arange(count) & 1).astype(bool)
     inside = inside[~inside[:, out].any(axis=1)]
-    off = np.array([_OFF if block.drawn else _OFF_UNDRAWN for block in blocks])
+    off = np.array([CalibrationCriteria.off if block.drawn else CalibrationCriteria.off_undrawn for block in blocks])
     log_prior = inside[:, ~out] @ np.log(off / (1 - off))[~out]
     return BlockSets(inside, log_prior, scale, block_of, out)

@@ -9,11 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
+from compd.calibration.criteria import CalibrationCriteria
 from compd.model.effects import FittedEffect
 from compd.text import nan_to_null
-
-# Variance of held-out errors over that of the noise above which more than noise is left: half of it has a cause.
-LEFT_OVER = 2.0
 
 
 class CalibratedNumber(NamedTuple):
@@ -263,7 +261,7 @@ class Calibration:
     @property
     def diagnose_next(self) -> bool:
         """Whether `compd diagnose` should go on: more than noise is left."""
-        return bool(np.isfinite(self.left_over) and self.left_over > LEFT_OVER)
+        return bool(np.isfinite(self.left_over) and self.left_over > CalibrationCriteria.left_over)
 
     def as_json(self) -> dict[str, Any]:
         """What `compd calibrate --json` prints, as plain data; nan is None."""

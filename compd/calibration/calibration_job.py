@@ -10,9 +10,16 @@ import numpy as np
 from compd.arrays import FloatArray, rms
 from compd.calibration.block_sets import block_sets
 from compd.calibration.calibration import CalibratedNumber, Calibration, GrossPose, TriedBlock
+from compd.calibration.criteria import CalibrationCriteria
 from compd.calibration.held_out import FEWEST_ROWS, PARTS, Fold, folds
 from compd.calibration.identifiability import held_combinations, length_scale_is_told
-from compd.calibration.machine_fit import MachineFit, fit_machine, in_likelier_coordinates, registered_mm
+from compd.calibration.machine_fit import (
+    MachineFit,
+    declared_mm,
+    fit_machine,
+    in_likelier_coordinates,
+    registered_mm,
+)
 from compd.calibration.parameters import WORDS, Parameters, calibration_parameters
 from compd.calibration.pose_errors import errors_alone, errors_of_folds
 from compd.calibration.poses import MeasuredPoses, links_of_pose
@@ -22,10 +29,6 @@ from compd.calibration.untested import Untested, untested_blocks
 from compd.comparison import AlignedRecording, compare
 from compd.errors import CompdError, Problem
 from compd.model import MachineModel
-
-# Standard deviation after over before, above which a single number counts as held at the drawing: a tolerance that is
-# wrong by a factor of two then moves it by less than its standard error.
-_TOLD_SHARE = 0.5
 
 
 def calibrate(
@@ -86,7 +89,7 @@ def calibrate(
         if chosen
     )
     said("uncertainty over the workspace")
-    prediction = prediction_map(model, fit, whole)
+    prediction = prediction_map(model, fit)
     prior = whole.result.scale[parameters.block_of]
     noise_um, noise_urad = _noise_um(fit)
     registered = any(one.registration is not None for one in recordings)
@@ -216,7 +219,7 @@ def _numbers(
                 correlation=size,
                 with_whom=parameters.elements[other] if size else "",
                 needed=bool(needed[k]),
-                held=bool(not fit.free[k] or std[k] > _TOLD_SHARE * prior[k]),
+                held=bool(not fit.free[k] or std[k] > CalibrationCriteria.told_share * prior[k]),
             )
         )
     return tuple(numbers)
@@ -276,6 +279,13 @@ def _warnings(
             "these measurements hold no scale of length: if all places and lengths were larger by one share, nothing "
             "would show. One known length tells it, such as a calibrated bar between two places of the tip."
         )
+    for now, sigma_mm in zip(fit.now, fit.sigma_mm, strict=True):
+        times = rms(sigma_mm[now.aligned.lengths]) / rms(declared_mm(now, len(sigma_mm))[now.aligned.lengths])
+        if times >= CalibrationCriteria.much_left:
+            said.append(
+                f"{now.aligned.recording.path.name}: these numbers leave {times:.0f} times the noise that its sidecar "
+                "declares. Something else moves the tip or the instrument; until it is found the numbers may be wrong."
+            )
     values = sum(len(part.z) for part in fit.linear)
     numbers = int(fit.free.sum()) + sum(part.R.shape[1] for part in fit.linear)
     if values < 2 * numbers:

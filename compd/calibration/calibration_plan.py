@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.calibration.held_out import FEWEST_ROWS
+from compd.calibration.held_out import FEWEST_ROWS, PARTS
 from compd.calibration.jacobian import pose_columns, rigid_columns, without
 from compd.calibration.parameters import Parameters, calibration_parameters
 from compd.calibration.pose_candidates import (
@@ -175,8 +175,9 @@ class PoseStudy:
                     where="plan",
                     what="has fewer poses than a calibration needs",
                     value=f"{count} poses" + (f" and {before} measured" if before else ""),
-                    allowed=f"{FEWEST_ROWS} or more in all",
-                    next_step="plan more poses, or give the recording of poses that are measured already",
+                    allowed=f"{FEWEST_ROWS} or more in all: of {PARTS} parts each is predicted from the others",
+                    next_step="plan more poses, or give the recording of those measured already: "
+                    "`compd plan RECORDING --calibrate N`",
                 )
             )
         poses = self.planned(count)

@@ -17,6 +17,7 @@ from scipy.special import chdtri, ndtri
 
 from compd.arrays import FloatArray, IntArray, rms
 from compd.calibration.calibration import Calibration, PoseErrors
+from compd.calibration.criteria import CalibrationCriteria
 from compd.calibration.jacobian import without
 from compd.calibration.machine_fit import declared_mm, gross_rows, registered_mm, scatter_mm, whitened_poses
 from compd.calibration.parameters import Parameters, calibration_parameters
@@ -25,8 +26,6 @@ from compd.calibration.poses import MeasuredPoses, PosesNow, links_of_pose
 from compd.comparison import AlignedRecording
 from compd.text import join_words, nan_to_null
 
-# Confidence, over all numbers together, beyond which a change or a misfit is more than chance.
-_CONFIDENCE = 0.999
 # Numbers of which a change is told, at most.
 _MOST = 12
 
@@ -115,7 +114,7 @@ def check_calibration(
     unit = (parameters.prior_std * parameters.per_theta)[use]
     dof = len(d) - part.R.shape[1]
     inverse = np.linalg.inv(np.eye(len(d)) + J @ C @ J.T)
-    limit = float(ndtri(1 - (1 - _CONFIDENCE) / 2 / len(use)))
+    limit = float(ndtri(1 - (1 - CalibrationCriteria.check_confidence) / 2 / len(use)))
     taken: list[int] = []
     y: FloatArray = np.zeros(0)
     covariance: FloatArray = np.zeros((0, 0))
@@ -149,7 +148,9 @@ def check_calibration(
     )
     errors = errors_alone(later.recording.path.name, poses, calibration.fitted, outlier)
     gross = tuple(later.recording.row[outlier].tolist())
-    return CalibrationCheck(errors, misfit, float(chdtri(dof, 1 - _CONFIDENCE)) / dof, changes, gross)
+    return CalibrationCheck(
+        errors, misfit, float(chdtri(dof, 1 - CalibrationCriteria.check_confidence)) / dof, changes, gross
+    )
 
 
 def _known(calibration: Calibration, parameters: Parameters, placed: bool) -> tuple[IntArray, FloatArray]:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.calibration.criteria import CalibrationCriteria
 from compd.calibration.jacobian import without
 from compd.calibration.machine_fit import MachineFit
 from compd.calibration.prior_fit import Whitened, fit_with_prior, normal_equations, open_columns, registration_of
@@ -22,8 +23,6 @@ PARTS, _DEALS = 5, 2
 _SEED = 40
 # Rows that a calibration needs: each part is predicted from the others, and has two.
 FEWEST_ROWS = 2 * PARTS
-# A direction in which poses lie within this share of the widest one has no regions.
-THIN_SHARE = 0.05
 # Rows beyond the registration's numbers that a recording needs among those learned from.
 _SPARE_VALUES = 6
 
@@ -59,7 +58,7 @@ def folds(fit: MachineFit) -> list[Fold]:
     used_mm = np.concatenate([place[now.use] for place, now in zip(places_mm, fit.now, strict=True)])
     middle_mm, directions, spread_mm = principal_directions(used_mm)
     for k in range(3):
-        if spread_mm[k] < THIN_SHARE * spread_mm[0]:
+        if spread_mm[k] < CalibrationCriteria.thin_share * spread_mm[0]:
             continue
         low, high = np.quantile((used_mm - middle_mm) @ directions[k], [1 / 3, 2 / 3])
         along = [(place - middle_mm) @ directions[k] for place in places_mm]

@@ -12,12 +12,11 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.calibration.calibration import HeldCombination
+from compd.calibration.criteria import CalibrationCriteria
 from compd.calibration.parameters import Parameters
 from compd.calibration.prior_fit import Normal
 from compd.model import MachineModel
 
-# Standard deviation after over before, above which a combination counts as held: half of its variance is left.
-_HELD_SHARE = 0.7
 # Share of a motion that lies in what is held, from which its name says what is held.
 _NAMED_SHARE = 0.7
 # Members that words name of another combination, and the share of the largest that one must have.
@@ -54,8 +53,8 @@ def held_combinations(
     relative = C[np.ix_(place, place)] / np.outer(prior[place], prior[place])
     values, vectors = np.linalg.eigh((relative + relative.T) / 2)
     shares = np.sqrt(np.clip(values, 0.0, None))
-    open_ = vectors[:, shares > _HELD_SHARE]
-    open_shares = shares[shares > _HELD_SHARE]
+    open_ = vectors[:, shares > CalibrationCriteria.held_share]
+    open_shares = shares[shares > CalibrationCriteria.held_share]
     result = []
     for motion in _motions(model, parameters):
         own = (motion.vector / prior / parameters.prior_std)[place]

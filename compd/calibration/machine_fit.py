@@ -15,6 +15,7 @@ from scipy.special import fdtri
 
 from compd.arrays import BoolArray, FloatArray, rms
 from compd.calibration.block_sets import BlockSets
+from compd.calibration.criteria import CalibrationCriteria
 from compd.calibration.parameters import Parameters
 from compd.calibration.poses import MeasuredPoses, PosesNow, links_of_pose
 from compd.calibration.prior_fit import Normal, PriorFit, Whitened, fit_with_prior, normal_equations
@@ -27,8 +28,6 @@ _ROUNDS = 12
 _SETTLED = 1e-4
 # A change, in tolerances, from which on outliers are sought: what numbers still explain makes none.
 _NEAR = 0.05
-# Confidence at which a scatter contradicts the noise that is declared.
-_CONTRADICTS = 0.99
 # Share of the measured values that count as degrees of freedom where a fit has nearly as many numbers.
 _FEWEST_SHARE = 0.1
 # Rounds in which the weights of lengths and angles settle.
@@ -65,7 +64,7 @@ class MachineFit:
         return np.asarray(self.result.C * np.outer(prior, prior))
 
     def about(self, joint: PriorFit) -> MachineFit:
-        """The same numbers, their covariance the mean square of their errors by an average over more sets."""
+        """The same numbers, their covariance the mean square of their errors by another fit of the same poses."""
         off = joint.x - self.result.x
         return replace(self, result=self.result._replace(C=joint.C + np.outer(off, off)))
 
@@ -194,9 +193,9 @@ def _sigma_mm(now: PosesNow, use: BoolArray, numbers: float) -> FloatArray:
     for part in _sections(now, len(sigma)):
         stated = declared[part]
         own = left_mm[:, part].size * dof / values
-        if np.isfinite(stated).all() and rms(sigma[part]) <= np.sqrt(float(fdtri(own, 1e9, _CONTRADICTS))) * rms(
-            stated
-        ):
+        if np.isfinite(stated).all() and rms(sigma[part]) <= np.sqrt(
+            float(fdtri(own, 1e9, CalibrationCriteria.contradicts))
+        ) * rms(stated):
             sigma[part] = stated
     return sigma
 

@@ -37,11 +37,8 @@ _GRID = 17
 _NAMES = "xyzabc"
 
 
-def prediction_map(model: MachineModel, fit: MachineFit, whole: MachineFit) -> PredictionMap | None:
-    """Of a fit's numbers; None where the tool stands on the plate, which has no places to plan.
-
-    whole : a fit of all numbers to the same recordings.
-    """
+def prediction_map(model: MachineModel, fit: MachineFit) -> PredictionMap | None:
+    """Of a fit's numbers; None where the tool stands on the plate, which has no places to plan."""
     if model.arrangement.on_plate:
         return None
     used = [now.use & ~out for now, out in zip(fit.now, fit.outlier, strict=True)]
@@ -54,8 +51,7 @@ def prediction_map(model: MachineModel, fit: MachineFit, whole: MachineFit) -> P
     spread = even_poses(model, box, _POSES, _SEED)
     planes = _planes(model, box)
     found = reachable(model, np.concatenate([spread, *(poses for *_, poses in planes)]), stroke_mm)
-    apart = whole.result.x - fit.result.x
-    near = _Moved(model, fit.parameters, whole.result.C + np.outer(apart, apart), rows)
+    near = _Moved(model, fit.parameters, fit.result.C, rows)
     std = near.standard_errors([found.rows])
     grid = np.full((len(spread) + sum(len(poses) for *_, poses in planes), 2), np.nan)
     grid[found.asked] = std

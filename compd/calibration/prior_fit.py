@@ -24,13 +24,10 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
+from compd.calibration.criteria import CalibrationCriteria
 from compd.calibration.jacobian import without
 from compd.statistics import determined, solve_least_squares
 
-# Numbers at the stated tolerance that count as seen before.
-_SEEN_BEFORE = 2.0
-# A tolerance is wrong by a hundred at most. Numbers that stand for what was left out would else grow without an end.
-_LARGEST_SCALE = 100.0
 # Rounds of expectation and maximisation, and a change of a factor that ends them.
 _ROUNDS, _SETTLED = 60, 1e-3
 
@@ -93,7 +90,8 @@ def fit_with_prior(normal: Normal, block_of: IntArray, free: BoolArray) -> Prior
         C = _inverse(A + np.diag(1.0 / scale[of_free] ** 2))
         x = C @ b
         size = np.bincount(of_free, weights=x**2 + np.diag(C), minlength=blocks)
-        new = np.clip(np.sqrt((_SEEN_BEFORE + size) / (_SEEN_BEFORE + count)), 1.0, _LARGEST_SCALE)[present]
+        spread = np.sqrt((CalibrationCriteria.seen_before + size) / (CalibrationCriteria.seen_before + count))
+        new = np.clip(spread, 1.0, CalibrationCriteria.largest_scale)[present]
         change = np.abs(new / scale[present] - 1).max()
         scale[present] = new
         if change < _SETTLED:

@@ -8,12 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray
+from compd.calibration.criteria import CalibrationCriteria
 from compd.calibration.held_out import Fold, HeldOut, held_out
 from compd.calibration.machine_fit import MachineFit
-
-# By how much a block must lower the sum of the logarithms of the two mean squares, half a percent of the error in each:
-# a number of no use moves the held-out errors of some hundred values by less.
-LEAST_FALL = 0.02
 
 
 class Selection(NamedTuple):
@@ -46,13 +43,13 @@ def select_blocks(
         for block, error in tried.items():
             without[block], with_it[block] = error, now
         least = min(kept, key=lambda block: tried[block].score)
-        if tried[least].score - now.score > LEAST_FALL:
+        if tried[least].score - now.score > CalibrationCriteria.least_fall:
             break
         kept.remove(least)
         dropped.append(least)
         now = tried[least]
     drawn = held_out(fit, free([]), parts)
-    if kept and drawn.score - now.score <= LEAST_FALL:
+    if kept and drawn.score - now.score <= CalibrationCriteria.least_fall:
         # together they do not do what each does beside the others
         dropped, kept, now = [*dropped, *kept], [], drawn
     for block in refused:

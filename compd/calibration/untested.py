@@ -3,7 +3,7 @@ measured.
 
 Gains that follow from poses at one height improve that height, and change all others by millimetres that no pose of
 the recording sees. Along a direction in which the poses are thin, and about an axis about which they hardly turn, the
-prediction is looked at as far away as the poses reach along their widest direction.
+prediction is looked at as far away as the poses reach along their widest direction, or its joints by its turns.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray, rms
-from compd.calibration.held_out import THIN_SHARE, principal_directions
+from compd.calibration.criteria import CalibrationCriteria
+from compd.calibration.held_out import principal_directions
 from compd.calibration.jacobian import pose_columns
 from compd.calibration.machine_fit import MachineFit
 from compd.calibration.pose_candidates import rows_at
@@ -21,10 +22,6 @@ from compd.model import MachineModel
 from compd.model.kinematics import Mechanism, inverse_by_actuators
 from compd.rotation import compose, rotation_matrix, rotation_vector
 
-# How many times as much as at the poses a block may change the prediction elsewhere.
-MOST_TIMES = 3.0
-# Largest turn to look at, rad.
-_FARTHEST_RAD = 0.15
 _SMALLEST_MM = 1e-9
 
 
@@ -47,8 +44,10 @@ class _Away(NamedTuple):
 
 def untested_blocks(model: MachineModel, fit: MachineFit) -> Untested:
     """What cannot be tested; nothing where the poses spread in all that a target fixes."""
-    places_mm = np.concatenate([now.aligned.rows.tip_M_mm[now.use] for now in fit.now])
-    attitudes = np.concatenate([now.aligned.rows.rotation_M_P[now.use] for now in fit.now])
+    # where the drawing has them: a fit that goes astray spreads them
+    rows = [now.poses.aligned.rows.select(np.flatnonzero(now.use)) for now in fit.now]
+    places_mm = np.concatenate([one.tip_M_mm for one in rows])
+    attitudes = np.concatenate([one.rotation_M_P for one in rows])
     turns = rotation_vector(compose(attitudes, model.zero.rotation_M_P.T))
     steps = _steps_away(model, places_mm, turns)
     if not steps:
@@ -68,7 +67,7 @@ def untested_blocks(model: MachineModel, fit: MachineFit) -> Untested:
                 here[:, :, own] @ x, np.concatenate(far)[:, :, own] @ x, places_mm, np.concatenate(beyond_mm)
             )
             times = rms(elsewhere) / max(rms(moved), _SMALLEST_MM)
-            if times > MOST_TIMES and rms(elsewhere) > _SMALLEST_MM:
+            if times > CalibrationCriteria.most_times and rms(elsewhere) > _SMALLEST_MM:
                 found[b] = (
                     f"{step.words}, and {step.far} away these numbers would change the tip {times:.0f} times as much "
                     "as at the poses. Measure poses there; until then they stay as drawn."
@@ -82,16 +81,19 @@ def _steps_away(model: MachineModel, places_mm: FloatArray, turns_rad: FloatArra
     _, directions, spread_mm = principal_directions(places_mm)
     joints_mm = model.platform_joints_P_mm - model.platform_joints_P_mm.mean(axis=0)
     radius_mm = float(np.sqrt((joints_mm**2).sum(axis=1).mean()))
+    turned_rad = turns_rad.std(axis=0)
+    # a platform that only tilts moves its joints and hardly its tip
+    widest_mm = max(float(spread_mm[0]), radius_mm * float(turned_rad.max()))
     steps = []
     for k in range(3):
         largest = int(np.abs(directions[k]).argmax())
-        if spread_mm[k] < THIN_SHARE * spread_mm[0] and fixed[largest]:
-            words = f"all poses lie within {4 * spread_mm[k]:.2g} mm along {'xyz'[largest]}"
-            steps.append(_Away(directions[k] * spread_mm[0], np.zeros(3), words, f"{spread_mm[0]:.2g} mm"))
-    for k, spread_rad in enumerate(turns_rad.std(axis=0)):
-        if fixed[3 + k] and spread_rad * radius_mm < THIN_SHARE * spread_mm[0]:
-            turn_rad = min(spread_mm[0] / radius_mm, _FARTHEST_RAD)
-            words = f"all poses lie within {np.degrees(4 * spread_rad):.2g} deg about {'xyz'[k]}"
+        if spread_mm[k] < CalibrationCriteria.thin_share * widest_mm and fixed[largest]:
+            words = f"all poses lie within {round(4 * spread_mm[k], 6):.2g} mm along {'xyz'[largest]}"
+            steps.append(_Away(directions[k] * widest_mm, np.zeros(3), words, f"{widest_mm:.2g} mm"))
+    for k, spread_rad in enumerate(turned_rad):
+        if fixed[3 + k] and spread_rad * radius_mm < CalibrationCriteria.thin_share * widest_mm:
+            turn_rad = min(widest_mm / radius_mm, CalibrationCriteria.farthest_turn)
+            words = f"all poses lie within {round(np.degrees(4 * spread_rad), 6):.2g} deg about {'xyz'[k]}"
             steps.append(_Away(np.zeros(3), turn_rad * np.eye(3)[k], words, f"{np.degrees(turn_rad):.2g} deg"))
     return steps
 

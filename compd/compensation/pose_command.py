@@ -12,6 +12,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
+from compd.compensation.followed_start import followed_to_target
 from compd.compensation.values import Compensation, Contributions, GaugeValues, WarmStart
 from compd.model import MachineModel, tip_by_scales
 from compd.model.kernels import Reason
@@ -39,26 +40,10 @@ def scales_of_command(model: MachineModel, tip_mm: FloatArray, rotation_rad: Flo
         rows = slice(begin, begin + _ROWS_AT_ONCE)
         values = GaugeValues(scale_mm[rows], nowhere, _NO_LENGTHS, {})
         turned = rotation_rad[rows] if rotation_rad is not None and model.attitude_is_free else None
-        found, _ = compensate_machine_tool(drawn, tip_mm[rows], turned, values, _start(drawn, tip_mm[rows]))
+        found, _ = compensate_machine_tool(drawn, tip_mm[rows], turned, values, followed_to_target(drawn, tip_mm[rows]))
         solved = found.reason == Reason.OK
         scale_mm[rows][solved] = found.nominal_scale_mm[solved]
     return scale_mm
-
-
-def _start(model: MachineModel, tip_mm: FloatArray) -> WarmStart:
-    """At the commanded tips with the attitude as at machine zero, and where there is no such pose at machine zero."""
-    start = WarmStart.at_zero(model)
-    if model.attitude_is_free and start.actuator_mm is None:
-        return start
-    tip_M_mm = model.arrangement.target_contact(model.frame, tip_mm).tip_M_mm
-    pose, scale_mm = model.reach(np.broadcast_to(tip_M_mm, tip_mm.shape))
-    known = pose.reason == Reason.OK
-    return start._replace(
-        supports_M_mm=np.broadcast_to(start.supports_M_mm, (len(known), 3, 3)),
-        origin_M_mm=np.where(known[:, None], pose.origin_M_mm, start.origin_M_mm),
-        rotation_M_P=np.where(known[:, None, None], pose.rotation_M_P, start.rotation_M_P),
-        actuator_mm=None if start.actuator_mm is None else start.actuator_mm + np.where(known[:, None], scale_mm, 0.0),
-    )
 
 
 def command_pose(model: MachineModel, wanted: Compensation) -> Compensation:
@@ -71,7 +56,10 @@ def command_pose(model: MachineModel, wanted: Compensation) -> Compensation:
     nowhere, zero = np.zeros(model.joint_weights.shape[1]), model.zero
     drawn = replace(model, effects=())
     values = GaugeValues(wanted.scale_setpoint_mm, nowhere, _NO_LENGTHS, {})
-    start = WarmStart.at_zero(drawn)
+    # the wanted pose is a correction away from both
+    start = WarmStart.at_zero(drawn)._replace(
+        origin_M_mm=wanted.tip_M_mm - wanted.rotation_M_P @ wanted.tip_P_mm, rotation_M_P=wanted.rotation_M_P
+    )
     command, _ = compensate_cmm(drawn, values, start)
     nominal, _ = compensate_cmm(drawn, values._replace(scale_mm=wanted.nominal_scale_mm), start)
     rotation_M_B = model.frame.zero_rotation_M_B

@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from compd.calibration.criteria import CalibrationCriteria
 from compd.comparison import ComparisonCriteria
 from compd.diagnosis import Criteria
 from compd.fleet.criteria import FleetCriteria
@@ -27,10 +28,11 @@ def counts() -> dict[str, Any]:
 
 
 INTRODUCTION = f"""\
-The result of `compd compare`, the verdict of `compd diagnose`, and what `compd fleet report` names rest on the numbers
-of this page. What else stands as a number in the program is rounding, the end of an iteration, the definition of a
-published method, memory and time, or the form of sentences and plans; `compd.diagnosis.criteria` states the rule. How
-a recording is joined and read has its own limits, beyond which `compd join` and `compd recording check` ask or refuse.
+The result of `compd compare`, the verdict of `compd diagnose`, and what `compd fleet report` and `compd calibrate`
+name rest on the numbers of this page. What else stands as a number in the program is rounding, the end of an iteration,
+the definition of a published method, memory and time, or the form of sentences and plans; `compd.diagnosis.criteria`
+states the rule. How a recording is joined and read has its own limits, beyond which `compd join` and
+`compd recording check` ask or refuse.
 
 Each has its default, its unit, its meaning, and the reason for its value; a reason that begins with "A choice" says
 that there is no derivation. [How a verdict is reached](../explanation/how-a-verdict-is-reached.md) shows where each
@@ -66,6 +68,11 @@ by its name on this page:
 """
 
 
+CALIBRATION = """\
+These are the same for every calibration: no argument changes them.
+[How a calibration is reached](../explanation/how-a-calibration-is-reached.md) shows where each enters.
+"""
+
 DATA = """\
 These hold wherever a recording is read, before any other criterion. Rows that are right all the same are named under
 `trusted_rows:` in the sidecar.
@@ -81,6 +88,8 @@ def page() -> str:
         _part("Diagnosis", "diagnosis", Criteria),
         _part("Comparison", "comparison", ComparisonCriteria),
         _part("A fleet of machines", "fleet", FleetCriteria),
+        _part("Calibration", "calibration", CalibrationCriteria),
+        CALIBRATION,
         _part("Data that are wrong", "data", FaultCriteria),
         DATA,
     )

@@ -21,6 +21,7 @@ from compd.compensation import (
     command_pose,
     compensate_cmm,
     external_as_applied,
+    first_start,
 )
 from compd.errors import StateError
 from compd.live.loop.commands import Target
@@ -169,11 +170,11 @@ def _compute(
         scale_mm, change_mm[:joints], change_mm[joints:], comparators.quantities, snapshot.time_s, zero.quantities
     )
     machine = applied.machine if usable.weight == 1.0 else applied.machine.with_effect_weight(usable.weight)
-    started = state.warm_start
+    started = first_start(machine, state.warm_start, values, None if target is None else target.tip_mm)
     compensation, warm_start, at_scale_mm = _compensated(machine, values, target, started, settings)
     scales_seen = state.scales_seen or target is None
     if code := int(compensation.reason):
-        # a warm start that failed once may fail for ever: the next cycle starts from machine zero
+        # a warm start that failed once may fail for ever: the next cycle is followed from machine zero
         warm_start = WarmStart.at_zero(settings.model)._replace(effects=warm_start.effects)
         state = state._replace(warm_start=warm_start, last_good=last_good, scales_seen=scales_seen)
         return _Outcome(State.REFUSED, _refusal(code, machine, values, target, started, wires)), state

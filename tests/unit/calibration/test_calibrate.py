@@ -14,7 +14,7 @@ from compd.arrays import FloatArray
 from compd.calibration import check_calibration
 from compd.comparison import AlignedRecording
 from compd.machine_kinds import KINDS
-from tests.support.built_machines import NOISE_MM, World, built, deviations, drawing, record
+from tests.support.built_machines import NOISE_MM, REACH_MM, REACH_RAD, World, built, deviations, drawing, record
 
 POSES = 60
 
@@ -80,6 +80,30 @@ def test_gains_from_one_height_stay_as_drawn_with_a_warning(tmp_path: Path) -> N
     result = compd.calibrate(opened(record(tmp_path / "flat.csv", world, rng, 64, flat(world, rng))))
     assert not next(block for block in result.blocks if block.name == "scale_gain_change").needed
     assert any("along z" in warning and "no pose of these tests" in warning for warning in result.warnings)
+
+
+def at_one_height(world: World) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """A grid in x and y, or in two turns where a target fixes no x and y, at the height of machine zero."""
+    fixed = world.drawn.fixed
+    for a in np.linspace(-1, 1, 8):
+        for b in np.linspace(-1, 1, 8):
+            place, turn = np.array([a, b, 0.0]) * REACH_MM, np.array([a, b, 0.0]) * REACH_RAD
+            yield (place, np.zeros(3)) if fixed[0] else (np.zeros(3), turn)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [31, 32])
+@pytest.mark.parametrize("pose", [True, False], ids=["poses", "positions"])
+@pytest.mark.parametrize("kind", ["6-pus", "6-rus", "3-spr", "3-rps", "3-prs", "linear-delta", "rotary-delta"])
+def test_poses_at_one_height_end_in_refusals_or_warnings(kind: str, pose: bool, seed: int, tmp_path: Path) -> None:
+    world, rng = world_of(tmp_path, kind, seed, tolerance_mm=1.0)
+    world = world._replace(bend=60e-6 * rng.standard_normal(world.drawn.scales))
+    learned = record(tmp_path / "flat.csv", world, rng, 64, at_one_height(world), pose=pose)
+    try:
+        result = compd.calibrate(opened(learned))
+    except compd.CompdError:
+        return
+    assert any("along z" in warning for warning in result.warnings)
 
 
 def test_several_recordings_with_instruments_of_their_own_tell_more_than_one(tmp_path: Path) -> None:
@@ -148,6 +172,17 @@ def test_another_day_holds_and_a_rod_that_was_changed_is_named(tmp_path: Path) -
     assert not changed.holds
     assert [change.element for change in changed.changes] == ["rod 3 length"]
     assert changed.changes[0].change == pytest.approx(0.1, abs=4 * changed.changes[0].std)
+
+
+def test_another_day_may_have_another_instrument_and_gross_rows(tmp_path: Path) -> None:
+    world, rng = world_of(tmp_path, "6-ups", seed=10)
+    learned = opened(record(tmp_path / "poses.csv", world, rng, POSES))
+    later = opened(record(tmp_path / "positions.csv", world, rng, 40, pose=False, gross_mm={4: 0.5}))
+    check = check_calibration(compd.calibrate(learned), [learned], later)
+    assert check.holds, check.verdict
+    # the header is row 1
+    assert check.gross == (6,)
+    assert "without row 6" in check.verdict
 
 
 def test_the_result_is_plain_data(tmp_path: Path) -> None:

@@ -59,6 +59,14 @@ def test_the_scale_of_a_block_follows_from_its_numbers() -> None:
     assert result.scale[1] == pytest.approx(0.3, rel=0.4)
 
 
+def test_a_tolerance_is_scaled_by_a_hundred_at_most() -> None:
+    J = 1e3 * np.eye(5)
+    one = part(J, np.full(5, 1e5), np.zeros((5, 0)), np.zeros(0))
+    result = fit_with_prior(normal_equations([one]), BLOCK_OF, ALL)
+    assert result.scale.max() == 100.0
+    np.testing.assert_allclose(result.x, 1e5, rtol=1e-6)
+
+
 def test_intervals_hold_numbers_of_which_a_block_may_be_as_drawn() -> None:
     """Pooled over drawn machines; of 4,000 numbers a share of 95 % has a standard deviation of 0.4 %."""
     inside = []

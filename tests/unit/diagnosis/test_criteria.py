@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import compd
+from compd.calibration.criteria import CalibrationCriteria
 from compd.comparison import AlignedRecording, ComparisonCriteria
 from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.recording_diagnosis import diagnose
@@ -27,7 +28,10 @@ PLAY = along("x", "play", "k * moved_1", parameters={"k": {"unit": "um", "plausi
 WINDUP = along("x", "windup", "k * moved_1 * (1 + position_mm / 4000)")
 
 
-@pytest.mark.parametrize("threshold", THRESHOLDS.values(), ids=THRESHOLDS)
+DOCUMENTED = {**THRESHOLDS, **thresholds(CalibrationCriteria)}
+
+
+@pytest.mark.parametrize("threshold", DOCUMENTED.values(), ids=DOCUMENTED)
 def test_every_threshold_says_what_it_means_in_which_unit_and_why(threshold: Field[Any]) -> None:
     assert set(threshold.metadata) == {"unit", "meaning", "reason"}
     assert all(text.strip() for text in threshold.metadata.values())

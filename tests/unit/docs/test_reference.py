@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from compd.calibration.criteria import CalibrationCriteria
 from compd.columns import COLUMN_KINDS, parse_name
 from compd.comparison import ComparisonCriteria
 from compd.configuration import SECTIONS, json_schema
@@ -46,7 +47,9 @@ MAX_TABLE = 4
 MESSAGES = [*REQUESTS.values(), *SENT_MESSAGES.values()]
 FILES = [ModelDocument, EffectEntry, ParameterEntry, ModelStep, FormulaDeclaration, FormulaParameter]
 THRESHOLDS = [
-    (name, field) for kind in (Criteria, ComparisonCriteria, FleetCriteria) for name, field in thresholds(kind).items()
+    (name, field)
+    for kind in (Criteria, ComparisonCriteria, FleetCriteria, CalibrationCriteria)
+    for name, field in thresholds(kind).items()
 ]
 
 
