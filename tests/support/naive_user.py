@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any, NamedTuple
 
 # Of a fit, a diagnosis or a page that starts, on a busy computer.
@@ -17,7 +18,7 @@ class Offered(NamedTuple):
 
 
 class NaiveUser:
-    """Uses the workbench in a tab; always takes the effect on top of the list."""
+    """Uses the page in a tab; of effects always takes the one on top of the list."""
 
     def __init__(self, tab: Any) -> None:
         self.tab = tab
@@ -30,6 +31,16 @@ class NaiveUser:
     def follow(self, name: str) -> None:
         """Follow a link."""
         self.tab.get_by_role("link", name=name).first.click()
+
+    def write(self, field: str, text: str) -> None:
+        """Write into the field of that name, and leave it."""
+        text_field, number_field = (self.tab.get_by_role(r, name=field, exact=True) for r in ("textbox", "spinbutton"))
+        text_field.or_(number_field).fill(text)
+        self.tab.keyboard.press("Tab")
+
+    def bring(self, field: str, file: Path) -> None:
+        """Give a file of this computer to the field of that name."""
+        self.tab.get_by_label(field).last.set_input_files(file)
 
     def open(self, recording: str, model: str) -> None:
         """Choose a recording, name a model, and wait for the effects."""
@@ -45,6 +56,11 @@ class NaiveUser:
     def see(self, text: str | re.Pattern[str]) -> None:
         """Wait until this can be read."""
         self.tab.get_by_text(text).filter(visible=True).first.wait_for()
+
+    def error_um(self) -> float:
+        """The model's error, as the bar on top is described to who does not see it."""
+        described = self.tab.get_by_role("img", name=re.compile("^The error as a bar")).get_attribute("aria-label")
+        return float(re.search(r"([\d.]+) now", described)[1])  # type: ignore[index]
 
     def propose_top(self) -> Offered:
         """Choose the effect on top, fit it, ask to add it, and read what is said."""

@@ -165,9 +165,13 @@ def test_the_wall_is_read_from_three_metres(tab, page, width, height):
 
 
 def test_a_phone_shows_reason_remedy_and_orders_first_and_cuts_nothing(chromium, page):
-    lose(page.link, LONG)
+    page.link.tell(State.OK, "")
     with opened(chromium, page, viewport={"width": 390, "height": 844}, has_touch=True) as tab:
+        shown(tab, "OK")
+        tape = tab.locator("#tape").bounding_box()
+        lose(page.link, LONG)
         shown(tab, "STOP")
+        assert tab.locator("#tape").bounding_box() == tape
         until(tab, "document.querySelectorAll('#gauge-table tbody tr').length === 3")
         assert tab.evaluate(INSIDE)
         assert tab.evaluate(CUT) == []

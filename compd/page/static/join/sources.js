@@ -16,6 +16,7 @@ export class Sources {
   }
 
   bring(wizard, input, choose) {
+    input.disabled = true; // until it is known whether this browser may
     input.addEventListener("change", () => {
       const [file] = input.files;
       if (file) wizard.attempt(async () => choose(await wizard.bring(file))).finally(() => (input.value = ""));

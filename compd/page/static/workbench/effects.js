@@ -64,7 +64,8 @@ export class Effects {
 
   draw() {
     const shown = this.shown;
-    this.note.textContent = this.noise || `${shown.length} of ${this.all.length}; what each explains alone, on rows left out`;
+    // the verdict on top says it whole
+    this.note.textContent = this.noise ? this.noise.split(/[:.] /)[0] : `${shown.length} of ${this.all.length}; what each explains alone, on rows left out`;
     this.place.classList.toggle("noise-only", Boolean(this.noise));
     this.place.replaceChildren(...shown.map((effect) => this.row(effect)));
   }

@@ -45,8 +45,9 @@ const firstSteps = { begin: ({ summary }) => (at("first-steps").hidden = summary
 bench.panels = [firstSteps, strip, picture, exclusions, card, ledger, diagnosis, effects, formula, plan, new LiveModel(at("live-model"))];
 bindKeys({ bench, picture, selection, exclusions, card, effects, ledger, diagnosis });
 
-// what is scrolled to stays below the header, which is always in sight
-new ResizeObserver(() => (document.documentElement.style.scrollPaddingTop = `${at("strip").offsetHeight + 8}px`)).observe(at("strip"));
+// what is scrolled to stays below the header, where that is always in sight
+const header = at("strip");
+new ResizeObserver(() => (document.documentElement.style.scrollPaddingTop = getComputedStyle(header).position === "sticky" ? `${header.offsetHeight + 8}px` : "")).observe(header);
 
 const open = () => bench.attempt(() => bench.open(at("recording").value, at("model").value.trim(), [...document.querySelectorAll("#libraries input:checked")].map(({ value }) => value)));
 at("open").addEventListener("click", open);
