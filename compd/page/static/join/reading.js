@@ -1,5 +1,5 @@
 // Reading of the export: its first rows, the role of each column, and further options.
-import { element } from "../format.js";
+import { element, micro } from "../format.js";
 import { Columns } from "./columns.js";
 import { Check, Choice, Quantity } from "./fields.js";
 
@@ -7,6 +7,7 @@ const ROLES = [["time", "time"], ["time[s]", "time, s"], ["time[ms]", "time, ms"
 const LENGTHS = ["mm", "um", "m", "cm", "inch", "ft"];
 const ANGLES = ["rad", "mrad", "deg", "arcsec"];
 const each = (values) => values.map((value) => [value, value]);
+const units = (values) => values.map((value) => [value, micro(value)]);
 const bare = (role) => role.replace(/\[.*/, "");
 
 export class Reading extends Columns {
@@ -14,8 +15,8 @@ export class Reading extends Columns {
     super(wizard, parts, "columns", "");
     this.fields = {
       shape: new Choice(wizard, "shape", "Shape"),
-      unit: new Choice(wizard, "unit", "Unit of lengths", each(LENGTHS)),
-      angle_unit: new Choice(wizard, "angle_unit", "Unit of angles", each(ANGLES)),
+      unit: new Choice(wizard, "unit", "Unit of lengths", units(LENGTHS)),
+      angle_unit: new Choice(wizard, "angle_unit", "Unit of angles", units(ANGLES)),
       angles: new Choice(wizard, "angles", "What the angles are"),
       decimal: new Choice(wizard, "decimal", "Decimal sign", [[".", "point"], [",", "comma"]]),
       dates: new Choice(wizard, "dates", "Order of dates", [["dmy", "day month year"], ["mdy", "month day year"], ["ymd", "year month day"]]),
