@@ -27,7 +27,7 @@ export class Reading extends Columns {
     };
     this.guess = element("button", { type: "button", id: "guess", onclick: () => wizard.change({ columns: null }) }, "Guess the columns again");
     // a role, as those in the table are
-    this.visits = element("select", { id: "choice-visits", onchange: () => this.chooseVisits() });
+    this.visits = element("select", { id: "choice-visits", disabled: true, onchange: () => this.chooseVisits() }, element("option", {}, "detected"));
     this.visitsLabel = element("label", {}, "Visits", this.visits);
     fields.replaceChildren(...Object.values(this.fields).map((field) => field.label), this.visitsLabel, this.guess);
   }
@@ -43,7 +43,7 @@ export class Reading extends Columns {
     if (table === this.shown) return;
     this.shown = table;
     this.showWhole(table, "choose an export");
-    this.visitsLabel.hidden = !table;
+    this.visits.disabled = !table;
     if (!table) return;
     this.showVisits(table, choices.by || table.by);
     const { shape, unit, angle_unit, angles, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
