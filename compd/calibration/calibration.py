@@ -167,13 +167,6 @@ class PredictionMap(NamedTuple):
             f"largest {largest}{turned}; at the measured poses {np.median(self.measured_std_um):.3g} um (median)."
         )
 
-    @property
-    def slice_groups(self) -> tuple[tuple[PredictionSlice, ...], ...]:
-        """The slices through places alone, and the others."""
-        places = tuple(one for one in self.slices if one.up in "xyz")
-        turns = self.slices[len(places) :]
-        return tuple(group for group in (places, turns) if group)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:

@@ -27,11 +27,9 @@ from compd.units import unit_factor, unit_named, unit_of
 # "X [mm]", "A (deg)", "X / mm", "X_mm": the name and its unit.
 _WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(]\s*(?P<in>[^\])]+?)\s*[\])]|/\s*(?P<after>\w+)|[_ ](?P<end>\w+))$")
 _FORM = '--log "X [mm]=commanded_x_mm", or with the unit --log X=commanded_x_mm:mm'
-<<<<<<< HEAD
-_OWN_NAME = re.compile(r"(scale|commanded|temperature|force)_\w+|time_s|point|visit|session")
-=======
-_OWN_NAME = re.compile(r"(scale|joint|frame|commanded|temperature|force|pressure|humidity)_\w+|time_s|point")
->>>>>>> ha
+_OWN_NAME = re.compile(
+    r"(scale|joint|frame|commanded|temperature|force|pressure|humidity)_\w+|time_s|point|visit|session"
+)
 _TIME = "time_s"
 # Options of the reader that `join` has for the export, and once more for the log.
 _READ_OPTION = re.compile(r"--(?=(?:as|sheet|decimal|dates|clock-set-back|angles)\b)")

@@ -10,7 +10,7 @@ from plotly.graph_objects import Bar, Figure, Heatmap, Scatter, Scatter3d
 from plotly.subplots import make_subplots
 
 from compd.arrays import BoolArray, FloatArray, rms
-from compd.calibration import CalibratedNumber, Calibration, PoseErrors, PredictionMap
+from compd.calibration import CalibratedNumber, Calibration, PoseErrors, PredictionMap, PredictionSlice
 from compd.display_unit import format_error
 from compd.report.figures import ARROW_SHARE, ARROWS
 from compd.report.page import COLOURS, Panel, style_figure, write_page
@@ -19,6 +19,8 @@ from compd.report.small_multiples import NOT_RECORDED, thin
 from compd.text import join_words, number_text
 from compd.units import UM_PER_MM
 
+# Height of a slice of the map.
+MAP_PX = 330
 # Names and colours of the two states, on every figure of the page.
 STATES = (("as drawn", COLOURS["worst"]), ("calibrated", COLOURS["best"]))
 # A smaller range of turns is not mentioned: a decimal of a degree would not show it.
@@ -159,62 +161,51 @@ def _prediction(prediction: PredictionMap | None) -> Panel:
     name = "How uncertain the prediction is"
     if prediction is None or not prediction.slices:
         return Panel(name, "Not computed: the machine has no places of its own to plan.", NOT_RECORDED)
+    slices = prediction.slices
     # an attitude that no target fixes follows from the place, and needs no map of its own
+    stds = {"um": [one.std_um for one in slices], "urad": [one.std_urad for one in slices]}
     kinds = ["um", "urad"] if prediction.turn_rad.any() else ["um"]
-    panels = [(kind, group) for kind in kinds for group in prediction.slice_groups]
-    figure = make_subplots(
-        len(panels),
-        len(prediction.slice_groups[0]),
-        subplot_titles=[
-            f"{'tip' if kind == 'um' else 'attitude'}, {kind}" + (f"<br>{one.held}" if one.held else "")
-            for kind, group in panels
-            for one in group
-        ],
-        horizontal_spacing=0.09,
-        vertical_spacing=0.44 / len(panels),
-    )
-    style_figure(figure, "", "", 60 + 370 * len(panels)).update_annotations(font_size=13)
     poses = np.concatenate([prediction.measured_mm, np.degrees(prediction.measured_rad)], axis=1)
     poses = poses[thin(np.arange(len(poses)), ARROWS)]
-    for row, (kind, group) in enumerate(panels, start=1):
-        for col, one in enumerate(group, start=1):
-            sides = [_side(name, at) for name, at in ((one.across, one.across_at), (one.up, one.up_at))]
-            (across, across_title), (up, up_title) = sides
-            cells = Heatmap(
-                x=across,
-                y=up,
-                z=one.std_um if kind == "um" else one.std_urad,
-                coloraxis="coloraxis" if kind == "um" else "coloraxis2",
-                hovertemplate=f"%{{z:.3g}} {kind} at %{{x:.4g}}, %{{y:.4g}}<extra></extra>",
-            )
-            dots = Scatter(
-                x=poses[:, "xyzabc".index(one.across)],
-                y=poses[:, "xyzabc".index(one.up)],
-                mode="markers",
-                name="measured poses, seen along the slice's normal",
-                showlegend=row == col == 1,
-                marker={"size": 5, "color": "white", "line": {"width": 1, "color": "black"}},
-                hoverinfo="skip",
-            )
-            figure.add_trace(cells, row=row, col=col)
-            figure.add_trace(dots, row=row, col=col)
-            figure.update_xaxes(title_text=across_title, title_standoff=4, row=row, col=col)
-            figure.update_yaxes(title_text=up_title, title_standoff=2, row=row, col=col)
-    scales = {
-        "coloraxis" if k == 0 else "coloraxis2": {
-            "colorscale": "Viridis",
-            "cmin": 0.0,
-            "colorbar": {"title": kind, "thickness": 14, "len": 0.9 / len(kinds), "y": 1 - (k + 0.5) / len(kinds)},
-        }
-        for k, kind in enumerate(kinds)
-    }
-    figure.update_layout(margin={"r": 80, "t": 100}, legend={"y": 1 + 80 / (370 * len(panels))}, **scales)
+    figures = [
+        _slice_figure(one, std, kind, float(np.nanmax(stds[kind])), poses)
+        for kind in kinds
+        for one, std in zip(slices, stds[kind], strict=True)
+    ]
     text = (
         f"{prediction.words} It follows from the covariance of all numbers; what is held counts with its tolerance. "
-        "Left out are the noise of a measurement and a motion of the whole machine. White: not reached."
-        + _turned(prediction.measured_rad)
+        "Left out are the noise of a measurement and a motion of the whole machine. Dots: measured poses, seen along "
+        "the slice's normal. White: not reached." + _turned(prediction.measured_rad)
     )
-    return Panel(name, text, figure)
+    return Panel(name, text, figures)
+
+
+def _slice_figure(one: PredictionSlice, std: FloatArray, kind: str, largest: float, poses: FloatArray) -> Figure:
+    """One slice. largest : end of the scale of colours. poses : (N, 6), mm and degrees."""
+    (across, across_title), (up, up_title) = _side(one.across, one.across_at), _side(one.up, one.up_at)
+    cells = Heatmap(
+        x=across,
+        y=up,
+        z=std,
+        zmin=0.0,
+        zmax=largest,
+        colorscale="Viridis",
+        colorbar={"title": kind, "thickness": 12},
+        hovertemplate=f"%{{z:.3g}} {kind} at %{{x:.4g}}, %{{y:.4g}}<extra></extra>",
+    )
+    dots = Scatter(
+        x=poses[:, "xyzabc".index(one.across)],
+        y=poses[:, "xyzabc".index(one.up)],
+        mode="markers",
+        marker={"size": 5, "color": "white", "line": {"width": 1, "color": "black"}},
+        hoverinfo="skip",
+    )
+    figure = style_figure(Figure([cells, dots]), across_title, up_title, MAP_PX)
+    title = f"{'tip' if kind == 'um' else 'attitude'}, {kind}" + (f", at {one.held}" if one.held else "")
+    figure.update_yaxes(title_standoff=2)
+    return figure.update_layout(
+        title={"text": title, "font": {"size": 13}}, showlegend=False, margin={"t": 50, "l": 60}
+    )
 
 
 def _turned(turn_rad: FloatArray) -> str:

@@ -67,11 +67,18 @@ class PageText:
 
 @dataclass(frozen=True)
 class Panel:
-    """A heading, a sentence on how to read it, and a figure, a table or lines of text."""
+    """A heading, a sentence on how to read it, and a figure, several side by side, a table or lines of text."""
 
     title: str
     caption: str
-    content: Figure | PageTable | PageText
+    content: Figure | Sequence[Figure] | PageTable | PageText
+
+    @property
+    def figures(self) -> Sequence[Figure]:
+        """The figures of the panel; empty for tables and text."""
+        if isinstance(self.content, Figure):
+            return [self.content]
+        return [] if isinstance(self.content, PageTable | PageText) else self.content
 
 
 def check_page_path(path: Path, overwrite: bool | None = None) -> None:
@@ -92,7 +99,7 @@ def write_page(
     shared_script : plotly's script (4.8 MB) is inside a page with figures, which is then a single file. True writes it
     to SHARED_SCRIPT beside the page instead, where all pages of a directory share it.
     """
-    has_figure = any(isinstance(panel.content, Figure) for panel in panels)
+    has_figure = any(panel.figures for panel in panels)
     if shared_script:
         path.with_name(SHARED_SCRIPT).write_text(get_plotlyjs(), encoding="utf-8")
     page = _template().render(
@@ -105,7 +112,10 @@ def write_page(
                 "caption": panel.caption,
                 "table": panel.content if isinstance(panel.content, PageTable) else None,
                 "lines": panel.content.html if isinstance(panel.content, PageText) else None,
-                "figure": _figure_html(panel.content, number) if isinstance(panel.content, Figure) else "",
+                "figures": [
+                    _figure_html(figure, f"{number}-{k}" if k else str(number))
+                    for k, figure in enumerate(panel.figures)
+                ],
             }
             for number, panel in enumerate(panels)
         ],
@@ -151,7 +161,7 @@ def _template() -> Template:
     return environment.get_template("page.html")
 
 
-def _figure_html(figure: Figure, number: int) -> str:
+def _figure_html(figure: Figure, number: str) -> str:
     """The figure as an element of its own; plotly's script is in the page's head."""
     return str(
         to_html(

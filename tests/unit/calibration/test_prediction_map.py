@@ -56,8 +56,8 @@ def test_slices_cover_the_workspace_with_the_measured_poses(tmp_path: Path) -> N
 
 def test_slices_of_a_hexapod_are_through_places_and_through_turns(tmp_path: Path) -> None:
     _, prediction = learned_in_the_middle("6-ups", tmp_path)
-    places, turns = prediction.slice_groups
-    assert [one.across + one.up for one in (*places, *turns)] == ["xy", "xz", "yz", "ab", "ac", "bc"]
+    places, turns = prediction.slices[:3], prediction.slices[3:]
+    assert [one.across + one.up for one in prediction.slices] == ["xy", "xz", "yz", "ab", "ac", "bc"]
     assert places[0].held.endswith("mm, no turn")
     for one in turns:
         measured_rad = prediction.measured_rad[:, "abc".index(one.across)]

@@ -1,5 +1,5 @@
 // Reading of the machine's own log: its first rows, what each column is in a recording, and in which unit.
-import { element } from "../format.js";
+import { element, micro } from "../format.js";
 import { Columns } from "./columns.js";
 import { Check, Choice } from "./fields.js";
 
@@ -51,7 +51,7 @@ export class LogReading extends Columns {
     const list = this.roleList(k, [["-", "unused"], ...names.map((known) => [known, known])], name);
     const units = UNITS[name.replace(/.*_/, "")];
     if (!units) return list;
-    const options = [["", "unit: as its name says"], ...units.map((unit) => [unit, unit])];
+    const options = [["", "unit: as its name says"], ...units.map((unit) => [unit, micro(unit)])];
     const unit = element("select", { id: `log-unit-${k}`, "aria-label": `Unit of column ${k + 1}` }, ...options.map(([value, text]) => element("option", { value, selected: value === unitOf(role) }, text)));
     unit.addEventListener("change", () => this.change(k, unit.value ? `${name}:${unit.value}` : name));
     return element("span", { class: "roles" }, list, unit);

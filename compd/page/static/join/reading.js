@@ -1,5 +1,5 @@
 // Reading of the export: its first rows, the role of each column, and further options.
-import { element } from "../format.js";
+import { element, micro } from "../format.js";
 import { Columns } from "./columns.js";
 import { Check, Choice, Quantity } from "./fields.js";
 
@@ -7,6 +7,7 @@ const ROLES = [["time", "time"], ["time[s]", "time, s"], ["time[ms]", "time, ms"
 const LENGTHS = ["mm", "um", "m", "cm", "inch", "ft"];
 const ANGLES = ["rad", "mrad", "deg", "arcsec"];
 const each = (values) => values.map((value) => [value, value]);
+const units = (values) => values.map((value) => [value, micro(value)]);
 const bare = (role) => role.replace(/\[.*/, "");
 
 export class Reading extends Columns {
@@ -14,8 +15,8 @@ export class Reading extends Columns {
     super(wizard, parts, "columns", "");
     this.fields = {
       shape: new Choice(wizard, "shape", "Shape"),
-      unit: new Choice(wizard, "unit", "Unit of lengths", each(LENGTHS)),
-      angle_unit: new Choice(wizard, "angle_unit", "Unit of angles", each(ANGLES)),
+      unit: new Choice(wizard, "unit", "Unit of lengths", units(LENGTHS)),
+      angle_unit: new Choice(wizard, "angle_unit", "Unit of angles", units(ANGLES)),
       angles: new Choice(wizard, "angles", "What the angles are"),
       decimal: new Choice(wizard, "decimal", "Decimal sign", [[".", "point"], [",", "comma"]]),
       dates: new Choice(wizard, "dates", "Order of dates", [["dmy", "day month year"], ["mdy", "month day year"], ["ymd", "year month day"]]),
@@ -26,7 +27,7 @@ export class Reading extends Columns {
     };
     this.guess = element("button", { type: "button", id: "guess", onclick: () => wizard.change({ columns: null }) }, "Guess the columns again");
     // a role, as those in the table are
-    this.visits = element("select", { id: "choice-visits", onchange: () => this.chooseVisits() });
+    this.visits = element("select", { id: "choice-visits", disabled: true, onchange: () => this.chooseVisits() }, element("option", {}, "detected"));
     this.visitsLabel = element("label", {}, "Visits", this.visits);
     fields.replaceChildren(...Object.values(this.fields).map((field) => field.label), this.visitsLabel, this.guess);
   }
@@ -42,7 +43,7 @@ export class Reading extends Columns {
     if (table === this.shown) return;
     this.shown = table;
     this.showWhole(table, "choose an export");
-    this.visitsLabel.hidden = !table;
+    this.visits.disabled = !table;
     if (!table) return;
     this.showVisits(table, choices.by || table.by);
     const { shape, unit, angle_unit, angles, decimal, dates, rate_hz, clock_set_back, group, sheet } = this.fields;
