@@ -24,7 +24,7 @@ from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, ob
 from tests.support.formulas import written
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
 from tests.support.live_models import with_noise
-from tests.support.paths import ROOT
+from tests.support.paths import CONFIG, ROOT
 
 FILES = ROOT / "tests" / "guard" / "files-0.2"
 
@@ -41,7 +41,7 @@ def use_all_kernels() -> None:
             evaluate_basis(effect, rows, constants_of(effect), None)
     # whether w is a period is seen from the formula's values
     written({"x": "a * sin(w * x_mm)", "z": "a * w + b * lag(x_mm, w)"}, port="tool", parameters="a b w")
-    compd.compare(open_recording(FILES / "campaign.csv"))
+    compd.compare(open_recording(FILES / "campaign.csv", CONFIG / "tripod-cmm.yaml"))
     for name in ("tripod-cmm", "hexapod"):
         list(replay_cycles(load(FILES / f"{name}.yaml"), RecordedCycles(FILES / f"{name}-run")))
         _in_motion(with_noise(machine(f"{name}.yaml"), 0.1))
