@@ -190,7 +190,7 @@ main()
 
 
 @pytest.mark.long
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1800)
 def test_a_check_on_another_architecture_says_that_it_compiles_and_works(tmp_path: Path) -> None:
     """The kernels of an installation are for x86-64: there a first start compiles, with one line that says so."""
     command = [sys.executable, "-c", _ON_AARCH64, "check", str(ROOT / "config" / "tripod-cmm.yaml")]
