@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import compd
@@ -22,7 +24,7 @@ from compd.model.kinematics import (
 from compd.rotation import compose, rotation_matrix, rotation_vector
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, observe_rows, random_inputs
 from tests.support.formulas import written
-from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
+from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 from tests.support.live_models import with_noise
 from tests.support.paths import CONFIG, ROOT
 
@@ -60,7 +62,7 @@ def _pose(model: MachineModel, random: np.random.Generator) -> None:
     track_motion(None, np.arange(50.0), moved_mm, random.normal(size=(50, 2)))
 
 
-def _in_motion(live: Machine) -> None:
+def _in_motion(live: Any) -> None:
     """Cycles in which every length moves by itself and is read at another time; what is read goes over a wire."""
     for cycle in range(3):
         live.now_s += 0.005

@@ -170,8 +170,8 @@ def test_the_level_is_that_of_the_processor_and_another_architecture_has_none(
     monkeypatch: pytest.MonkeyPatch, machine: str, features: str, level: str | None
 ) -> None:
     present = {"v3": LEVELS["x86-64-v3"], "v2": LEVELS["x86-64-v2"]}.get(features, {features})
-    monkeypatch.setattr(kernel_target.platform, "machine", lambda: machine)
-    monkeypatch.setattr(kernel_target.llvmlite.binding, "get_host_cpu_features", lambda: dict.fromkeys(present, True))
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", lambda: dict.fromkeys(present, True))
     monkeypatch.setattr(kernel_target._config, "CPU_NAME", None)
     monkeypatch.setattr(kernel_target._config, "CPU_FEATURES", None)
     kernel_target.choose_target()
