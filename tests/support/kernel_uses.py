@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import compd
@@ -22,9 +24,9 @@ from compd.model.kinematics import (
 from compd.rotation import compose, rotation_matrix, rotation_vector
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, observe_rows, random_inputs
 from tests.support.formulas import written
-from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
+from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 from tests.support.live_models import with_noise
-from tests.support.paths import ROOT
+from tests.support.paths import CONFIG, ROOT
 
 FILES = ROOT / "tests" / "guard" / "files-0.2"
 
@@ -41,7 +43,7 @@ def use_all_kernels() -> None:
             evaluate_basis(effect, rows, constants_of(effect), None)
     # whether w is a period is seen from the formula's values
     written({"x": "a * sin(w * x_mm)", "z": "a * w + b * lag(x_mm, w)"}, port="tool", parameters="a b w")
-    compd.compare(open_recording(FILES / "campaign.csv"))
+    compd.compare(open_recording(FILES / "campaign.csv", CONFIG / "tripod-cmm.yaml"))
     for name in ("tripod-cmm", "hexapod"):
         list(replay_cycles(load(FILES / f"{name}.yaml"), RecordedCycles(FILES / f"{name}-run")))
         _in_motion(with_noise(machine(f"{name}.yaml"), 0.1))
@@ -60,7 +62,7 @@ def _pose(model: MachineModel, random: np.random.Generator) -> None:
     track_motion(None, np.arange(50.0), moved_mm, random.normal(size=(50, 2)))
 
 
-def _in_motion(live: Machine) -> None:
+def _in_motion(live: Any) -> None:
     """Cycles in which every length moves by itself and is read at another time; what is read goes over a wire."""
     for cycle in range(3):
         live.now_s += 0.005

@@ -6,12 +6,11 @@ import subprocess
 import sys
 import tomllib
 from importlib.metadata import packages_distributions
-from pathlib import Path
 
 import pytest
 
 from compd.extras import EXTRAS, missing_package
-from tests.support.paths import ROOT
+from tests.support.paths import CONFIG, ROOT
 
 # Runs compd as it is where the packages of these extras are not installed.
 _WITHOUT = """
@@ -66,12 +65,10 @@ def test_a_command_that_needs_an_extra_says_what_to_type(
     assert said.endswith("1 problem\n")
 
 
-def test_numbers_on_a_terminal_need_no_extra(tmp_path: Path) -> None:
-    recording = str(tmp_path / "recording.csv")
-    machine = str(ROOT / "config" / "tripod-cmm.yaml")
-    without_extras("campaign", machine, "--out", recording)
-    assert "noise floor" in without_extras("compare", recording, "--machine", machine)[0]
-    assert "noise" in without_extras("diagnose", recording, "--machine", machine)[0]
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_numbers_on_a_terminal_need_no_extra(command: str) -> None:
+    recording = ROOT / "tests" / "guard" / "files-0.2" / "campaign.csv"
+    assert "noise" in without_extras(command, str(recording), "--machine", str(CONFIG / "tripod-cmm.yaml"))[0]
 
 
 def test_a_mistake_in_an_import_is_no_missing_extra() -> None:
