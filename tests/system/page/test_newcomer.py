@@ -19,8 +19,8 @@ from tests.support.paths import CONFIG
 
 pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
 
-# What the machine's effects hide; the last one is found where its error is plain.
-HIDDEN = 8
+# Hides the growth of the links with temperature, which the running machine measures, too.
+HIDDEN = 4
 # Where the links are driven while a gauge is lost, mm from machine zero.
 ELSEWHERE_MM = [0.3, 0.3, 0.3]
 
@@ -84,7 +84,7 @@ def correct(user: NaiveUser) -> None:
     user.see("measured and modelled differ by")
     before_um = user.error_um()
     user.press("Diagnose")
-    user.see("What is missing is link_elasticity")
+    user.see("What is missing is link_expansion")
     user.press("Add …")
     user.confirm()
     assert user.error_um() < 0.3 * before_um
@@ -96,7 +96,7 @@ def correct(user: NaiveUser) -> None:
     user.press("Adopt it …")
     user.press("Adopt the shadow's model")
     user.see("Done: adopt the shadow's model.")
-    user.see("Applied: machine.model.yaml (link elasticity")
+    user.see("Applied: machine.model.yaml (link expansion")
 
 
 def accept(user: NaiveUser) -> None:
