@@ -56,7 +56,8 @@ def test_the_scale_of_a_block_follows_from_its_numbers() -> None:
     empty = np.zeros((80, 0))
     result = fit_with_prior(normal_equations([part(J, x, empty, np.zeros(0))]), block_of, np.ones(80, dtype=bool))
     assert result.scale[0] == pytest.approx(3.0, rel=0.3)
-    assert result.scale[1] == pytest.approx(0.3, rel=0.4)
+    # numbers that look as drawn make no others better known
+    assert result.scale[1] == 1.0
 
 
 def test_a_tolerance_is_scaled_by_a_hundred_at_most() -> None:
