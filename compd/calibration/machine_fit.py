@@ -93,9 +93,10 @@ def fit_machine(
     blocks = sorted(set(parameters.block_of[free].tolist()))
     numbers = float(free.sum()) / len(recordings)
     sigmas = [] if start is None else list(start.sigma_mm)
+    x = result.x
     for _ in range(_ROUNDS):
-        effects = parameters.split(result.x * parameters.prior_std, np.zeros((count, count)), blocks)
-        now = [one.now(effects) for one in recordings]
+        x, now = _reaching(recordings, parameters, blocks, result.x, x)
+        result = result._replace(x=x)
         rows = [one.use & ~left for one, left in zip(now, out, strict=True)]
         if start is None:
             sigmas = [_sigma_mm(one, use, numbers) for one, use in zip(now, rows, strict=True)]
@@ -115,6 +116,20 @@ def fit_machine(
         if change < _SETTLED and same:
             break
     return MachineFit(parameters, tuple(now), tuple(linear), result, tuple(out), tuple(sigmas), free, sets)
+
+
+def _reaching(
+    recordings: Sequence[MeasuredPoses], parameters: Parameters, blocks: list[int], x: FloatArray, before: FloatArray
+) -> tuple[FloatArray, list[PosesNow]]:
+    """The numbers x (P,) in tolerances and the poses with them; halfway back to those before as long as a machine with
+    such numbers has no pose in most of the rows: the step was too long for derivatives."""
+    none = np.zeros((len(x), len(x)))
+    while True:
+        now = [one.now(parameters.split(x * parameters.prior_std, none, blocks)) for one in recordings]
+        most = all(2 * own.use.sum() >= one.use.sum() for own, one in zip(now, recordings, strict=True))
+        if most or np.abs(x - before).max(initial=0.0) < _SETTLED:
+            return x, now
+        x = (x + before) / 2
 
 
 def gross_rows(now: PosesNow, left: FloatArray) -> BoolArray:

@@ -118,6 +118,8 @@ def points_spread_mm(tip_M_mm: FloatArray) -> float:
     """Root mean square of the coordinates of points (N, 3) from their centroid, along the axes that are known."""
     known: BoolArray = np.asarray(np.isfinite(tip_M_mm).any(axis=0))
     points_mm = tip_M_mm[:, known][np.isfinite(tip_M_mm[:, known]).all(axis=1)]
+    if not points_mm.size:
+        return MIN_SPREAD_MM
     return max(float(np.sqrt(np.mean((points_mm - points_mm.mean(axis=0)) ** 2))), MIN_SPREAD_MM)
 
 
