@@ -47,7 +47,11 @@ bindKeys({ bench, picture, selection, exclusions, card, effects, ledger, diagnos
 
 // what is scrolled to stays below the header, where that is always in sight
 const header = at("strip");
-new ResizeObserver(() => (document.documentElement.style.scrollPaddingTop = getComputedStyle(header).position === "sticky" ? `${header.offsetHeight + 8}px` : "")).observe(header);
+new ResizeObserver(() => {
+  const above = getComputedStyle(header).position === "sticky" ? `${header.offsetHeight + 8}px` : "";
+  document.documentElement.style.scrollPaddingTop = above;
+  document.documentElement.style.setProperty("--above", above || "0px");
+}).observe(header);
 
 const open = () => bench.attempt(() => bench.open(at("recording").value, at("model").value.trim(), [...document.querySelectorAll("#libraries input:checked")].map(({ value }) => value)));
 at("open").addEventListener("click", open);
