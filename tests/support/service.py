@@ -1,137 +1,200 @@
-"""The daemon as systemd runs it in a container, for a simulated machine there."""
+"""A publisher on real sockets, and clients made of a socket and nothing else."""
 
 from __future__ import annotations
 
-import re
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+import json
+import math
+import socket
+import threading
 
-import yaml
+import numpy as np
 
-from compd.client import Client, connect
-from compd.errors import DaemonError
-from tests.support.container import Container, wait_until
-from tests.support.paths import CONFIG
+from compd.clock import MonotonicClock
+from compd.compensation import Compensation
+from compd.compensation.values import Contributions
+from compd.errors import Problem, StateError
+from compd.live.loop import Commands, Setpoint
+from compd.live.memory import PollRequests, SharedRing
+from compd.live.service import Errands, Listeners, Messages, Publisher, RequestContext, Requests, TargetKeys, TcpAccess
+from compd.live.service.messages import line
+from compd.model.kinematics import Frame
+from compd.operation_settings import SocketSettings
+from compd.setpoint_states import Mode, State
 
-# Where the container has this project's configurations.
-CONFIGURATIONS = Path("/opt/config")
-SIMULATED = Path("/run/simulated")
-MACHINE = Path("/etc/compd/machine.yaml")
-SOCKET = Path("/run/compd/compd.sock")
-SHIPPED = "tripod-cmm.yaml"
-# A bound for waiting, never a measure.
-PATIENCE_S = 60.0
-# Longer than the tests take: the machine stands still, so that machine zero fits its gauges throughout.
-ZERO_HOLD_S = 86_400
+PERIOD_S = 0.005
+TIMEOUT_S = 20
+TARGET_KEYS = TargetKeys("tip_B0_mm", rotation=False)
+VERSION = {"class": "VERSION", "protocol": 1, "release": "1", "machine": "test", "config_hash": "00"}
+NO_ZERO = StateError(Problem(where="zero", what="none"))
 
 
-@dataclass(frozen=True)
+def setpoint(seq: int, time_s: float | None = None) -> Setpoint:
+    three = np.array([1.0, 2.0, 3.0])
+    contributions = Contributions(("joints", "frame"), np.array([three, three]))
+    frame = Frame(three, three, three, three, three, three, *(np.array(0),) * 3)
+    numbers = Compensation(*(three,) * 4, frame, *(three,) * 5, contributions, np.array(0))
+    time_s = seq * PERIOD_S if time_s is None else time_s
+    return Setpoint(seq, time_s, time_s + 0.1, 0.01, State.OK, "", Mode.CMM, numbers)
+
+
+class Peer:
+    """A client made of a socket and nothing else."""
+
+    def __init__(self, family, address, receive_buffer=None, token=None):
+        self.socket = socket.socket(family, socket.SOCK_STREAM)
+        if receive_buffer:
+            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        self.socket.settimeout(TIMEOUT_S)
+        self.socket.connect(address)
+        self.file = self.socket.makefile("rb")
+        try:
+            self.version = self.read()
+            if token is not None:
+                self.version = self.ask({"class": "AUTH", "token": token})
+        except AssertionError:
+            self.close()
+            raise
+
+    def send(self, message):
+        self.socket.sendall(message if isinstance(message, bytes) else json.dumps(message).encode() + b"\n")
+
+    def read(self):
+        received = self.file.readline()
+        assert received.endswith(b"\n"), f"closed after {received!r}"
+        return json.loads(received)
+
+    def ask(self, message):
+        self.send(message)
+        return self.read()
+
+    def close(self):
+        self.file.close()
+        self.socket.close()
+
+
+class SteppedClock:
+    """The real clock, which a test can put forward."""
+
+    def __init__(self):
+        self.ahead_s = 0.0
+
+    def monotonic(self):
+        return MonotonicClock().monotonic() + self.ahead_s
+
+    def step(self, step_s):
+        self.ahead_s += step_s
+
+
+class LoopIsWell:
+    """In the place of the watch: the setpoints of these tests have times of their own."""
+
+    limit_s = 1.0
+
+    def admits(self, seq, time_s):
+        return True
+
+    def wait_s(self, now_s):
+        return self.limit_s
+
+    def missing(self, now_s):
+        return None
+
+    def stop(self, now_s, reason):
+        return Setpoint(10**6, now_s, now_s, math.nan, State.STOP, reason, Mode.CMM, None)
+
+
 class Service:
-    """The daemon as systemd runs it in a container."""
+    """A publisher on real sockets, with the loop's side in the test's hands."""
 
-    container: Container
+    def __init__(self, directory, target_keys=TARGET_KEYS, tcp=None, target=None):
+        """`tcp`, `target`: keys of the configuration's sections of these names."""
+        self.path = directory / "s" / "compd.sock"
+        sockets = SocketSettings(
+            tcp={"port": 0, **(tcp or {})}, unix={"path": str(self.path)}, valid_for_s=0.1, target=target or {}
+        )
+        self.clock = SteppedClock()
+        self.commands = Commands(NO_ZERO)
+        self.observed = []
+        self.zeros = []
+        self.models = []
+        self.distrusted = {"scale_1": ["scale_1.position"], "joints": ["joints.1", "joints.2"]}
+        self.poll_requests = PollRequests(["scale_1"])
+        self.listeners = Listeners(sockets)
+        self.ring = SharedRing()
+        self.publisher = Publisher(
+            listeners=self.listeners,
+            setpoints=self.ring,
+            cycles=SharedRing(),
+            watch=LoopIsWell(),
+            period_s=PERIOD_S,
+            clock=self.clock,
+            observers=[self.observed.append],
+        )
+        self.requests = Requests(
+            RequestContext(
+                messages=Messages(
+                    version=VERSION,
+                    machine={"class": "MACHINE"},
+                    status=self.status,
+                    budget=lambda: {"class": "BUDGET"},
+                ),
+                errands=Errands(
+                    take_zero=lambda replace, answer: self.zeros.append((replace, answer)),
+                    switch_model=lambda *arguments: self.models.append(arguments),
+                    accept=self.accept,
+                    poll=self.poll_requests.add,
+                    tell_order=self.publisher.tell_order,
+                ),
+                commands=self.commands,
+                target_keys=target_keys,
+                targets=sockets.target,
+                access=TcpAccess.of(sockets.tcp),
+                clock=self.clock,
+            )
+        )
+        self.stopping = threading.Event()
+        self.thread = threading.Thread(target=self.run, args=(self.requests,))
+        self.thread.start()
+        self.peers = []
 
-    def systemctl(self, *arguments: str) -> str:
-        return self.container.run("systemctl", *arguments)
+    def run(self, requests):
+        self.publisher.run(requests, lambda: not self.stopping.is_set(), lambda: None)
+        self.publisher.end("the test is over")
 
-    def shown(self, name: str) -> str:
-        """A property of the unit."""
-        return self.systemctl("show", "--value", f"--property={name}", "compd").strip()
+    def status(self):
+        return {"class": "STATUS"}
 
-    def reached_s(self, name: str) -> float:
-        """When the unit reached a state, on the monotonic clock that the container shares."""
-        return int(self.shown(f"{name}TimestampMonotonic")) * 1e-6
+    def accept(self, gauge, answer):
+        """In the place of the acquisition: believes the gauges of `distrusted` again."""
+        if gauge != "all" and gauge not in self.distrusted:
+            raise ValueError(f"no gauge {gauge}; there are {', '.join(self.distrusted)}")
+        names = list(self.distrusted) if gauge == "all" else [gauge]
+        channels = [channel for name in names for channel in self.distrusted.pop(name)]
+        answer(line({"class": "ACCEPT", "gauges": channels}))
 
-    def connect(self) -> Client:
-        """A client, from outside the container."""
-        return connect(self.container.path(SOCKET), PATIENCE_S)
+    def pass_time(self, step_s):
+        """Let time pass, and the publisher look at what is overdue."""
+        self.clock.step(step_s)
+        self.ring.wake_reader()
 
-    def zero(self) -> Any:
-        with self.connect() as client:
-            return client.status()["zero"]
+    def deliver(self, setpoint):
+        _, content = setpoint.pack(None)
+        self.ring.put(setpoint.time_s, setpoint.state.code, content)
 
-    def wait_for_ok(self, timeout_s: float = PATIENCE_S) -> float:
-        """Wait until the daemon's setpoints are ok; the time on the monotonic clock at which one was."""
+    def unix(self, **options):
+        return self._peer(Peer(socket.AF_UNIX, str(self.path), **options))
 
-        end_s = time.monotonic() + timeout_s
+    def tcp(self, **options):
+        return self._peer(Peer(socket.AF_INET, ("127.0.0.1", self.listeners.tcp_port), **options))
 
-        def moment_s() -> float | None:
-            try:
-                with self.connect() as client:
-                    for setpoint in client.watch():
-                        if setpoint["state"] == "ok":
-                            return time.monotonic()
-                        assert time.monotonic() < end_s, setpoint
-            except DaemonError:
-                pass  # not yet there
-            return None
+    def _peer(self, peer):
+        self.peers.append(peer)
+        return peer
 
-        return wait_until(moment_s, "a daemon with setpoints", timeout_s)
-
-    def wait_for_another_process(self, main: str) -> None:
-        """Wait until systemd has started the daemon anew. main : the process id of the one before."""
-        wait_until(lambda: self.shown("MainPID") not in (main, "0"), "a restart", PATIENCE_S)
-
-    def config_hash(self) -> str:
-        """Of the configuration that the daemon runs with."""
-        with self.connect() as client:
-            return str(client.version["config_hash"])
-
-    def log(self, since_s: float = 0.0) -> str:
-        """What daemon and systemd have written to the journal about the unit. since_s : seconds since 1970."""
-        return self.container.run("journalctl", "--unit=compd", "--output=cat", "--quiet", f"--since=@{since_s:.6f}")
-
-    def signal_main(self, name: str) -> None:
-        self.systemctl("kill", "--kill-whom=main", f"--signal={name}", "compd")
-
-
-def simulate(container: Container, program: Path) -> None:
-    """A simulated machine on ptys of the daemon's user, and the configuration of that machine.
-
-    program : compd in the container, which has this project's configurations at CONFIGURATIONS.
-    """
-    container.run(
-        *("systemd-run", "--unit=simulated-machine", "--quiet"),
-        *("--property=User=compd", f"--property=RuntimeDirectory={SIMULATED.name}"),
-        *(str(program), "simulate", str(CONFIGURATIONS / SHIPPED)),
-        *(f"--directory={SIMULATED}", f"--zero-hold={ZERO_HOLD_S}"),
-    )
-    wait_until(container.path(SIMULATED / "control.sock").exists, "the simulated machine", PATIENCE_S)
-    data = yaml.safe_load(container.path(SIMULATED / SHIPPED).read_text())
-    shipped = yaml.safe_load((CONFIG / SHIPPED).read_text())
-    data["sockets"]["unix"] = shipped["sockets"]["unix"]
-    data["state"] = shipped["state"]
-    container.path(MACHINE).parent.mkdir(exist_ok=True)
-    container.path(MACHINE).write_text(yaml.safe_dump(data))
-
-
-def take_zero(container: Container, program: Path) -> None:
-    """Take machine zero of the simulated machine."""
-    zero = (str(program), "zero", str(SOCKET))
-    # on a busy computer a simulated gauge is late now and then
-    wait_until(lambda: "taken" in container.run(*zero, check=False), "machine zero", PATIENCE_S)
-
-
-@contextmanager
-def changed_limit(service: Service, name: str, value: float) -> Iterator[None]:
-    """Write a limit into the machine's configuration; the one before is back after the block."""
-    path = service.container.path(MACHINE)
-    before = path.read_text()
-    data = yaml.safe_load(before)
-    data["limits"][name] = value
-    path.write_text(yaml.safe_dump(data))
-    try:
-        yield
-    finally:
-        path.write_text(before)
-
-
-def without_s(words: str) -> float:
-    """The time without valid setpoints that `compd service` tells."""
-    found = re.search(r"([\d.]+) s without valid setpoints", words)
-    assert found is not None, words
-    return float(found[1])
+    def close(self):
+        for peer in self.peers:
+            peer.close()
+        self.stopping.set()
+        self.ring.wake_reader()
+        self.thread.join()
+        self.listeners.close()

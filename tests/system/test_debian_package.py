@@ -20,7 +20,7 @@ import pytest
 from compd.errors import DaemonError
 from tests.support.container import Container, booted, debian, what_is_missing
 from tests.support.paths import CONFIG, ROOT
-from tests.support.service import (
+from tests.support.installed_service import (
     CONFIGURATIONS,
     MACHINE,
     PATIENCE_S,

@@ -18,7 +18,7 @@ import pytest
 
 from tests.support.container import COMPD, booted, install_compd, wait_until, what_is_missing
 from tests.support.paths import CONFIG, ROOT
-from tests.support.service import (
+from tests.support.installed_service import (
     CONFIGURATIONS,
     MACHINE,
     PATIENCE_S,
