@@ -19,7 +19,6 @@ import pytest
 
 from compd.errors import DaemonError
 from tests.support.container import Container, booted, debian, what_is_missing
-from tests.support.paths import CONFIG, ROOT
 from tests.support.installed_service import (
     CONFIGURATIONS,
     MACHINE,
@@ -30,6 +29,7 @@ from tests.support.installed_service import (
     take_zero,
     without_s,
 )
+from tests.support.paths import CONFIG, ROOT
 
 PROGRAM = Path("/usr/bin/compd")
 STATE = Path("/var/lib/compd/machine-zero.json")

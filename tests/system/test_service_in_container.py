@@ -17,7 +17,6 @@ from typing import Any
 import pytest
 
 from tests.support.container import COMPD, booted, install_compd, wait_until, what_is_missing
-from tests.support.paths import CONFIG, ROOT
 from tests.support.installed_service import (
     CONFIGURATIONS,
     MACHINE,
@@ -29,6 +28,7 @@ from tests.support.installed_service import (
     take_zero,
     without_s,
 )
+from tests.support.paths import CONFIG, ROOT
 
 UNITS = Path("/opt/systemd")
 # Another environment beside COMPD.
