@@ -137,10 +137,13 @@ def test_mistakes_are_named(
         read_recording(edited(path, tmp_path / "wrong.csv", **columns), configuration)
 
 
-def test_a_machine_with_scales_does_not_take_a_commanded_pose_for_them(
+def test_the_pose_that_the_controller_was_told_stands_for_the_scales_of_a_machine_where_none_was_recorded(
     tmp_path: Path, hexapod: tuple[Path, Configuration]
 ) -> None:
     path, _ = hexapod
     (tmp_path / "scales.yaml").write_text(machine_text("mine", "6-ups", KINDS["6-ups"].usual))
-    with pytest.raises(RecordingError, match="0 scale columns, mine has 6"):
-        read_recording(path, load(tmp_path / "scales.yaml"))
+    configuration = load(tmp_path / "scales.yaml")
+    assert read_recording(path, configuration).commanded_mm is not None
+    one = {"scale_1_mm": ["1.0"] * read_recording(path, configuration).rows}
+    with pytest.raises(RecordingError, match="1 scale columns, mine has 6"):
+        read_recording(edited(path, tmp_path / "one.csv", **one), configuration)
