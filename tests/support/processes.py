@@ -36,6 +36,11 @@ def takes_zero(client: Client) -> bool:
     return True
 
 
+def read_twice(client: Client) -> bool:
+    """Whether the motion of every length is known: one reading tells none, and is refused when it is held."""
+    return all(gauge["ok"] >= 2 for line in client.status()["lines"].values() for gauge in line["gauges"].values())
+
+
 class Machine:
     """The shipped tripod on simulated wires, with one gauge more, the one that misbehaves; and one daemon at a time.
 
@@ -108,6 +113,7 @@ class Machine:
                     wait_for_gauges(observer, client.watch(10))
                 until("machine zero is taken", lambda: takes_zero(observer))
             until("the dial is good", lambda: daemon.quality() == "ok")
+            until("every gauge was read twice", lambda: read_twice(observer))
             watcher.until("ok", lambda seen: seen["state"] == "ok", watcher.now)
 
     def _stop_daemon(self) -> None:
