@@ -205,7 +205,7 @@ def _alone(function: Callable[..., Any]) -> Iterator[None]:
 def _say_once() -> None:
     """One line where nobody watches a terminal, as in a log."""
     where = f"kept in {CACHE_DIRECTORY}" if CACHE_DIRECTORY else _NOT_KEPT
-    print(f"compd compiles kernels (1 to 2 min): none fit {compiler_name()}; {where}", file=sys.stderr, flush=True)
+    print(f"compd compiles kernels (about 1 min): none fit {compiler_name()}; {where}", file=sys.stderr, flush=True)
 
 
 @contextmanager
@@ -215,7 +215,7 @@ def _said(function: Callable[..., Any]) -> Iterator[None]:
         _say_once()
         yield
         return
-    how_often = "once, 1 to 2 min" if CACHE_DIRECTORY else _NOT_KEPT
+    how_often = "once, about 1 min" if CACHE_DIRECTORY else _NOT_KEPT
     text = f"compd compiles kernels ({how_often}): {function.__name__}"
     # overwritten by the next, and gone at the end; a line of 80 characters, since one that wraps would stay
     print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)

@@ -147,6 +147,8 @@ def _exchange(socket: str, new: Mapping[str, str], clock: Clock) -> Replacement:
         _write(old, new)
         back = _restart(socket, clock, State.OK)
         raise CompdError(_worse(came, f"the release before runs again ({back.after})"))
+    if PAGE in new:  # behind the daemon, which has the processor for itself until setpoints are valid
+        SystemCommand("and its page, where it runs", ("systemctl", "try-restart", "--no-block", PAGE)).run()
     return came
 
 
@@ -173,7 +175,6 @@ def _restart(socket: str, clock: Clock, wanted: str = "") -> Replacement:
     SystemCommand("systemd reads the units", ("systemctl", "daemon-reload")).run()
     # without waiting: a start that fails is tried again for ever
     SystemCommand("start the other release", ("systemctl", "restart", "--no-block", DAEMON)).run()
-    SystemCommand("and its page, where it runs", ("systemctl", "try-restart", "--no-block", PAGE)).run()
     wanted = wanted or before.get("state", "")
     state, has_ended, valid_s, without_s = _SILENT, not before, before.get("time_s", math.nan), 0.0
     for setpoint in setpoints:

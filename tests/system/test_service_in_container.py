@@ -182,6 +182,29 @@ def test_stop_ends_at_once_and_by_itself(service: Service) -> None:
     assert took_s <= STOP_S
 
 
+@pytest.fixture
+def next_release(service: Service) -> Iterator[Path]:
+    """The program of another environment, as an upgrade has it; the first one runs again after the test."""
+    run = service.container.run
+    run("sh", "-ec", f"cp -a {COMPD} {NEXT} && sed -i s#{COMPD}/#{NEXT}/# {NEXT}/bin/compd")
+    yield NEXT / "bin" / "compd"
+    if str(NEXT) in service.shown("ExecStart"):
+        run(f"{COMPD}/bin/compd", "service", "back")
+    run("rm", "-r", str(NEXT))
+
+
+def test_another_release_takes_over_and_gives_back(service: Service, next_release: Path) -> None:
+    """Without the page, which is installed below."""
+    zero = service.zero()
+    upgraded = service.container.run(str(next_release), "service", "upgrade")
+    assert str(NEXT) in service.shown("ExecStart")
+    assert upgraded.count("ok, then ok") == 1
+    assert service.zero() == zero
+    back = service.container.run(str(next_release), "service", "back")
+    assert str(COMPD) in service.shown("ExecStart")
+    report("another release", upgrade=without_s(upgraded), back=without_s(back))
+
+
 @dataclass(frozen=True)
 class PageService:
     """The page as systemd runs it beside the daemon. token : of a person who may operate."""
@@ -323,28 +346,6 @@ def test_the_pages_exposure_is_at_most_two(page: PageService) -> None:
     exposure = re.search(r"exposure level for compd-page.service: ([\d.]+)", last)
     assert exposure is not None, last
     assert float(exposure[1]) <= MAX_EXPOSURE
-
-
-@pytest.fixture
-def next_release(service: Service) -> Iterator[Path]:
-    """The program of another environment, as an upgrade has it; the first one runs again after the test."""
-    run = service.container.run
-    run("sh", "-ec", f"cp -a {COMPD} {NEXT} && sed -i s#{COMPD}/#{NEXT}/# {NEXT}/bin/compd")
-    yield NEXT / "bin" / "compd"
-    if str(NEXT) in service.shown("ExecStart"):
-        run(f"{COMPD}/bin/compd", "service", "back")
-    run("rm", "-r", str(NEXT))
-
-
-def test_another_release_takes_over_and_gives_back(service: Service, next_release: Path) -> None:
-    zero = service.zero()
-    upgraded = service.container.run(str(next_release), "service", "upgrade")
-    assert str(NEXT) in service.shown("ExecStart")
-    assert upgraded.count("ok, then ok") == 1
-    assert service.zero() == zero
-    back = service.container.run(str(next_release), "service", "back")
-    assert str(COMPD) in service.shown("ExecStart")
-    report("another release", upgrade=without_s(upgraded), back=without_s(back))
 
 
 def test_a_release_that_does_not_start_gives_way_to_the_one_before(service: Service, next_release: Path) -> None:

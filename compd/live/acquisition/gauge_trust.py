@@ -55,6 +55,9 @@ class GaugeTrust:
     def judge(self, readings: Sequence[Reading], now_s: float) -> list[Reading]:
         """The readings of the last poll that may be published, one per channel."""
         firsts = self._first or [None] * len(readings)
+        for channel, reading in zip(self._channels, readings, strict=True):
+            if channel is not None and reading.ok:
+                channel.show(reading)  # a channel that was away is compared with all of its poll, whatever their order
         judged = []
         for channel, reading, first in zip(self._channels, readings, firsts, strict=True):
             if channel is not None and reading.ok:

@@ -86,10 +86,14 @@ class QuantityTrust:
         if quality is Quality.LINE_LOST:
             self._memory.end_order(self._i)
 
+    def show(self, reading: Reading) -> None:
+        """As of `ReadingTrust.show`."""
+        self._memory.show(self._i, reading.value, reading.time_s)
+
     def judge(self, reading: Reading, window_s: float, first: Reading | None = None) -> Reading:
         """The reading as it may be published; parameters as of `ReadingTrust.judge`."""
         memory, i = self._memory, self._i
-        memory.show(i, reading.value, reading.time_s)
+        self.show(reading)
         if memory.accepted[i] != memory.obeyed[i] and first is not None:
             return self._judge_after_acceptance(reading, first)
         if memory.voted[i] != memory.handled[i]:

@@ -119,6 +119,10 @@ class ReadingTrust:
         self._missed = True
         self._after.clear()
 
+    def show(self, reading: Reading) -> None:
+        """Let other channels compare themselves with a good reading, be it believed or not."""
+        self._memory.show(self._i, reading.value, reading.time_s)
+
     def judge(self, reading: Reading, window_s: float, first: Reading | None = None) -> Reading:
         """The reading to publish: itself, the first answer, or one without a value.
 
@@ -130,7 +134,7 @@ class ReadingTrust:
         """
         memory, i = self._memory, self._i
         sample = GaugeSample(reading.value, reading.time_s, window_s)
-        memory.show(i, sample.value, sample.time_s)
+        self.show(reading)
         self._scatter.note(sample)
         memory.scatter_mm[i] = self._scatter.mm
         # a channel accepted during a poll is polled twice the next time
@@ -177,6 +181,8 @@ class ReadingTrust:
             )
         self._history.clear()
         self._memory.begin(self._i)
+        if earlier.time_s < sample.time_s:  # two samples tell how it moves; a latched gauge answers with one
+            self._remember(earlier)
         return self._accept(reading, sample)
 
     def _accept(self, reading: Reading, sample: GaugeSample) -> Reading:

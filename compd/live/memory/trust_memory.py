@@ -116,7 +116,12 @@ class TrustMemory:
         return self._units[i]
 
     def show(self, i: int, value: float, time_s: float) -> None:
-        """Note what the gauge of channel `i` gave at `time_s` (s), believed or not, and count how often it repeats."""
+        """Note what the gauge of channel `i` gave at `time_s` (s), believed or not, and count how often it repeats.
+
+        What was given at a time counts once.
+        """
+        if time_s == self.shown_s[i]:
+            return
         change = abs(value - float(self.shown[i]))
         if change == 0.0:
             self.repeats[i] += 1

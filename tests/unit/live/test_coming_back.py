@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from compd.configuration import Configuration, load
 from compd.gauge import Quality, Reading, good
+from compd.live.acquisition.gauge_trust import GaugeTrust
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.machine.wiring import MachineWires
 from compd.live.memory.latest import Latest
@@ -126,6 +128,27 @@ def test_after_a_gap_gauges_that_show_what_they_showed_need_nobody(shop, gap):
         GAPS[gap](shop)
         shop.poll(5)
         assert not shop.not_believed
+
+
+def test_after_a_start_the_second_round_tells_how_everything_moves(shop):
+    shop.restart(1.0)
+    shop.poll(2)
+    assert not shop.not_believed
+    unknown = [channel for channel, reading in shop.read.items() if math.isnan(reading.motion.u_mm_per_s)]
+    assert not unknown, "each was asked twice: its two answers are two samples"
+
+
+def test_the_channels_of_the_gauge_that_is_back_last_are_believed_at_once(shop):
+    shop.restart(1.0)
+    gauges: dict[str, list[str]] = {}
+    for channel in shop.trust:
+        gauges.setdefault(channel.split(".")[0], []).append(channel)
+    for channels in gauges.values():
+        trust = GaugeTrust([shop.trust[channel] for channel in channels], shop.clock)
+        readings = trust.read(lambda channels=channels: [shop._ask(channel) for channel in channels])
+        judged = trust.judge(readings, shop.clock.now_s)
+    assert len(judged) > 1
+    assert all(reading.ok for reading in judged)
 
 
 def with_ports_exchanged(configuration: Configuration) -> Configuration:
