@@ -147,8 +147,6 @@ def _exchange(socket: str, new: Mapping[str, str], clock: Clock) -> Replacement:
         _write(old, new)
         back = _restart(socket, clock, State.OK)
         raise CompdError(_worse(came, f"the release before runs again ({back.after})"))
-    if PAGE in new:  # behind the daemon, which has the processor for itself until setpoints are valid
-        SystemCommand("and its page, where it runs", ("systemctl", "try-restart", "--no-block", PAGE)).run()
     return came
 
 
@@ -186,6 +184,8 @@ def _restart(socket: str, clock: Clock, wanted: str = "") -> Replacement:
             valid_s = setpoint["time_s"]
         if has_ended and setpoint and wanted in ("", state):
             break
+    if PAGE in _installed_units():  # behind the daemon, which has the processor for itself meanwhile
+        SystemCommand("and its page, where it runs", ("systemctl", "try-restart", "--no-block", PAGE)).run()
     return Replacement(before.get("state", _SILENT), state, without_s)
 
 
