@@ -173,7 +173,6 @@ def _restart(socket: str, clock: Clock, wanted: str = "") -> Replacement:
     SystemCommand("systemd reads the units", ("systemctl", "daemon-reload")).run()
     # without waiting: a start that fails is tried again for ever
     SystemCommand("start the other release", ("systemctl", "restart", "--no-block", DAEMON)).run()
-    SystemCommand("and its page, where it runs", ("systemctl", "try-restart", "--no-block", PAGE)).run()
     wanted = wanted or before.get("state", "")
     state, has_ended, valid_s, without_s = _SILENT, not before, before.get("time_s", math.nan), 0.0
     for setpoint in setpoints:
@@ -185,6 +184,8 @@ def _restart(socket: str, clock: Clock, wanted: str = "") -> Replacement:
             valid_s = setpoint["time_s"]
         if has_ended and setpoint and wanted in ("", state):
             break
+    # only now: it would take the processor while the daemon starts
+    SystemCommand("and its page, where it runs", ("systemctl", "try-restart", "--no-block", PAGE)).run()
     return Replacement(before.get("state", _SILENT), state, without_s)
 
 

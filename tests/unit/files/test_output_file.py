@@ -70,10 +70,8 @@ def test_no_command_writes_over_a_recording(tmp_path, command):
 
 def test_a_directory_in_which_a_command_may_not_write_is_named_without_a_traceback(tmp_path):
     """/sys takes no directory from anybody, root included."""
-    main = "from compd.cli import main; main()"
-    done = subprocess.run(
-        [sys.executable, "-c", main, "demo", "--page", "/sys/out/demo.html"], capture_output=True, text=True, check=False
-    )
+    command = [sys.executable, "-c", "from compd.cli import main; main()", "demo", "--page", "/sys/out/demo.html"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("/sys/out: was refused: ")
     assert "Traceback" not in done.stderr
