@@ -49,13 +49,21 @@ def main() -> None:
     for shell, path in COMPLETIONS.items():
         staged = DEBIAN / "completions" / path
         staged.parent.mkdir(parents=True, exist_ok=True)
-        environment = os.environ | {"_COMPD_COMPLETE": f"source_{shell}"}
-        staged.write_bytes(subprocess.run([own_program()], env=environment, check=True, capture_output=True).stdout)
+        staged.write_text(completion(shell))
     (DEBIAN / "compd.install").write_text("debian/completions/* /\n")
     built = datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), UTC)
     (DEBIAN / "changelog").write_text(changelog(Path("CHANGELOG.md").read_text(), built))
     (DEBIAN / "copyright").write_text(copyright_text(Path("LICENSE").read_text()))
     (DEBIAN / "python-dependency").write_text(python_dependency())
+
+
+def completion(shell: str) -> str:
+    """The script that a shell reads when it first completes a command line of compd."""
+    environment = os.environ | {"_COMPD_COMPLETE": f"source_{shell}"}
+    done = subprocess.run([own_program()], env=environment, check=True, capture_output=True, text=True)
+    script = done.stdout.lstrip()
+    # zsh looks at the first line alone for what a file completes, and calls the file in place of the function once
+    return f'{script}_compd_completion "$@"\n' if shell == "zsh" else script
 
 
 def removed_directories() -> list[str]:

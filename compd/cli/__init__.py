@@ -35,6 +35,12 @@ def main() -> None:
         if problem is None:
             raise
         _refuse((problem,))
+    except OSError as error:
+        from compd.files import refused_path
+
+        if (problem := refused_path(error)) is None:
+            raise
+        _refuse((problem,))
 
 
 def _refuse(problems: tuple[Problem, ...]) -> NoReturn:

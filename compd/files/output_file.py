@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +10,14 @@ from compd.errors import CompdError, Problem
 
 # Enough for the head of a page.
 _HEAD_BYTES = 4096
+# What the system refuses for a reason outside the program, by errno(3).
+_REFUSALS = {
+    errno.EACCES: "give this user the right, or choose a directory of its own",
+    errno.EPERM: "give this user the right, or choose a directory of its own",
+    errno.EROFS: "choose a directory on another file system",
+    errno.ENOSPC: "make room there",
+    errno.EDQUOT: "make room there",
+}
 
 
 def check_replaceable(path: Path, marks: Sequence[bytes], what: str, overwrite: bool | None = None) -> None:
@@ -41,3 +50,11 @@ def check_directory(path: Path) -> None:
         raise CompdError(
             Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
         )
+
+
+def refused_path(error: OSError) -> Problem | None:
+    """The problem of a file or directory that the system refused; None for any other error."""
+    next_step = _REFUSALS.get(error.errno or 0)
+    if next_step is None or error.filename is None:
+        return None
+    return Problem(where=str(error.filename), what=f"was refused: {error.strerror}", next_step=next_step)

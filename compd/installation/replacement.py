@@ -184,7 +184,8 @@ def _restart(socket: str, clock: Clock, wanted: str = "") -> Replacement:
             valid_s = setpoint["time_s"]
         if has_ended and setpoint and wanted in ("", state):
             break
-    if PAGE in _installed_units():  # behind the daemon, which has the processor for itself meanwhile
+    # only now: it would take the processor while the daemon starts
+    if PAGE in _installed_units():
         SystemCommand("and its page, where it runs", ("systemctl", "try-restart", "--no-block", PAGE)).run()
     return Replacement(before.get("state", _SILENT), state, without_s)
 

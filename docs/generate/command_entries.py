@@ -87,7 +87,7 @@ def _walk(command: Any, words: tuple[str, ...], panel: str, parent: Any) -> Iter
 
 def shown_argument(parameter: Any) -> str:
     """The name of an argument."""
-    return str(parameter.metavar or parameter.name.upper()).strip("[]" if str(parameter.metavar)[:1] == "[" else "")
+    return str(parameter.metavar or parameter.name.upper())
 
 
 def _shown_in_synopsis(parameter: Any) -> str:
@@ -106,7 +106,9 @@ def shown_option(parameter: Any) -> str:
 def shown_default(parameter: Any) -> str:
     """The value without the option; "" where there is none."""
     default = parameter.default
-    return "" if parameter.required or default is None or default is False or default in ("", ()) else str(default)
+    if parameter.required or default is None or default is False or default in ("", ()):
+        return ""
+    return parameter.opts[0] if default is True else str(default)
 
 
 def meaning(parameter: Any) -> str:

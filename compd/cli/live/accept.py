@@ -15,7 +15,7 @@ def accept(
     gauges: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[GAUGE]...",
+            metavar="GAUGE...",
             help="A gauge, one channel as gauge.channel, or `all`; default: list the distrusted ones with reasons.",
         ),
     ] = None,

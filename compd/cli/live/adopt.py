@@ -16,7 +16,7 @@ from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
 _TIMEOUT_S = 30.0
 
 FileArgument = Annotated[
-    Path | None, typer.Argument(metavar="[FILE]", help="The model file; default: print the daemon's present model.")
+    Path | None, typer.Argument(metavar="FILE", help="The model file; default: print the daemon's present model.")
 ]
 NoneOption = Annotated[bool, typer.Option("--none", help="No model file: the machine without effects, no shadow.")]
 

@@ -16,7 +16,7 @@ _TLS = "put a proxy with TLS in front (--behind): tokens pass in the clear other
 
 def page(
     address: Annotated[
-        str, typer.Argument(metavar="[CONFIG]", help="The daemon's configuration (YAML), or its Unix socket.")
+        str, typer.Argument(metavar="CONFIG", help="The daemon's configuration (YAML), or its Unix socket.")
     ] = DEFAULT_SOCKET,
     port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port of the page; 0: any free port.")] = 7760,
     listen: Annotated[

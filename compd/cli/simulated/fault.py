@@ -16,7 +16,7 @@ def fault(
     ],
     line: Annotated[str | None, typer.Argument(help="The line's name in the configuration; default: list all.")] = None,
     kind: Annotated[
-        str | None, typer.Argument(metavar="[FAULT]", help="unplugged, silent, late ...; none mends the line.")
+        str | None, typer.Argument(metavar="FAULT", help="unplugged, silent, late ...; none mends the line.")
     ] = None,
 ) -> None:
     """Break a line of the simulated machine, and mend it: unplugged, silent, garbled, late replies ...

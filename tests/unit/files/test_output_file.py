@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import subprocess
+import sys
 
 import pytest
 from typer.testing import CliRunner
 
 from compd.cli.app import app
 from compd.errors import CompdError
-from compd.files.output_file import check_replaceable
+from compd.files.output_file import check_replaceable, refused_path
 from compd.report import check_page_path, write_page
 
 PRECIOUS = "row,time_s,reference_x_mm\n1,0.0,1.25\n"
@@ -63,3 +66,17 @@ def test_no_command_writes_over_a_recording(tmp_path, command):
     assert str(recording) in str(result.exception)
     assert "there already" in str(result.exception)
     assert recording.read_text() == PRECIOUS
+
+
+def test_a_directory_in_which_a_command_may_not_write_is_named_without_a_traceback(tmp_path):
+    """/sys takes no directory from anybody, root included."""
+    command = [sys.executable, "-c", "from compd.cli import main; main()", "demo", "--page", "/sys/out/demo.html"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("/sys/out: was refused: ")
+    assert "Traceback" not in done.stderr
+
+
+def test_an_error_without_a_file_or_of_the_program_is_no_refusal():
+    assert refused_path(OSError(errno.EACCES, "Permission denied")) is None
+    assert refused_path(OSError(errno.EBADF, "Bad file descriptor", "x")) is None
