@@ -35,6 +35,9 @@ MAX_HEAD_BYTES = 16 * 1024
 ACCEPTED_AT_ONCE = 8
 # Connections that wait in the system meanwhile: backlog of listen(2).
 WAITING = 1024
+# Bytes that the system buffers of a stream of events for a browser that does not read: a few seconds. Any other answer
+# is sent many times faster with the system's own size.
+EVENTS_BUFFER_BYTES = 32 * 1024
 _STATE_KEY = "connection"
 # struct linger of socket(7): on, 0 s.
 _NO_LINGER = struct.pack("ii", 1, 0)
@@ -79,6 +82,10 @@ class LimitedProtocol(H11Protocol):
         self._watch()
         return self._known
 
+    def begin_events(self) -> None:
+        """The answer is a stream of events, of which a slow browser gets the newest instead of all."""
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, EVENTS_BUFFER_BYTES)
+
     def note(self, what: str) -> None:
         """Count an event of a request in the log."""
         self._all.note(what)
@@ -90,10 +97,14 @@ class LimitedProtocol(H11Protocol):
 
     def drop(self) -> None:
         """Close the connection at once; unsent data is lost, including that in the system's buffers."""
-        own = self.transport.get_extra_info("socket")
-        if own.fileno() >= 0:
-            own.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
+        if self._socket.fileno() >= 0:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
         self.transport.abort()
+
+    @property
+    def _socket(self) -> socket.socket:
+        own: socket.socket = self.transport.get_extra_info("socket")
+        return own
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """As asyncio.Protocol."""

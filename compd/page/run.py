@@ -21,10 +21,10 @@ from compd.page.limited_protocol import ACCEPTED_AT_ONCE, MAX_HEAD_BYTES, WAITIN
 from compd.page.recordings import Recordings
 from compd.page.server import Server
 
-# Bytes that the system buffers for a browser that does not read: a few seconds of events.
-SEND_BUFFER_BYTES = 32 * 1024
 LOOPBACK_NAMES = ("127.0.0.1", "localhost")
 _HTTP_PORT = 80
+# Uvicorn's own limit (s) for the next head would end before HEAD_WITHIN_S, and unknown to LimitedProtocol: a year.
+NO_LIMIT_S = 365 * 86_400
 
 
 def run_page(
@@ -76,6 +76,7 @@ def limited_config(app: Guard, connections: Connections) -> uvicorn.Config:
         access_log=False,
         backlog=ACCEPTED_AT_ONCE,
         timeout_graceful_shutdown=1,
+        timeout_keep_alive=NO_LIMIT_S,
         h11_max_incomplete_event_size=MAX_HEAD_BYTES,
         server_header=False,
     )
@@ -118,7 +119,6 @@ class _Uvicorn(uvicorn.Server):
 def _listener(host: str, port: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)  # connections take it over
     try:
         listener.bind((host, port))
     except OSError as error:

@@ -27,6 +27,7 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.guard import Token
 from compd.page.history import History
 from compd.page.joining.routes import JoinRoutes
+from compd.page.limited_protocol import LimitedProtocol
 from compd.page.logbook import Logbook
 from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders, explained
@@ -127,6 +128,8 @@ class Server:
     async def _live(self, request: Request) -> Response:
         token: Token = request.scope["token"]
         browser = self._browsers.connect(token, request.client.host if request.client else "")
+        if (connection := LimitedProtocol.of(request.scope)) is not None:
+            connection.begin_events()
         unbuffered = {"X-Accel-Buffering": "no"}  # asks a proxy to pass events on at once
         return StreamingResponse(self._broadcast.events(browser), headers=unbuffered, media_type="text/event-stream")
 

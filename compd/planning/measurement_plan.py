@@ -86,13 +86,15 @@ class MeasurementPlan:
     @property
     def summary(self) -> str:
         """What the rows are good for, in a sentence or two."""
-        *others, last = self.rivals
-        subject, by = (f"{', '.join(others)} and {last} differ", "by") if others else (f"{last} is seen", "at")
-        least = f"{by} at least" if len(others) > 1 else by
         except_alike = ", but for those named below," if self.alike and self.rows else ""
+        verb, by = ("differ", "by ") if len(self.rivals) > 1 else ("is", "")
+        errors = "The errors" if len(self.rivals) > 1 else "The error"
+        least = f"{by}at least " if len(self.rivals) > 2 else by
+        enough = f"; {self.criteria.min_separation:.2g} times is enough" if self.is_wide_enough else ""
         text = (
-            f"{subject}{except_alike} {least} {as_factor(self.before)} times the noise on what was measured, {least} "
-            f"{as_factor(self.separation)} times with these {len(self.rows)} rows."
+            f"{errors} from {join_words(self.rivals, 'and')}{except_alike} {verb} {least}{as_factor(self.before)} "
+            f"times the measurement's noise in the rows so far, and {least}{as_factor(self.separation)} times with "
+            f"these {len(self.rows)} rows{enough}."
         )
         if self.alike:
             pairs = join_words([f"{first} from {second}" for first, second in self.alike], "or")

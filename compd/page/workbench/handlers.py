@@ -45,7 +45,8 @@ async def _trial(request: Request, workbench: OpenWorkbench) -> Response:
 
 
 async def _doubt(request: Request, workbench: OpenWorkbench) -> Response:
-    return plain(await workbench.ask("doubt", request.path_params["effect"]))
+    """Whether the rows support an effect. The first request of a state takes a diagnosis, the others none."""
+    return plain(await workbench.doubt_of(request.path_params["effect"]))
 
 
 async def _step(request: Request, workbench: OpenWorkbench) -> Response:

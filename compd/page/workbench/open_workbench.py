@@ -1,4 +1,4 @@
-"""Open files of the page: a workbench in a worker, a second one for plans, and the newest diagnosis."""
+"""Open files of the page: a workbench in a worker, others for plans and doubts, and the newest diagnosis."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _WORKBENCH = "compd.page.workbench.workbench:Workbench"
 # Opening of 500,000 rows took 7 s on two busy processors.
 LIMITS = WorkerLimits(memory_mb=2000, opening_s=120.0, idle_s=600.0)
 PLANNER_LIMITS = WorkerLimits(memory_mb=2000, opening_s=120.0, idle_s=300.0)
-# Limits for a comparison, candidates, a card, a trial or a step, and for a plan.
+# Limits for a comparison, candidates, a card, a trial or a step; and for a plan or a doubt.
 ANSWER_S, PLAN_S = 60.0, 300.0
 
 
@@ -37,6 +37,7 @@ class OpenWorkbench:
         arguments = (path, model_path, machine)
         self.worker: Worker = workers.worker(f"workbench of {path.stem}", _WORKBENCH, arguments, LIMITS)
         self.planner = workers.worker(f"plan for {path.stem}", _WORKBENCH, arguments, PLANNER_LIMITS)
+        self._doubter = workers.worker(f"doubts about {path.stem}", _WORKBENCH, arguments, PLANNER_LIMITS)
 
     @property
     def libraries(self) -> list[str]:
@@ -47,12 +48,12 @@ class OpenWorkbench:
     def is_busy(self) -> bool:
         """Whether a request waits for it."""
         runs = self.diagnosis is not None and not self.diagnosis.has_ended
-        return runs or self.worker.questions + self.planner.questions > 0
+        return runs or any(worker.questions for worker in (self.worker, self.planner, self._doubter))
 
     def rest(self) -> None:
         """End its processes, unless they work on a question; it waits for their end."""
-        self.worker.rest()
-        self.planner.rest()
+        for worker in (self.worker, self.planner, self._doubter):
+            worker.rest()
 
     async def ask(self, question: str, *given: Any, seconds: float = ANSWER_S) -> bytes:
         """The answer of the workbench. question : a method of `Workbench`, or the full name of a function.
@@ -64,6 +65,13 @@ class OpenWorkbench:
     async def ask_planner(self, question: str, *given: Any, seconds: float = ANSWER_S) -> bytes:
         """As `ask`, in a second workbench: plans take minutes, and are cancelled."""
         return await self.planner.ask(_full_name(question), *given, seconds=seconds)
+
+    async def doubt_of(self, effect: str) -> bytes:
+        """See `Workbench.doubt`. A third workbench diagnoses while the others answer; the first alone has the drafts,
+        whose names have an @."""
+        if "@" in effect:
+            return await self.ask("doubt", effect, self.libraries)
+        return await self._doubter.ask(_full_name("doubt"), effect, self.libraries, seconds=PLAN_S)
 
     async def diagnose(self) -> None:
         """Begin a diagnosis unless one runs. Raises StateError if too many run in the server."""

@@ -195,15 +195,21 @@ class Workbench:
     def effects(self) -> dict[str, Any]:
         """See `Candidates.summary`; `own` says which effects are not of the library.
 
-        `noise` : the verdict in words where only noise is left; else "".
+        `noise` : the verdict in words where only noise is left; else "".  `warning` : of each effect as of `doubt`;
+        None where that takes a diagnosis.
         """
         summary = self.candidates.summary()
-        verdict = self._diagnosis("") if self.candidates.is_noise else None
+        known = self._diagnosis("") if self.candidates.is_noise else None
         return {
             **summary,
-            "noise": verdict.summary if verdict is not None and verdict.verdict == "adequate" else "",
+            "noise": known.summary if known is not None and known.verdict == "adequate" else "",
             "effects": [
-                {**effect, "own": effect["effect"] in self.sources.own.effects} for effect in summary["effects"]
+                {
+                    **effect,
+                    "own": effect["effect"] in self.sources.own.effects,
+                    "warning": None if known is None else known.doubt_of(effect["effect"]),
+                }
+                for effect in summary["effects"]
             ],
         }
 
@@ -219,11 +225,13 @@ class Workbench:
             self._diagnoses[draft] = diagnose(self.opened.aligned, model.fitted, model.covariance, effects)
         return self._diagnoses[draft]
 
-    def doubt(self, name: str) -> dict[str, Any]:
+    def doubt(self, name: str, libraries: Sequence[str]) -> dict[str, Any]:
         """`warning` : why the rows do not support an effect, in the words of the verdict; else "".
 
         It takes a diagnosis, where none was made of these rows and this model.  name : as of `card`.
+        libraries : the chosen ones. Raises as `look_again`.
         """
+        self.look_again(libraries)
         candidates, effect = self.drafts.find(name)
         diagnosis = self._diagnosis("" if candidates is self.candidates else name)
         return {"warning": diagnosis.doubt_of(effect)}

@@ -193,3 +193,13 @@ def test_events_that_the_system_kept_while_the_page_stood_still_are_never_shown_
         assert any(true > 1.0 for true, _ in late), "the page did stand still"
         assert all(behind > 0 for true, behind in late if true > 0.6)
         assert late[-1][1] == 0, "and it comes back"
+
+
+def test_a_window_that_is_made_narrower_shows_the_strips_whole(tab):
+    until(tab, "document.querySelectorAll('.strip canvas').length === 3")
+    right = "getBoundingClientRect().right"
+    ends = f"[...document.querySelectorAll('.strip, .strip canvas')].map((part) => part.{right})"
+    for width in (1920, 1366, 390):
+        tab.set_viewport_size({"width": width, "height": 844})
+        until(tab, f"Math.max(...{ends}) <= document.getElementById('links').{right}")
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width

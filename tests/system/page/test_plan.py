@@ -50,7 +50,7 @@ def test_the_rows_and_files_are_those_of_the_command(tab, directory, tmp_path):
     tab.get_by_label("largest load, N").fill("100")
     tab.locator("#plan-button").click()
     until(tab, "document.querySelectorAll('#plan-table tbody tr').length > 0")
-    assert "times the noise" in tab.locator("#plan-summary").inner_text()
+    assert "times the measurement's noise" in tab.locator("#plan-summary").inner_text()
     tab.locator("#plan-feed").fill("1200")
     for shape in ("sa", "csv", "gcode", "plan"):
         with tab.expect_download() as waiting:

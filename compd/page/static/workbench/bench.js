@@ -6,7 +6,7 @@ import { fetchArrays } from "./arrays.js";
 export class Bench extends Session {
   constructor(status) {
     super(status);
-    Object.assign(this, { panels: [], key: "", summary: null, rows: null, trial: null, tried_rms: null });
+    Object.assign(this, { panels: [], key: "", summary: null, rows: null, trial: null, tried_rms: null, doubts: new Map() });
   }
 
   // JSON of the open recording. Throws the server's reason.
@@ -28,6 +28,17 @@ export class Bench extends Session {
     return answer;
   }
 
+  // Why the rows do not support an effect, "" where they do. It may take a diagnosis; each effect is asked once.
+  doubtOf(effect) {
+    const { doubts } = this;
+    if (!doubts.has(effect)) {
+      const asked = this.get(`effects/${effect}/doubt`).then(({ warning }) => warning);
+      asked.catch(() => doubts.delete(effect));
+      doubts.set(effect, asked);
+    }
+    return doubts.get(effect);
+  }
+
   // A change of the model or of the rows; the server refuses it after another browser's change.
   async change(path, keys) {
     await this.show(await this.post(path, { ...keys, revision: this.summary.revision }));
@@ -44,7 +55,7 @@ export class Bench extends Session {
 
   // Another state of the open recording: every panel starts again.
   async show(summary) {
-    Object.assign(this, { summary: null, trial: null, tried_rms: null });
+    Object.assign(this, { summary: null, trial: null, tried_rms: null, doubts: new Map() });
     this.rows = await this.arrays("rows");
     this.summary = summary;
     document.getElementById("opened").hidden = false;

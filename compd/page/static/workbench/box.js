@@ -42,7 +42,8 @@ function drawAxis(context, project, { from, to, ends: [[x0, y0], [x1, y1]] }, ax
     context.fillText(text, x + 1.4 * NUMBER_PX * away[0], y + NUMBER_PX * away[1] + 4);
   }
   context.fillStyle = ink("--ink");
-  context.fillText(`${name}, ${unit}`, (x0 + x1) / 2 + 1.5 * TITLE_PX * away[0], (y0 + y1) / 2 + TITLE_PX * away[1] + 4);
+  const lowest = context.canvas.height / context.getTransform().d - 4;
+  context.fillText(`${name}, ${unit}`, (x0 + x1) / 2 + 1.5 * TITLE_PX * away[0], Math.min(lowest, (y0 + y1) / 2 + TITLE_PX * away[1] + 4));
   context.textAlign = "left";
 }
 

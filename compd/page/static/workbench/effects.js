@@ -18,6 +18,9 @@ export class Effects {
     Object.assign(this, { effects: ranking.effects, noise: ranking.noise });
     this.ranked(ranking);
     this.draw();
+    for (const { effect, warning } of this.effects) if (warning !== null) bench.doubts.set(effect, warning);
+    // the diagnosis that says whether the rows support an effect begins while a person still looks
+    if (this.effects.length) void bench.doubtOf(this.effects[0].effect);
     // what was chosen stays chosen while it is still offered
     if (last && this.effects.some(({ effect }) => effect === last)) await this.pick(last);
   }

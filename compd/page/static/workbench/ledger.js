@@ -2,6 +2,7 @@
 import { CommandLine } from "../command_line.js";
 import { element, ink, micro, prepared } from "../format.js";
 import { Proposal } from "./proposal.js";
+import { stroke } from "./ticks.js";
 
 const words = (effect) => effect.replaceAll("_", " ");
 
@@ -37,7 +38,7 @@ export class Ledger {
       ...[commands.undo, ...(effects.length ? [commands.fit, commands.remove] : []), ...(ledger.length ? [commands.ledger] : [])].map((command) => new CommandLine(command).row),
     );
     canvas.hidden = !ledger.length;
-    requestAnimationFrame(() => this.draw(canvas, ledger, floor, unit));
+    new ResizeObserver(() => this.draw(canvas, ledger, floor, unit)).observe(canvas);
   }
 
   draw(canvas, ledger, floor, unit) {
@@ -54,16 +55,14 @@ export class Ledger {
     context.strokeStyle = ink("--line");
     context.lineWidth = 2;
     context.stroke();
-    context.beginPath();
-    context.setLineDash([4, 4]);
-    context.moveTo(8, y(floor));
-    context.lineTo(width - 8, y(floor));
-    context.strokeStyle = ink("--soft");
-    context.stroke();
-    context.setLineDash([]);
     context.font = "11px system-ui";
     context.fillStyle = ink("--soft");
-    context.fillText(`noise ${floor.toFixed(2)} ${micro(unit)}`, 10, y(floor) - 3);
+    if (floor !== null) {
+      context.setLineDash([4, 4]);
+      stroke(context, "--soft", 8, y(floor), width - 8, y(floor));
+      context.setLineDash([]);
+      context.fillText(`noise ${floor.toFixed(2)} ${micro(unit)}`, 10, y(floor) - 3);
+    }
     ledger.forEach((step, k) => context.fillText(`${step.kind === "add" ? "+" : step.kind === "remove" ? "−" : step.kind} ${words(step.effect)}`, x(k + 1) + 3, Math.max(11, y(errors[k + 1]) - 4)));
   }
 }

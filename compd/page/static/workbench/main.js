@@ -68,4 +68,6 @@ bench.attempt(async () => {
   at("recording").value = asked.get("recording");
   await open();
 });
+// pictures have the colours of the theme in which they are drawn
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => bench.summary && bench.attempt(() => bench.show(bench.summary)));
 window.bench = Object.assign(bench, { selection, picture }); // for tests and inspection

@@ -18,6 +18,7 @@ export class Proposal {
     this.shown = step;
     bench.attempt(async () => {
       this.place.replaceChildren(element("p", { class: "note" }, `fitting on ${bench.summary.used} rows …`));
+      const doubted = step.kind === "add" ? bench.doubtOf(step.effect) : "";
       const outcome = await bench.post("step", { ...step, dry_run: true });
       if (this.shown !== step) return;
       const rows = outcome.numbers.map((entry) => element("tr", { class: entry.plausible ? "" : "bad" }, element("td", {}, `${entry.effect.replaceAll("_", " ")} ${entry.parameter}`), element("td", { class: "number" }, number(entry.was)), element("td", { class: "number" }, `${number(entry.value)}${entry.standard_error === null ? "" : ` ± ${number(entry.standard_error, 2)}`}`), element("td", {}, micro(entry.unit))));
@@ -33,7 +34,9 @@ export class Proposal {
           last),
       );
       this.place.scrollIntoView({ block: "nearest" });
-      const warning = step.kind === "add" ? await this.doubtOf(bench, step.effect, last) : "";
+      const asking = element("span", { class: "note", role: "status" }, "asking the rows left out whether they support it …");
+      last.prepend(asking);
+      const warning = await Promise.resolve(doubted).finally(() => asking.remove());
       if (this.shown !== step) return;
       if (warning) doubt.replaceChildren(element("p", { class: "warning", role: "alert" }, element("b", {}, "Not supported by these rows. "), warning));
       const confirm = element("button", { type: "button", id: "confirm", onclick: () => bench.attempt(() => bench.change("step", step)) }, warning ? `${verb} all the same` : verb);
@@ -41,13 +44,5 @@ export class Proposal {
       if (!warning) confirm.focus({ preventScroll: true });
       this.place.scrollIntoView({ block: "nearest" });
     });
-  }
-
-  // Why the rows do not support the effect; it may take a diagnosis.
-  async doubtOf(bench, effect, row) {
-    const asking = element("span", { class: "note", role: "status" }, "asking the rows left out whether they support it …");
-    row.prepend(asking);
-    const { warning } = await bench.get(`effects/${effect}/doubt`).finally(() => asking.remove());
-    return warning;
   }
 }

@@ -226,7 +226,7 @@ def test_three_rivals_that_rows_tell_apart_are_planned_for_together(tmp_path: Pa
     plan = compd.plan_measurement(tmp_path / "run.csv", names, rows=20, force_N=100.0)
     assert plan.alike == ()
     assert plan.separation >= PlanningCriteria.min_separation
-    assert plan.summary.startswith("link_elasticity, joint_contact and link_zero differ by at least ")
+    assert plan.summary.startswith("The errors from link_elasticity, joint_contact and link_zero differ by at least ")
 
 
 @pytest.mark.parametrize(

@@ -331,7 +331,7 @@ def test_the_command_writes_the_settings_and_says_what_to_set(tmp_path: Path) ->
     out = tmp_path / "next.csv"
     result = run_plan(tmp_path, "--limit", "elevation_deg=20,85", "--rows", "12", "--out", str(out))
     assert result.exit_code == 0, result.output
-    assert "tube and angle differ by" in result.output
+    assert "The errors from tube and angle differ by" in result.output
     assert "Set elevation_deg from 20 to 85." in result.output
     lines = out.read_text().splitlines()
     assert lines[0] == "row,purpose,time_s,elevation_deg"

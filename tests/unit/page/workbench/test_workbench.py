@@ -104,16 +104,17 @@ def test_a_model_with_code_is_refused_and_the_code_does_not_run(path, tmp_path):
 
 def test_what_the_rows_support_is_added_without_a_warning_and_what_they_do_not_with_the_verdict(workbench):
     assert workbench.effects()["noise"] == ""
-    assert workbench.doubt("link_expansion")["warning"] == ""
-    assert (
-        "link_sag is not named. identified: What is missing is link_expansion" in workbench.doubt("link_sag")["warning"]
-    )
+    assert {effect["warning"] for effect in workbench.effects()["effects"]} == {None}, "it takes a diagnosis"
+    assert workbench.doubt("link_expansion", [])["warning"] == ""
+    said = workbench.doubt("link_sag", [])["warning"]
+    assert "link_sag is not named. identified: What is missing is link_expansion" in said
     workbench.make("add", "link_expansion", workbench.revision)
     offered = workbench.effects()
     assert offered["noise"].startswith("Nothing is missing")
     assert {effect["explained"] for effect in offered["effects"]} == {None}
-    warning = workbench.doubt(offered["effects"][0]["effect"])["warning"]
-    assert warning.endswith(f"is not named. adequate: {offered['noise']}")
+    first = offered["effects"][0]
+    assert first["warning"].endswith(f"is not named. adequate: {offered['noise']}")
+    assert workbench.doubt(first["effect"], [])["warning"] == first["warning"]
 
 
 def test_the_fall_is_from_the_machine_without_effects_on_rows_that_count_in_both(workbench):
@@ -125,3 +126,11 @@ def test_the_fall_is_from_the_machine_without_effects_on_rows_that_count_in_both
     assert bool(made["fall"]["differ"]) == (made["used"] != before["used"])
     _, rows = unpacked(workbench.opened.rows())
     assert np.abs(rows["residual"]).mean() < np.abs(rows["start"]).mean()
+
+
+def test_a_doubt_follows_steps_that_another_workbench_has_made(workbench, path, tmp_path):
+    doubter = Workbench(path, tmp_path / "tripod.model.yaml", None)
+    assert doubter.doubt("link_expansion", [])["warning"] == ""
+    workbench.make("add", "link_expansion", workbench.revision)
+    (first, *_) = workbench.effects()["effects"]
+    assert doubter.doubt(first["effect"], [])["warning"] == first["warning"] != ""
