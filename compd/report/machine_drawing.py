@@ -15,6 +15,8 @@ from compd.report.axis_colours import AXIS_COLOURS
 from compd.rotation import to_outer
 
 PANEL_PX, MARGIN_PX, TITLE_PX = 380, 46, 40
+# Below the views, for the axes and the bar of the scale.
+FOOT_PX = 40
 # Directions of the views: where x, y and z of {M} point on the page, to the right and up.
 VIEWS = {
     "from above": np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
@@ -31,7 +33,7 @@ def machine_svg(model: MachineModel, name: str) -> str:
     tool and the axes of {M}."""
     parts = _Parts(model)
     width = PANEL_PX * len(VIEWS)
-    height = PANEL_PX + TITLE_PX + 34
+    height = PANEL_PX + TITLE_PX + FOOT_PX + 34
     body: list[str] = [
         f'<text x="14" y="26" font-size="17" font-weight="600">{escape(name)} at machine zero: {model.links} rods, '
         f"{model.scales} actuators, {6 - model.links} hinges</text>"
@@ -140,7 +142,7 @@ def _panel(parts: _Parts, title: str, view: FloatArray, left_px: int, numbered: 
 
 def _axes(view: FloatArray, left_px: int) -> list[str]:
     """The axes of {M} in the lower left corner."""
-    x0, y0, size = left_px + 40.0, TITLE_PX + PANEL_PX - 34.0, 26.0
+    x0, y0, size = left_px + 40.0, TITLE_PX + PANEL_PX + FOOT_PX - 34.0, 26.0
     body = []
     for name, unit in zip("xyz", np.eye(3), strict=True):
         right, up = size * (view @ unit)
@@ -158,7 +160,7 @@ def _scale_bar(px_per_mm: float, left_px: int) -> list[str]:
     about = 0.2 * PANEL_PX / px_per_mm
     power = 10.0 ** math.floor(math.log10(about))
     length = max(step * power for step in (1, 2, 5) if step * power <= about)
-    x1, y = left_px + PANEL_PX - 24.0, TITLE_PX + PANEL_PX - 20.0
+    x1, y = left_px + PANEL_PX - 24.0, TITLE_PX + PANEL_PX + FOOT_PX - 20.0
     x0 = x1 - length * px_per_mm
     return [
         f'<line x1="{x0:.1f}" y1="{y}" x2="{x1}" y2="{y}" stroke="#222" stroke-width="2"/>',

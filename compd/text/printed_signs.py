@@ -11,4 +11,4 @@ _CELSIUS = re.compile(r"(?<![\w.-])degC\b")
 
 def typeset(text: str) -> str:
     """The text with signs of print: "0.12 +- 0.02 um/K" is "0.12 ± 0.02 µm/K"; a name such as `tip_x_um` stays."""
-    return _CELSIUS.sub("°C", _MICRO.sub(r"µ\1", text)).replace(" +- ", " ± ").replace(" -> ", " → ")
+    return _CELSIUS.sub("°C", _MICRO.sub(r"µ\1", text)).replace("+- ", "± ").replace(" -> ", " → ")

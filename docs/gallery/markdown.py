@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from compd.model.library import load_library
 from compd.simulation.causes.catalogue import CAUSES
+from compd.text import typeset
 from docs.gallery.cases import DIAGNOSE_COMMAND
 from docs.gallery.result import Result
 
@@ -21,7 +22,7 @@ def gallery_text(results: Sequence[Result], picture_folder: str) -> str:
         f"{result.after_um:.2f} | {result.floor_um:.2f} |"
         for result in results
     ]
-    head = ["| case | verdict | before, um | after, um | noise, um |", "|---|---|---:|---:|---:|"]
+    head = ["| case | verdict | before, µm | after, µm | noise, µm |", "|---|---|---:|---:|---:|"]
     cases = [line for result in results for line in _case(result, picture_folder)]
     return "\n".join([*head, *rows, "", *cases])
 
@@ -44,10 +45,10 @@ def _case(result: Result, picture_folder: str) -> list[str]:
     lines += [
         f'Full pages with every figure: <a href="{diagnosis}">diagnosis</a>, <a href="{comparison}">comparison</a>.',
         "",
-        f"- **Verdict**: {result.verdict}. {result.summary}",
+        f"- **Verdict**: {result.verdict}. {typeset(result.summary)}",
         f"- **What was hidden**: {_hidden(result)}",
-        f"- **Error on other days**: {result.before_um:.2f} um before, {result.after_um:.2f} um after with {learned}; "
-        f"noise alone is {result.floor_um:.2f} um.",
+        f"- **Error on other days**: {result.before_um:.2f} µm before, {result.after_um:.2f} µm after with {learned}; "
+        f"noise alone is {result.floor_um:.2f} µm.",
         f"- **Commands**: {', '.join(f'`compd {shlex.join(command)}`' for command in commands)}",
         "",
     ]

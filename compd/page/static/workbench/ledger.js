@@ -8,7 +8,7 @@ const words = (effect) => effect.replaceAll("_", " ");
 
 export class Ledger {
   constructor(place) {
-    this.place = place;
+    Object.assign(this, { place, redraw: () => {} });
   }
 
   undo() {
@@ -38,7 +38,8 @@ export class Ledger {
       ...[commands.undo, ...(effects.length ? [commands.fit, commands.remove] : []), ...(ledger.length ? [commands.ledger] : [])].map((command) => new CommandLine(command).row),
     );
     canvas.hidden = !ledger.length;
-    new ResizeObserver(() => this.draw(canvas, ledger, floor, unit)).observe(canvas);
+    this.redraw = () => this.draw(canvas, ledger, floor, unit);
+    new ResizeObserver(this.redraw).observe(canvas);
   }
 
   draw(canvas, ledger, floor, unit) {

@@ -69,5 +69,5 @@ bench.attempt(async () => {
   await open();
 });
 // pictures have the colours of the theme in which they are drawn
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => bench.summary && bench.attempt(() => bench.show(bench.summary)));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => [picture, ledger].forEach((shown) => shown.redraw()));
 window.bench = Object.assign(bench, { selection, picture }); // for tests and inspection

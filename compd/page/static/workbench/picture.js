@@ -15,7 +15,7 @@ export class Picture {
   // selection: of rows, shared by all views of rows
   constructor({ canvas, tabs, around, against, note }, selection) {
     Object.assign(this, { canvas, tabs, around, against, note, selection, rows: null, left: null, kind: "3D", views: {}, without: false, scales: new Map(), machine: "" });
-    const draw = () => this.draw();
+    const draw = (this.redraw = () => this.draw());
     this.lasso = new Lasso(canvas, { wanted: (event) => event.button === 0 && (event.shiftKey || this.kind !== "3D"), draw, around: (contains) => this.pick(contains) });
     this.turn = new Turn(canvas, draw);
     this.hover = new Hover(canvas, () => this.rows && { rows: this.rows, residual: this.shown, marks: this.marks, used: (row) => this.used(row) });
