@@ -198,6 +198,9 @@ class DiagnosisStep:
         Probability of so high a score by noise alone, corrected for all effects that were tried.
     parameters : tuple of ParameterEstimate
         Its numbers with standard errors.
+    taken : float
+        By how much it lowers the mean square on rows that were left out, beside those before it and not below the
+        noise floor, in squares of that; nan where the noise is not known.
     """
 
     fitted: FittedEffect
@@ -206,6 +209,7 @@ class DiagnosisStep:
     explained_fraction: float
     p_value: float
     parameters: tuple[ParameterEstimate, ...]
+    taken: float = math.nan
 
     @property
     def effect(self) -> Effect:

@@ -11,6 +11,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording, Comparison, compare
+from compd.diagnosis.little_effects import little_effects
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.phrases import best_description, followed_text
 from compd.diagnosis.words.summary import summary
@@ -158,11 +159,13 @@ def _conditions(comparison: Comparison) -> dict[str, FloatArray]:
 def evaluate_holdouts(diagnosis: Diagnosis, recordings: Sequence[AlignedRecording]) -> tuple[Diagnosis, list[Holdout]]:
     """Each holdout recording, and the diagnosis with what they say.
 
-    It is identified where it was likely, and what it found brings one of them down to its noise.
+    It is identified where it was likely, and what it found brings one of them down to its noise; an effect that takes
+    less than the noise leaves it there in any case.
     Raises CompdError as `evaluate_holdout` does.
     """
     holdouts = [evaluate_holdout(diagnosis, recording) for recording in recordings]
-    if diagnosis.verdict == "likely" and any(each.after.floor.known and each.after.at_floor for each in holdouts):
+    tells = diagnosis.verdict == "likely" and not little_effects(diagnosis.steps, diagnosis.criteria)
+    if tells and any(each.after.floor.known and each.after.at_floor for each in holdouts):
         diagnosis = replace(diagnosis, verdict="identified")
         diagnosis = replace(diagnosis, summary=summary(diagnosis))
     return diagnosis, holdouts

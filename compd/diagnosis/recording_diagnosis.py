@@ -37,11 +37,12 @@ from compd.diagnosis.findings import (
 from compd.diagnosis.implausible_effect import implausible_effect
 from compd.diagnosis.intercepts import beside, with_intercepts
 from compd.diagnosis.left_interval import left_interval_um
+from compd.diagnosis.little_effects import little_effects
 from compd.diagnosis.named_probability import NOT_TESTED, NamedProbability
 from compd.diagnosis.proposed_measurement import propose_measurement
 from compd.diagnosis.rival_selection import named_members
 from compd.diagnosis.search.better_sets import better_sets
-from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again
+from compd.diagnosis.search.explanation import Explanation, Progress, explain, explain_again, explain_little
 from compd.diagnosis.search.gross_rows import gross_rows
 from compd.diagnosis.search.place_significance import place_p_value
 from compd.diagnosis.search.problem import DiagnosisProblem, build_problem
@@ -161,7 +162,7 @@ def explain_residual(
     members = [explanation.losses.candidates[k] for k in explanation.members]
     weights = explanation.problem.weigh_beside(members)
     problem = build_problem(before, pool, criteria, weights)
-    explanation = explain_again(problem, explanation, progress)
+    explanation = explain_little(explain_again(problem, explanation, progress))
     named = named_members(explanation.losses, explanation.members)
     return replace(explanation, members=with_intercepts(explanation.losses, named))
 
@@ -267,9 +268,8 @@ def _verdict(
         if any(step.rivals for step in steps):
             return "ambiguous"
         effects = [step.effect for step in steps]
-        return (
-            "likely" if seen_once(problem.aligned, problem.comparison.used, effects, problem.criteria) else "identified"
-        )
+        once = seen_once(problem.aligned, problem.comparison.used, effects, problem.criteria)
+        return "likely" if once or little_effects(steps, problem.criteria) else "identified"
     if steps:
         return "partial"
     may_be_noise = not problem.floor_known and not problem.comparison.floor.above_declared
@@ -320,6 +320,7 @@ def _steps(
                 explained_fraction=explained_fraction(loss_before, loss, floor),
                 p_value=p_value_by_effect[fitted.effect.id],
                 parameters=tuple(parameters),
+                taken=problem.above_floor(loss_before) - problem.above_floor(loss),
             )
         )
     return tuple(steps)

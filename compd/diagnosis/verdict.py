@@ -18,6 +18,7 @@ from compd.diagnosis.findings import (
     UnknownStates,
     UntestedEffect,
 )
+from compd.diagnosis.little_effects import little_effects
 from compd.diagnosis.named_probability import NamedProbability
 from compd.result_tables import Columns, data_frame, html_table
 from compd.text import nan_to_null
@@ -39,8 +40,9 @@ class Diagnosis:
     ----------
     verdict : str
         ``"adequate"``: nothing is missing. ``"identified"``: the effects of `steps` are what is missing.
-        ``"likely"``: they explain it, but a thermal one was seen in one warm-up only, or `probability` is too small;
-        another session, a sealed recording or a second cycle of heating and cooling makes it identified.
+        ``"likely"``: they explain it, but a thermal one was seen in one warm-up only, or `probability` is too small,
+        or one takes less than the noise. Another session, a sealed recording or a second cycle of heating and cooling
+        makes it identified; of what takes less than the noise, a recording in which it does more.
         ``"ambiguous"``: they explain it, but the recording cannot tell at least one of them from a rival.
         ``"partial"``: they explain a part; the rest is above the noise, or the noise is not known.
         ``"unexplained"``: no effect of the library gains; `depends_on` says what the error follows.
@@ -131,6 +133,8 @@ class Diagnosis:
             return f"these rows cannot tell {effect} from {step.rivals[0].name}. {said}"
         if not all(parameter.plausible for parameter in step.parameters):
             return f"{effect} needs an implausible number. {said}"
+        if self.verdict == "likely" and effect in little_effects(self.steps, self.criteria):
+            return f"{effect} takes less than the noise and may be something else. {said}"
         return "" if self.probability_from.confirms else f"{effect} may be something else. {said}"
 
     def to_dataframe(self) -> pd.DataFrame:

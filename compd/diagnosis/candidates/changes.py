@@ -7,10 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compd.arrays import FloatArray
+from compd.arrays import BoolArray, FloatArray
 from compd.comparison import AlignedRecording
 from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.candidates import Candidate
+
+# A column that varies by less of what it does in all rows does not vary.
+MIN_SHARE = 1e-6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,7 +50,11 @@ def change_candidates(
     times_s: Sequence[float],
     criteria: CandidateCriteria = CandidateCriteria(),
 ) -> list[ChangeCandidate]:
-    """Each of some effects from each moment on; what it did before stays as it is. A drift begins at nought."""
+    """Each of some effects from each moment on; what it did before stays as it is. A drift begins at nought.
+
+    An effect that varies with something has to vary after the moment, too: else all rows are shifted alike, which says
+    nothing of the effect.
+    """
     time_s = aligned.rows.time_s
     return [
         ChangeCandidate(
@@ -63,7 +70,17 @@ def change_candidates(
         )
         for candidate in candidates
         for moment_s in times_s
+        if _may_change(candidate.columns_um[aligned.usable.mask], time_s[aligned.usable.mask] >= moment_s)
     ]
+
+
+def _may_change(columns_um: FloatArray, after: BoolArray) -> bool:
+    """Whether columns (N, m, P) vary in the rows `after` (N,), or never do."""
+    known = np.isfinite(columns_um).all(axis=(1, 2))
+    if not (known & after).any():
+        return False
+    varies = np.ptp(columns_um[known], axis=0)
+    return not varies.any() or bool((np.ptp(columns_um[known & after], axis=0) > MIN_SHARE * varies).any())
 
 
 def _after(columns_um: FloatArray, time_s: FloatArray, moment_s: float, *, drifts: bool) -> FloatArray:

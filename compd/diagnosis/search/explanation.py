@@ -142,6 +142,23 @@ def explain_again(problem: DiagnosisProblem, before: Explanation, progress: Prog
     return Explanation(problem, losses, _ordered(losses, best.members), fits, fit_by_place, before.start)
 
 
+def explain_little(explanation: Explanation) -> Explanation:
+    """Where nothing is named: the effects that take more than all that may stay unnamed, if they leave noise alone.
+
+    What stays unnamed is `disturbance` at most: an effect that surely takes more is named, at this lower price.
+    """
+    problem, criteria = explanation.problem, explanation.problem.criteria
+    if explanation.members or not problem.floor_known:
+        return explanation
+    price = float(np.log1p(criteria.disturbance**2))
+    lower = replace(problem, criteria=replace(criteria, effect_price=min(price, criteria.effect_price)))
+    effects = [candidate for candidate in explanation.losses.candidates if candidate.kind in ("effect", "constant")]
+    losses, best = _refined(lower, effects, ())
+    if not best.members or not problem.may_be_noise(best.cv_loss):
+        return explanation
+    return replace(explanation, losses=losses, members=_ordered(losses, best.members), fits=(), fit_by_place={})
+
+
 def _beats_descriptions(problem: DiagnosisProblem, losses: SubsetLosses, best: Subset) -> bool:
     """Whether no description could score better than a set of effects: at the floor each costs its price at least.
 

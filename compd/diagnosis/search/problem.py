@@ -86,6 +86,10 @@ class DiagnosisProblem:
         half_step = 3.0 * float(np.mean((self.comparison.floor.unseen_um / self.sigma_um) ** 2))
         return max(1.0, half_step / self.criteria.most_at_floor)
 
+    def above_floor(self, loss: float) -> float:
+        """By how much a loss is above the least one, 0 at least; nan where the noise is not known."""
+        return max(loss - self.least_loss, 0.0) if self.floor_known else float("nan")
+
     def may_be_noise(self, loss: float) -> bool:
         """Whether a loss at which nothing more was found is at the floor, or chance as the floor is from few repeats.
 

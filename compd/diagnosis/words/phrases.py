@@ -19,6 +19,7 @@ from compd.diagnosis.findings import (
     ParameterEstimate,
     UntestedEffect,
 )
+from compd.diagnosis.little_effects import little_effects
 from compd.diagnosis.thermal_evidence import seen_once
 from compd.diagnosis.verdict import Diagnosis
 from compd.model.effects import Effect
@@ -314,6 +315,14 @@ def too_small(diagnosis: Diagnosis) -> CandidateResult | None:
     """The effect that surely acts and takes too little for a name, the one that takes most; None without any."""
     small = [candidate for candidate in diagnosis.candidates if candidate.status == "too_small"]
     return min(small, key=lambda candidate: candidate.heldout_rms_um, default=None)
+
+
+def little_clause(diagnosis: Diagnosis) -> str:
+    """Which effects take so little that others may be behind them, and what tells that; "" where none does."""
+    names = little_effects(diagnosis.steps, diagnosis.criteria)
+    take, it, does = ("takes", "it", "does") if len(names) == 1 else ("take", "they", "do")
+    doubt = f"{join_words(names)} {take} less than the noise and may be something else"
+    return f"{doubt}: measure where {it} {does} more" if names else ""
 
 
 def was_any_tried(diagnosis: Diagnosis) -> bool:

@@ -12,6 +12,7 @@ from compd.diagnosis.words.phrases import (
     change_text,
     doubts,
     followed_text,
+    little_clause,
     named_with_place,
     question_text,
     rivals_text,
@@ -60,6 +61,8 @@ def _verdict(diagnosis: Diagnosis) -> str:
             falls = f"{names} {be} likely what is missing: with {them} the error of {before} falls to {after}, {noise}."
             if thermal_in_one_session(diagnosis):
                 return f"{falls} One warm-up proves no cause: {CONFIRM}."
+            if little := little_clause(diagnosis):
+                return f"{falls} But {little}."
             return f"{falls} Another set may be as good (probability {diagnosis.probability:.2f}): {DECIDE}."
         case "ambiguous":
             pairs = "; ".join(rivals_text(step) for step in diagnosis.steps if step.rivals)

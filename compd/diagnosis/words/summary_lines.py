@@ -20,6 +20,7 @@ from compd.diagnosis.words.phrases import (
     followed_text,
     gross_texts,
     is_best_a_change,
+    little_clause,
     named_with_place,
     parameter_texts,
     physics_clause,
@@ -244,6 +245,7 @@ def _sure(diagnosis: Diagnosis) -> list[str]:
     implausible = [text for text in numbers if any(word in text for word in (IMPLAUSIBLE, NOT_DETERMINED, "outside:"))]
     names = thermal_in_one_session(diagnosis)
     session = [f"{join_words(names)} seen in one session only: measure on another day"] if names else []
+    session += [clause for clause in (little_clause(diagnosis),) if clause and diagnosis.verdict == "likely"]
     p_values = [step.p_value for step in steps] or ([] if finding is None else [finding.p_value])
     chance = [clause for clause in (chance_clause(p_values),) if clause]
     implausible += [f"{step.effect.id}: {remark}" for step in steps for remark in step.effect.remarks]

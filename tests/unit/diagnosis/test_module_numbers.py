@@ -87,6 +87,7 @@ NUMBERS = {
     "comparison/thinning.py": {"SEED": SEED},
     "diagnosis/implausible_effect.py": {"_FREE": CONDITIONING},
     "diagnosis/undetermined.py": {"_NAMED_SHARE": WORDS, "MAX_NAMED": WORDS, "_ALIKE": WORDS},
+    "diagnosis/candidates/changes.py": {"MIN_SHARE": ROUNDING},
     "diagnosis/candidates/proxies.py": {"ZERO_DEGC_K": DEFINITION},
     "diagnosis/candidates/constant.py": {"MM_PER_UM": DEFINITION, "MIN_OUTSIDE": ROUNDING},
     "diagnosis/descriptions/empirical_terms.py": {

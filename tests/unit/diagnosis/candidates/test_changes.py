@@ -73,6 +73,22 @@ def test_a_drift_that_begins_does_so_at_nought(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.diff(column[after]), np.diff(whole.columns_um[after, 0, 0]))
 
 
+def test_an_effect_that_does_not_vary_after_a_moment_is_no_change_of_it(tmp_path: Path) -> None:
+    moved = np.where(np.arange(ROWS) < 200, np.resize([1.0, -1.0], ROWS), -1.0)
+    columns = {"moved_1": moved, "position_mm": np.linspace(0, 100, ROWS)}
+    shifted_um = 2.0 * moved + 1.5 * (np.arange(ROWS) >= 200)
+    aligned = record_external(tmp_path / "run.csv", columns, {"x": shifted_um}, model_mm={"x": columns["position_mm"]})
+    candidates = library_pool(aligned, [PLAY, GAIN], ()).candidates
+    found = change_candidates(candidates, aligned, [1500.0, 2000.0])
+    assert {(change.whole.name, change.time_s) for change in found} == {
+        ("play", 1500.0),
+        ("gain", 1500.0),
+        ("gain", 2000.0),
+    }
+    lines = " ".join(" ".join(summary_lines(diagnose(aligned, (), None, [PLAY, GAIN]))).split())
+    assert "every row is shifted alike" in lines
+
+
 def test_play_that_grows_is_found_with_its_time_beside_the_play_that_was_there(tmp_path: Path) -> None:
     diagnosis = diagnose(stage(tmp_path / "run.csv", 2.0, 5.0), (), None, [PLAY, GAIN])
     assert diagnosis.verdict == "partial"
