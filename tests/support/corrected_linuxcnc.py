@@ -29,6 +29,8 @@ HEXAPOD = "hexapod.yaml"
 CLAMP_MM, SLEW_MM_PER_S, PERIOD_S = 0.2, 0.5, 0.001
 # halsampler prints six decimals of two commands, and limit3 may exceed its slew a little where it stops.
 ROUNDING_MM = 3e-6
+# limit3 can swing about its input for ever, by a few times what it accelerates by in a period: 20 mm/s2 * (1 ms)**2.
+SETTLED_MM = 1e-4
 # Of a machine that is to be armed when a fault comes.
 TRIES = 5
 # Between any two places within reach, for as long as a test likes.

@@ -14,7 +14,7 @@ import pytest
 
 from compd.demo.linuxcnc.controller import obstacle
 from tests.injection.faults import Shows
-from tests.support.corrected_linuxcnc import ROUNDING_MM, CorrectedLinuxCnc, check_corrections, moved_mm
+from tests.support.corrected_linuxcnc import SETTLED_MM, CorrectedLinuxCnc, check_corrections, moved_mm
 from tests.support.simulated import run_directory
 from tests.support.watching import until
 
@@ -159,13 +159,13 @@ def test_homing_again(moving: CorrectedLinuxCnc) -> None:
     moving.until(
         "the offsets are 0",
         fault_s,
-        lambda samples: [sample for sample in samples[-20:] if sample.largest_mm < ROUNDING_MM],
+        lambda samples: [sample for sample in samples[-20:] if sample.largest_mm < SETTLED_MM],
     )
     moving.controller.do("home")
-    assert moving.for_s(0.5)[-1].largest_mm < ROUNDING_MM
+    assert moving.for_s(0.5)[-1].largest_mm < SETTLED_MM
     arms_only_when_asked(moving, 12)
     moving.until(
-        "corrections are back", fault_s, lambda samples: [s for s in samples[-20:] if s.largest_mm > ROUNDING_MM]
+        "corrections are back", fault_s, lambda samples: [s for s in samples[-20:] if s.largest_mm > SETTLED_MM]
     )
 
 

@@ -285,7 +285,7 @@ def test_every_result_shows_its_verdict_first_and_names_itself_in_a_line(
         (comparison, "tripod-cmm: measured and modelled differ"),
         (diagnosis, "identified: What is missing is link_expansion"),
         (model, "Model of tripod-cmm"),
-        (plan, "link_elasticity and joint_contact"),
+        (plan, "The errors from link_elasticity and joint_contact"),
     ]
     for thing, begin in firsts:
         text = thing._repr_html_()
