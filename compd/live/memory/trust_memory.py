@@ -118,9 +118,9 @@ class TrustMemory:
     def show(self, i: int, value: float, time_s: float) -> None:
         """Note what the gauge of channel `i` gave at `time_s` (s), believed or not, and count how often it repeats.
 
-        What was given at a time counts once.
+        The same reading counts once.
         """
-        if time_s == self.shown_s[i]:
+        if (value, time_s) == (self.shown[i], self.shown_s[i]):
             return
         change = abs(value - float(self.shown[i]))
         if change == 0.0:

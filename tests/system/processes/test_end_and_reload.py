@@ -30,6 +30,7 @@ def check_goodbye(seen: list[Seen], reason: str) -> None:
     """
     announced = next((i for i, s in enumerate(seen) if reason in s["reason"]), None)
     assert announced is not None, f"no reason contains {reason!r}: {seen[-1].setpoint}"
+    assert seen[announced]["state"] != State.STOP, "it is held before it stops"
     for s in seen[announced:]:
         own, _, _ = s["reason"].partition(reason)
         if s["state"] == State.REFUSED:
