@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,16 @@ Phase = Literal["moving", "dwelling"]
 # Drives of a measuring machine.
 SPEED_MM_PER_S = 50.0
 ACCELERATION_MM_PER_S2 = 250.0
+
+
+class Drives(NamedTuple):
+    """Limits of the drives of each link: speed, mm/s, and acceleration, mm/s2."""
+
+    mm_per_s: float = SPEED_MM_PER_S
+    mm_per_s2: float = ACCELERATION_MM_PER_S2
+
+
+DRIVES = Drives()
 
 
 @dataclass(frozen=True)
@@ -68,19 +78,21 @@ class Approach:
     A link that cannot stop at its end any more comes back to it.
     """
 
-    def __init__(self, start_mm: FloatArray, start_mm_per_s: FloatArray, end_mm: FloatArray) -> None:
-        """`start_mm`, `end_mm`: (n,). `start_mm_per_s`: (n,), at most SPEED_MM_PER_S."""
+    def __init__(
+        self, start_mm: FloatArray, start_mm_per_s: FloatArray, end_mm: FloatArray, drives: Drives = DRIVES
+    ) -> None:
+        """`start_mm`, `end_mm`: (n,). `start_mm_per_s`: (n,), at most the speed of the drives."""
         self.end_mm = end_mm
-        self._start_mm, self._start_mm_per_s = start_mm, start_mm_per_s
-        acceleration = ACCELERATION_MM_PER_S2
-        self._sign = np.where(end_mm >= stopping_place_mm(start_mm, start_mm_per_s), 1.0, -1.0)
+        self._start_mm, self._start_mm_per_s, self._drives = start_mm, start_mm_per_s, drives
+        acceleration = drives.mm_per_s2
+        self._sign = np.where(end_mm >= stopping_place_mm(start_mm, start_mm_per_s, drives), 1.0, -1.0)
         way_mm, speed = self._sign * (end_mm - start_mm), self._sign * start_mm_per_s
-        peak = np.minimum(np.sqrt(np.maximum(acceleration * way_mm + speed**2 / 2, 0.0)), SPEED_MM_PER_S)
+        peak = np.minimum(np.sqrt(np.maximum(acceleration * way_mm + speed**2 / 2, 0.0)), drives.mm_per_s)
         even_mm = np.maximum(way_mm - (2 * peak**2 - speed**2) / (2 * acceleration), 0.0)
         self._peak_mm_per_s = peak
         # ends of speeding up, of even speed and of braking, s
         self._faster_s = np.maximum(peak - speed, 0.0) / acceleration
-        self._even_s = self._faster_s + even_mm / SPEED_MM_PER_S
+        self._even_s = self._faster_s + even_mm / drives.mm_per_s
         self._ends_s = self._even_s + peak / acceleration
 
     @property
@@ -89,7 +101,7 @@ class Approach:
 
     def position_mm(self, time_s: float) -> FloatArray:
         """(n,) scale positions `time_s` after the start; `end_mm` after the end."""
-        half = 0.5 * ACCELERATION_MM_PER_S2 * self._sign
+        half = 0.5 * self._drives.mm_per_s2 * self._sign
         faster_s, left_s = np.minimum(time_s, self._faster_s), np.maximum(self._ends_s - time_s, 0.0)
         before_mm = self._start_mm + self._start_mm_per_s * faster_s + half * faster_s**2
         before_mm = before_mm + self._sign * self._peak_mm_per_s * np.maximum(time_s - self._faster_s, 0.0)
@@ -98,21 +110,21 @@ class Approach:
 
     def speeds_mm_per_s(self, time_s: float) -> FloatArray:
         """(n,) speeds `time_s` after the start."""
-        acceleration = ACCELERATION_MM_PER_S2 * self._sign
+        acceleration = self._drives.mm_per_s2 * self._sign
         faster_s, left_s = np.minimum(time_s, self._faster_s), np.maximum(self._ends_s - time_s, 0.0)
         before = self._start_mm_per_s + acceleration * faster_s
         speeds: FloatArray = np.where(time_s < self._even_s, before, acceleration * left_s)
         return speeds
 
 
-def stopping_place_mm(start_mm: FloatArray, start_mm_per_s: FloatArray) -> FloatArray:
+def stopping_place_mm(start_mm: FloatArray, start_mm_per_s: FloatArray, drives: Drives = DRIVES) -> FloatArray:
     """(n,) stopping positions of links that brake from now on."""
-    return start_mm + start_mm_per_s * np.abs(start_mm_per_s) / (2 * ACCELERATION_MM_PER_S2)
+    return start_mm + start_mm_per_s * np.abs(start_mm_per_s) / (2 * drives.mm_per_s2)
 
 
-def braking(start_mm: FloatArray, start_mm_per_s: FloatArray) -> Approach:
+def braking(start_mm: FloatArray, start_mm_per_s: FloatArray, drives: Drives = DRIVES) -> Approach:
     """Motion of links that come to rest."""
-    return Approach(start_mm, start_mm_per_s, stopping_place_mm(start_mm, start_mm_per_s))
+    return Approach(start_mm, start_mm_per_s, stopping_place_mm(start_mm, start_mm_per_s, drives), drives)
 
 
 def standing(here_mm: FloatArray) -> Approach:
@@ -171,9 +183,9 @@ class SetpointMotion:
 
     point = None
 
-    def __init__(self, start: Approach) -> None:
+    def __init__(self, start: Approach, drives: Drives = DRIVES) -> None:
         """start : motion of the (n,) links until the first setpoint is given."""
-        self._approach = start
+        self._approach, self._drives = start, drives
         self._since_s = 0.0
 
     @property
@@ -183,7 +195,7 @@ class SetpointMotion:
 
     @setpoint_mm.setter
     def setpoint_mm(self, setpoint_mm: FloatArray) -> None:
-        self._approach = Approach(self.position_mm, self.speeds_mm_per_s, setpoint_mm)
+        self._approach = Approach(self.position_mm, self.speeds_mm_per_s, setpoint_mm, self._drives)
         self._since_s = 0.0
 
     @property

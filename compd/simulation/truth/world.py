@@ -20,7 +20,16 @@ from compd.simulation.truth.frame import Frame
 from compd.simulation.truth.heat import HELD_TIME_CONSTANT_S
 from compd.simulation.truth.joints import Joints
 from compd.simulation.truth.mechanism import Mechanism
-from compd.simulation.truth.motion import Approach, Phase, SetpointMotion, TourMotion, braking, standing
+from compd.simulation.truth.motion import (
+    DRIVES,
+    Approach,
+    Drives,
+    Phase,
+    SetpointMotion,
+    TourMotion,
+    braking,
+    standing,
+)
 from compd.simulation.truth.plan_motion import DWELL_S, PlanMotion
 from compd.simulation.truth.planned_row import PlannedRow
 from compd.simulation.truth.sensors import Sensors
@@ -56,19 +65,22 @@ class World:
         weather: Weather | None = None,
         rows: Sequence[PlannedRow] = (),
         air_at_zero: AirAtZero = STANDARD_AIR,
+        drives: Drives = DRIVES,
     ) -> None:
         """seed : of joints, weather, tour and gauge noise. speedup : factor by which weather and warm-up run faster
         than the machine moves.
 
         zero_hold_s : time at machine zero before switch-on; a command, `start_tour` or `start_plan` ends it as well.
         causes : in addition to those in `strengths`. weather : default an air-conditioned laboratory.
-        rows : measured instead of the tour. air_at_zero : of the default weather.
+        rows : measured instead of the tour. air_at_zero : of the default weather. drives : by which commands are
+        followed.
         """
         self._strengths = strengths or Strengths()
         weather_rng, joint_rng, self._tour_rng, sensor_rng = (
             np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)
         )
         self._speedup = speedup
+        self._drives = drives
         self.zero_hold_s = zero_hold_s
         self._mechanism = Mechanism(geometry)
         self._causes = tuple(causes)
@@ -79,7 +91,7 @@ class World:
         self._sensors = Sensors(geometry, wiring, self._strengths, sensor_rng)
         self._stroke_mm = self._mechanism.stroke_mm
         self._motion: TourMotion | SetpointMotion | PlanMotion | FollowMotion = SetpointMotion(
-            standing(np.zeros(self._mechanism.scales))
+            standing(np.zeros(self._mechanism.scales)), drives
         )
         self._rows = rows
         self._unsolved_s = 0.0, 0.0  # time (s) since the last `advance`, and the part of it with moving links
@@ -103,7 +115,7 @@ class World:
             try:
                 self._advance_state(self._motion.position_mm, self._state.posture, passed_s, moved_s)
             except KinematicsError:
-                self._motion = SetpointMotion(standing(self._state.scale_mm))
+                self._motion = SetpointMotion(standing(self._state.scale_mm), self._drives)
                 self.mode = "blocked"
         self._readings = self._read_gauges()
 
@@ -128,7 +140,7 @@ class World:
         """
         self.time_s += time_s
         self._advance_state(scale_mm, guess, time_s, travel_s)
-        self._motion = SetpointMotion(standing(scale_mm))
+        self._motion = SetpointMotion(standing(scale_mm), self._drives)
         self.mode, self.zero_hold_s = "commanded", 0.0
         self._readings = self._read_gauges()
 
@@ -194,7 +206,7 @@ class World:
         self._solve(setpoint_mm, self._state.posture)
         self._leave_plan()
         if not isinstance(self._motion, SetpointMotion):
-            self._motion = SetpointMotion(self._braking())
+            self._motion = SetpointMotion(self._braking(), self._drives)
         self._motion.setpoint_mm = setpoint_mm
         self.mode, self.zero_hold_s = "commanded", 0.0
 
@@ -344,7 +356,7 @@ class World:
 
     def _braking(self) -> Approach:
         """The motion that brings the links to rest from now on."""
-        return braking(self._motion.position_mm, self._motion.speeds_mm_per_s)
+        return braking(self._motion.position_mm, self._motion.speeds_mm_per_s, self._drives)
 
     def _leave_plan(self) -> None:
         """Release what the plan holds, except for a load."""

@@ -1,0 +1,1 @@
+"""The daemon's parts, a machine and its devices in virtual time: see `tests.worlds.world`."""
