@@ -226,6 +226,13 @@ class GaugeOptions(BaseModel):
         description="lengths: whether the device shows the same value again after its power was off; false: it counts "
         "from where it was switched on; left out: what the driver knows of its device",
     )
+    restart_s: float = Field(
+        default=0.5,
+        gt=0,
+        allow_inf_nan=False,
+        description="lengths: the shortest time in which the device can restart and count anew; after a shorter "
+        "time without an answer the limits of motion judge its value",
+    )
     trust_after_loss: bool = Field(
         default=False,
         description="lengths: the device keeps its power and goes on counting while only its cable is out, so that it "

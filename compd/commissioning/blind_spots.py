@@ -178,9 +178,10 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
     BlindSpot(
         "power_cut",
         "displays and computer lose their power together; the displays count anew from where they stand",
-        "at the start, a gauge that counts must show what it showed last, which is on the disk",
+        "a gauge that counts must show what it showed last, which is on the disk, and a person looks whether the "
+        "machine stands where it stood",
         "",
-        "displays that come back with the same number although the machine was moved; a state directory that was lost",
+        "a person who accepts without a look; a state directory that was lost",
         power_cut,
     ),
     BlindSpot(
@@ -196,11 +197,10 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
     BlindSpot(
         "count_lost_in_a_gap",
         "a gauge loses its count while its replies are lost, or it is not read",
-        "at rest: it shows another value, and no other gauge has moved. On the move: the ways of the other links, or "
-        "its own speed, say where it must be; where they do not, or the gap was longer than `stale_after_s`, a person "
-        "is asked for",
+        "at rest: it shows another value, and no other gauge has moved. On the move: its limits of motion; after more "
+        "than its `restart_s` without an answer a person is asked for",
         "",
-        "what the ways of the links leave open; a comparator on the move, within its limits of motion",
+        "on the move, what its limits of motion allow in a shorter gap",
         gap,
     ),
     BlindSpot(

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from compd.commissioning.drift_costs import DRIFT_UM, DriftCost, drift_costs, exchange_mm
-from compd.commissioning.jump_trials import FeignedJump, feigned_jumps
+from compd.commissioning.jump_trials import FeignedJump, believed_jump, feigned_jumps
 from compd.commissioning.line_budget import LineBudget, line_budgets
 from compd.configuration import Configuration
 from compd.errors import CompdError, Problem
-from compd.live.acquisition import MIN_MOTION, MIN_WAY_MM, UNIT_LIMITS, WAY_SHARE
+from compd.live.acquisition import MIN_MOTION, UNIT_LIMITS
 from compd.machine_builder import build_model
 from compd.stated_noise import SCATTER_RATIO, tolerance_mm
 from compd.units import UM_PER_MM
@@ -20,8 +20,6 @@ from compd.units import UM_PER_MM
 STEEL_PPM_PER_K = 11.5
 # Assumed speed of a machine without a declared one: a measuring machine between two points.
 _USUAL_SPEED_MM_PER_S = 50.0
-# Motion (mm) of a link at that speed in a gap of 0.2 s.
-GAP_WAY_MM = 10.0
 _MM_PER_INCH = 25.4
 
 
@@ -201,10 +199,13 @@ def gap(figures: Figures) -> str:
     counting = [j.gauge for j in jumps if not _is_absolute(figures.configuration, j.gauge)]
     if not counting:
         return ""
-    error_mm = WAY_SHARE * GAP_WAY_MM + MIN_WAY_MM
+    gauges, noise_of = figures.configuration.gauges, figures.configuration.noise_of
+    error_mm, gauge = max((believed_jump(gauges[g], gauges[g].restart_s, noise_of(g).um)[1], g) for g in counting)
+    if math.isinf(error_mm):
+        return f"nothing limits how {gauge} moves; give its `acceleration_mm_per_s2`"
     return (
-        f"in a gap in which the links move by {GAP_WAY_MM:g} mm, {error_mm:.2g} mm of a scale: "
-        f"{error_mm * figures.leverage('scale'):.2f} mm at the tip; at rest {_at_rest(figures)}"
+        f"on the move up to {error_mm:.2g} mm of {gauge} in {gauges[gauge].restart_s:g} s without an answer: "
+        f"{error_mm * figures.leverage('scale'):.2g} mm at the tip; at rest {_at_rest(figures)}"
     )
 
 

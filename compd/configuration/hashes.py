@@ -13,7 +13,7 @@ from compd.operation_settings import TargetSettings, VoteSettings
 
 # Keys about the trust in a gauge, not its value.
 NOT_IN_ZERO = (
-    *("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "trust_after_loss"),
+    *("noise_um", "noise", "acceleration_mm_per_s2", "absolute", "restart_s", "trust_after_loss"),
     *("plausible", "fastest_change", "apart", "tolerance_mm", "sha256"),
 )
 # Options of later releases, with their neutral values.
@@ -21,6 +21,7 @@ _LATER_OPTIONS: Mapping[str, Any] = {
     "fastest_mm_per_s": None,
     "acceleration_mm_per_s2": None,
     "absolute": None,
+    "restart_s": 0.5,
     "trust_after_loss": False,
     "allow": [],
     "token_file": None,

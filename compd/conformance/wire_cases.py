@@ -32,7 +32,7 @@ IN_ANY_ORDER = 300
 
 def _time_stamp(session: ConformanceSession, _: Subject) -> CaseResult:
     """The harness checks every stamp of every poll; here the reply takes long to come."""
-    return faulty_polls(session, "time stamp: when asked, not when answered", GOOD, one_poll_each(faults.late(0.5)))
+    return faulty_polls(session, "time stamp: when asked, not when answered", GOOD, one_poll_each(faults.late(0.15)))
 
 
 def _no_reply(session: ConformanceSession, _: Subject) -> CaseResult:

@@ -20,3 +20,5 @@ from .registry import polled_kind as polled_kind
 from .registry import readable_definition as readable_definition
 from .stream import StreamLine as StreamLine
 from .stream import shown as shown
+from .usual_time import USUAL_SHARE as USUAL_SHARE
+from .usual_time import Durations as Durations

@@ -4,28 +4,20 @@ from __future__ import annotations
 
 import math
 import threading
-from collections import deque
 
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality
 from compd.lines.echo import is_echo
 from compd.lines.port import Port
+from compd.lines.usual_time import UsualWait
 
 SHOWN_BYTES = 40  # of a broken reply, in a fault's detail
 # Longest draining (timeouts) of a line that never becomes quiet.
 MAX_DRAIN_TIMEOUTS = 10
 # Least time (s) of a reply's rest on the wire for waiting as a whole instead of byte by byte.
 WORTH_SLEEPING_S = 1e-3
-# Replies of which the longest pause is kept in mind, and so many of them are needed.
-RESTS_IN_MIND, MIN_RESTS = 256, 20
-# The rest of a reply may take so much longer than it ever did beyond its time on the wire, and so much, s: an adapter
-# hands over what has come after its latency timer.
-SLOWER_REST, LATER_REST_S = 1.25, 10e-3
 # Least wait for a reply's rest, as a share of the timeout: a device may pause within a reply.
 MIN_REST = 0.5
-# Replies in a row with an abandoned rest, or one whose rest comes after all, that show a slower device; a single one
-# may have lost a byte.
-MAX_GIVEN_UP = 5
 
 
 def shown(data: bytes) -> str:
@@ -42,7 +34,7 @@ class StreamLine:
     """
 
     def __init__(self, port: Port, timeout_s: float, gap_s: float, clock: Clock, echo: bool = False) -> None:
-        """`timeout_s`: for the first byte of a reply, and again for the rest beyond its time on the wire.
+        """`timeout_s`: longest wait for the first byte of a reply, and again for the rest beyond its time on the wire.
 
         `gap_s`: silence before a request, s. `echo`: the adapter repeats every request, which is taken out.
         """
@@ -61,8 +53,9 @@ class StreamLine:
         self._no_event = threading.Event()  # never set: the clock waits for it to pause
         self._received = bytearray()
         self._last_byte_s = clock.monotonic()
-        self._rests_s: deque[float] = deque(maxlen=RESTS_IN_MIND)  # of whole replies, beyond their time on the wire
-        self._given_up = 0  # replies in a row, before the timeout; none has been whole since
+        self._first_byte = UsualWait(timeout_s)
+        self._rest = UsualWait(timeout_s, MIN_REST * timeout_s)  # of a reply, beyond its time on the wire
+        self._not_waited_s = 0.0  # what the last wait in vain was shorter than the timeout
         self._first_s = -math.inf  # when the first byte of the frame whose head was taken was there
 
     def send(self, request: bytes) -> float:
@@ -72,7 +65,7 @@ class StreamLine:
         INCOMPLETE or MISMATCH for any other.
         """
         self._wait_for_silence()
-        self._request, self._came = request, b""
+        self._request, self._came, self._not_waited_s = request, b"", 0.0
         self.last_request_s = self._clock.monotonic()
         self._left_s = self.last_request_s + len(request) * self._port.character_s
         self._port.write(request)
@@ -152,18 +145,6 @@ class StreamLine:
         self._next_line_s = ended_s - (len(line) + len(terminator)) * self._port.character_s
         return line, time_s
 
-    @property
-    def rest_timeout_s(self) -> float:
-        """How long the rest of a reply is waited for, beyond its time on the wire, s.
-
-        At most the timeout; less where the rest of so many replies has come sooner. After a reply that was given up
-        sooner and came after all, or `MAX_GIVEN_UP` in a row that did not, it is the timeout until one is whole: a
-        device that has become slower is waited for.
-        """
-        if self._given_up >= MAX_GIVEN_UP or len(self._rests_s) < MIN_RESTS:
-            return self._timeout_s
-        return min(self._timeout_s, max(MIN_REST * self._timeout_s, SLOWER_REST * max(self._rests_s) + LATER_REST_S))
-
     def receive(self, count: int, timeout_s: float | None = None) -> bytes:
         """Exactly `count` bytes. Raises LineFault: TIMEOUT, INCOMPLETE, LINE_LOST."""
         first_s = self._wait_for_first_byte(timeout_s)
@@ -216,8 +197,12 @@ class StreamLine:
         return bytes(self._received)
 
     def drain(self, quiet_s: float | None = None) -> bytes:
-        """Wait until nothing has come for `quiet_s`, the line's timeout if None; all that came, also before."""
-        quiet_s = self._timeout_s if quiet_s is None else quiet_s
+        """Wait until nothing has come for `quiet_s`; all that came, also before.
+
+        None: for the line's timeout, and what is left of the timeout of the last request.
+        """
+        if quiet_s is None:
+            quiet_s, self._not_waited_s = self._timeout_s + self._not_waited_s, 0.0
         dropped = self._take(len(self._received))
         self._next_line_s = math.nan
         until_s = self._clock.monotonic() + MAX_DRAIN_TIMEOUTS * self._timeout_s
@@ -290,36 +275,40 @@ class StreamLine:
     def _wait_for_first_byte(self, timeout_s: float | None) -> float:
         """Wait for a reply's first byte; the time (s) at which it was there."""
         if not self._received:
-            wait_s = self._timeout_s if timeout_s is None else timeout_s
+            wait_s = self._first_byte.wait_s if timeout_s is None else timeout_s
             leaving_s = max(0.0, self._left_s - self._clock.monotonic())  # of a long request, at a low baud rate
             data = self._port.read(wait_s + leaving_s if wait_s > 0 else 0.0)
             if not data:
-                raise LineFault(Quality.TIMEOUT, f"no byte within {wait_s:g} s")
+                if timeout_s is None:
+                    self._first_byte.missed()
+                    self._not_waited_s = self._timeout_s - wait_s
+                raise LineFault(Quality.TIMEOUT, f"no byte within {wait_s:.3g} s")
             self._store(data)
+            if timeout_s is None:
+                self._first_byte.took(self._last_byte_s - self._left_s)
         return self._last_byte_s
 
     def _whole(self, first_s: float, count: int) -> None:
         """Note how long the rest of a reply of `count` bytes took, whose first byte was there at `first_s` (s)."""
-        self._given_up = 0
-        self._rests_s.append(max(0.0, self._last_byte_s - first_s - count * self._port.character_s))
+        self._rest.took(self._last_byte_s - first_s - count * self._port.character_s)
 
     def _came_after_all(self) -> None:
-        """Bytes have come without a request: behind a reply that was given up they are its rest."""
-        if self._given_up:
-            self._given_up = MAX_GIVEN_UP
+        """Bytes have come without a request: they belong to a reply that was given up."""
+        self._first_byte.came_late()
+        self._rest.came_late()
 
     def _read_more(self, count: int, first_s: float, head: bytes = b"") -> None:
         """Wait for more of a reply of at most `count` bytes, whose first was there at `first_s` (s).
 
         head : what was taken of it before, for the fault. Raises LineFault: INCOMPLETE, LINE_LOST.
         """
-        deadline_s = first_s + self.rest_timeout_s + count * self._port.character_s
+        deadline_s = first_s + self._rest.wait_s + count * self._port.character_s
         on_the_wire_s = (count - len(self._received)) * self._port.character_s
         if on_the_wire_s > WORTH_SLEEPING_S:
             self._clock.wait(self._no_event, on_the_wire_s)
         data = self._port.read(deadline_s - self._clock.monotonic())
         if not data:
-            self._given_up += self.rest_timeout_s < self._timeout_s
+            self._rest.missed()
             came = head + self._received
             raise LineFault(Quality.INCOMPLETE, f"only {len(came)} bytes: {shown(came)}")
         self._store(data)

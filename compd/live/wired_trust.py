@@ -85,6 +85,7 @@ def _settings(configuration: Configuration, wire: Wire, is_scale: bool) -> Trust
         MotionLimits(options.fastest_mm_per_s or math.inf, options.acceleration_mm_per_s2 or math.inf),
         options.trust_after_loss or (driver.absolute if options.absolute is None else options.absolute),
         wire.stale_after_s,
+        options.restart_s,
         configuration.geometry.scale_signal_period_mm or math.nan if is_scale else math.nan,
         math.inf if math.isnan(wire.noise.um) else SAME_VALUE_SIGMAS * wire.noise.um / UM_PER_MM,
     )

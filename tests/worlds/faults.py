@@ -63,7 +63,7 @@ def shift(world: World, gauge: str, by: float | Callable[[str], float]) -> None:
 
 
 def lose_counts(world: World, was_mm: np.ndarray) -> None:
-    """Every scale shows what it showed at `was_mm` (n), though the machine is elsewhere now, and counts on from there."""
+    """Every scale shows what it showed at `was_mm` (n), wherever the machine is now, and counts on from there."""
     for link, (gauge, mm) in enumerate(zip(scales(world), (was_mm - world.scale_mm()).tolist(), strict=True)):
         sign = world.configuration.wiring.scale[link].sign
         shift(world, gauge, sign * mm)

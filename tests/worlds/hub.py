@@ -111,7 +111,7 @@ class Hub:
                 run()
             except GreenletExit:
                 pass
-            except Exception:
+            except Exception:  # noqa: BLE001  the world says that a part has died
                 self.died.append(traceback.format_exc())
 
         actor = Actor(body, group, self._main)

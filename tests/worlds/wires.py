@@ -78,9 +78,7 @@ class Wire:
         """Send a request, which the device answers where it is whole."""
         rng = self._hub.rng
         heard_s = self._hub.now_s + (len(request) * self.character_s or PACKET_S)
-        self._hub.at(
-            max(heard_s, self._free_s) + rng.uniform(*SAMPLES_AFTER_S), lambda: self._answer(port, request)
-        )
+        self._hub.at(max(heard_s, self._free_s) + rng.uniform(*SAMPLES_AFTER_S), lambda: self._answer(port, request))
 
     def _answer(self, port: WirePort, request: bytes) -> None:
         reply = self._listener.receive(request)

@@ -10,7 +10,7 @@ import math
 import random
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from copy import deepcopy
 from functools import partial
@@ -26,17 +26,17 @@ from compd.documents import read_document
 from compd.line_settings import powered
 from compd.live.acquisition import LOOK_EVERY_S, Acquisition, Votes
 from compd.live.loop import Commands, Loop, LoopTiming, Setpoint, build_pipeline
-from compd.live.loop.commands import Target
 from compd.live.machine import MachineZero
 from compd.live.service import LastReadings
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
-from compd.plugins import SIMULATED_GAUGES, load as load_plugin
+from compd.plugins import SIMULATED_GAUGES
+from compd.plugins import load as load_plugin
 from compd.setpoint_states import State
 from compd.simulation import World as Truth
 from compd.simulation.truth.motion import DRIVES, Drives
 from compd.simulation.wires.live_world import LiveWorld
 from compd.simulation.wires.server import STEP_S, Sensing
-from tests.worlds.hub import Actor, Hub
+from tests.worlds.hub import Hub
 from tests.worlds.wires import Wire, opened_virtually
 
 # Processes of the daemon.
@@ -108,7 +108,9 @@ class World:
         configuration = self.configuration
         self._pipeline = pipeline = build_pipeline(configuration, configuration.gauge_objects())
         self.trust = wired_memory(configuration, pipeline.wires)
-        zero = zero or MachineZero(configuration.zero_hash, _TAKEN_AT, dict.fromkeys(pipeline.wires.length_channels, 0.0))
+        zero = zero or MachineZero(
+            configuration.zero_hash, _TAKEN_AT, dict.fromkeys(pipeline.wires.length_channels, 0.0)
+        )
         self.commands = Commands(zero)
         self.commands.models = pipeline.settings.without_effects
         last = LastReadings(self._directory, configuration.zero_hash, self.trust, self.hub)

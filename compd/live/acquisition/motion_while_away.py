@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from compd.live.memory import Doubt, TrustMemory
 
@@ -12,12 +14,25 @@ from compd.live.memory import Doubt, TrustMemory
 _WAIT_FOR_OTHERS_S = 2.0
 
 
-def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -> tuple[int | None, bool]:
-    """Number of a channel that has moved since channel `i` was last believed, and whether enough were compared.
+class MotionWhileAway(NamedTuple):
+    """What other channels say of an absence.
 
-    What counts are the channels that have been good all the time, as far as they have been read since `i` was lost.
-    Where there are none, because everything was off, half of those that are back are enough to say that the machine
-    has stood still. back_s : since when `i` answers.
+    moved : number of a channel that has moved; None where none has. compared : whether enough have been read again.
+    witnessed : whether a scale that has kept its power was among them, or is the channel itself.
+    """
+
+    moved: int | None
+    compared: bool
+    witnessed: bool = True
+
+
+def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -> MotionWhileAway:
+    """Whether the machine has moved since channel `i` was last believed.
+
+    What counts are the channels that have been good all the time, as far as they have been read since `i` was lost, and
+    a scale among them: joints and frame hardly see the machine move. Where there is none, because everything was off,
+    half of those that are back are enough to say that the machine has stood still, if a scale has kept its power.
+    back_s : since when `i` answers.
     """
     n = memory.lengths
     witness = memory.witness[i]
@@ -27,27 +42,34 @@ def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -
     stayed = good & (memory.time_s[:n] > memory.lost_s[i])
     back = known & (memory.shown_s[:n] > memory.lost_s[i])
     waited = now_s - back_s >= _WAIT_FOR_OTHERS_S
-    if stayed.any() and (waited or (stayed == good).all()):
+    scales = np.arange(n) < memory.scales
+    sees_motion = bool(stayed[scales].any()) or not memory.scales
+    if sees_motion and (waited or (stayed == good).all()):
         moved = stayed & (np.abs(memory.value[:n] - witness) > tolerance)
-        return (int(np.flatnonzero(moved)[0]) if moved.any() else None), True
-    if not waited and (good.any() or back.sum() < known.sum()):
-        return None, False
+        return MotionWhileAway(_first(moved), True)
+    if not waited and back.sum() < known.sum():
+        return MotionWhileAway(None, False)
     moved = back & (np.abs(memory.shown[:n] - witness) > tolerance)
-    if 2 * moved.sum() > back.sum():
-        return int(np.flatnonzero(moved)[0]), True
-    return None, True
+    most = 2 * moved.sum() > back.sum()
+    back[i] = True
+    witnessed = bool((back & scales & (memory.power_lost[:n] == 0.0)).any()) or not memory.scales
+    return MotionWhileAway(_first(moved) if most else None, True, witnessed)
 
 
-def stood_still(memory: TrustMemory, i: int) -> bool:
-    """Whether every comparable channel beside `i` has kept its value since `i` was last believed.
+def _first(channels: npt.NDArray[np.bool_]) -> int | None:
+    return int(np.flatnonzero(channels)[0]) if channels.any() else None
 
-    False if there is none.
+
+def stood_still(memory: TrustMemory, i: int, since_s: float) -> bool | None:
+    """Whether every scale beside `i` still shows what it showed when `i` was last believed.
+
+    None if one of them has not been read since `since_s` (s). False if there is none.
     """
     n, before = memory.lengths, memory.witness[i]
-    compared = (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(before)
-    return bool(
-        compared.any() and (np.abs(memory.value[:n] - before)[compared] <= memory.tolerance_mm[:n][compared]).all()
-    )
+    others = (np.arange(n) < memory.scales) & (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(before)
+    if (memory.shown_s[:n] < since_s)[others].any():
+        return None
+    return bool(others.any() and (np.abs(memory.shown[:n] - before) <= memory.tolerance_mm[:n])[others].all())
 
 
 def scales_stood(memory: TrustMemory, i: int) -> bool:
@@ -60,10 +82,3 @@ def scales_stood(memory: TrustMemory, i: int) -> bool:
             return False
         compared += 1
     return compared > 0
-
-
-def all_back(memory: TrustMemory, i: int, since_s: float) -> bool:
-    """Whether every believed channel beside `i` has been read since a monotonic time (s)."""
-    n = memory.lengths
-    good = (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(memory.value[:n])
-    return bool((memory.time_s[:n][good] >= since_s).all())

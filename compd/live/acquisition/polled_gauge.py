@@ -20,8 +20,8 @@ log = structlog.get_logger()
 _NO_TRUST: Mapping[str, Judge] = {}
 # Faults of the wire. The next poll is likely to succeed, and the last good reading stays valid.
 TRANSIENT_FAULTS = (Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
-# Damaged replies in a row, above which the cause is more than interference.
-MAX_DAMAGED = 10
+# Failures in a row, above which the cause is more than interference, and the gauge rests between two polls.
+MAX_FAILURES = 10
 DAMAGED = (Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH)
 # Longest rest (s) of a gauge on an open line: it is polled again within a second of a fault.
 MAX_REST_S = 0.9
@@ -160,9 +160,8 @@ class PolledGauge:
         """Count a poll that failed as a whole, at the monotonic time `now_s` (s).
 
         A reading that is still good stays after a fault that may pass (`TRANSIENT_FAULTS`); every other channel takes
-        `quality`. After a missing reply, more than MAX_DAMAGED damaged ones in a row, or the second other fault, the
-        gauge rests for one timeout of the line, then for twice as long each time: a late reply has time to come and go,
-        and the others are not slowed.
+        `quality`. After more than MAX_FAILURES in a row the gauge rests for one timeout of the line, then for twice as
+        long each time: the others are not slowed.
         """
         self.polls += 1
         self.faults[quality] += 1
@@ -173,7 +172,7 @@ class PolledGauge:
         if not kept:
             self._log_change()
         self.failures += 1
-        if self.failures > (MAX_DAMAGED if quality in DAMAGED else 0 if quality is Quality.TIMEOUT else 1):
+        if self.failures > MAX_FAILURES:
             self.rests_until_s = now_s + self._back_off.failed()
 
     def driver_error(self, error: Exception) -> str:

@@ -8,6 +8,8 @@ possible where an interval is left.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 # Baseline (s) of the previous speed estimate; much longer than one reply.
@@ -65,32 +67,31 @@ def _speed(change_mm: float, positive_in_s: float, negative_in_s: float) -> floa
     return change_mm / duration_s if duration_s > 0 else math.copysign(math.inf, change_mm)
 
 
+ANY_SPEED = Interval(-math.inf, math.inf)
+
+
 def is_possible(
-    before: Interval,
-    base_s: float,
-    last: GaugeSample,
-    first: GaugeSample,
-    second: GaugeSample,
+    samples: Sequence[GaugeSample],
     tolerance_mm: float,
     limits: MotionLimits,
+    before: Interval = ANY_SPEED,
+    base_s: float = 0.0,
 ) -> bool:
-    """Whether the part can have come from `last` over `first` to `second`.
+    """Whether a part can have come from the first of these samples, ordered by time, over all others to the last.
 
-    before : its mean speed (mm/s) over `base_s` (s) until `last`.
+    before : its mean speed (mm/s) over `base_s` (s) until the first.
     """
-    first_s = first.time_s - last.time_s + first.window_s
-    second_s = second.time_s - first.time_s + second.window_s
     allowed = Interval(-limits.speed, limits.speed)
     now = before.common(allowed)
     if now.empty:
         now = before
-    for start, end, between_s in (
-        (last, first, (base_s + first_s) / 2),
-        (first, second, (first_s + second_s) / 2),
-    ):
-        now = now.widened(limits.acceleration * between_s).common(allowed).common(mean_speed(start, end, tolerance_mm))
+    for start, end in pairwise(samples):
+        passed_s = end.time_s - start.time_s + end.window_s
+        now = now.widened(limits.acceleration * (base_s + passed_s) / 2)
+        now = now.common(allowed).common(mean_speed(start, end, tolerance_mm))
         if now.empty:
             return False
+        base_s = passed_s
     return True
 
 

@@ -16,32 +16,38 @@ from compd.recording import limit_of
 from compd.stated_noise import SAME_VALUE_SIGMAS
 from compd.units import unit_of
 
+_S_PER_H = 3600.0
+
 
 class UnitLimits(NamedTuple):
-    """Of quantities of one unit, in it. fastest_per_s, apart, tolerance : as of `QuantityLimits`; reason : of each."""
+    """Of quantities of one unit, in it. fastest_per_s, apart, tolerance, usual_per_h : as of `QuantityLimits`, the last
+    per hour; reason : of each."""
 
     fastest_per_s: float
     apart: float
     tolerance: float
+    usual_per_h: float
     reason: str
 
 
 UNIT_LIMITS: Mapping[str, UnitLimits] = {
     "degC": UnitLimits(
-        0.2, 15.0, 0.25,
+        0.2, 15.0, 0.25, 10.0,
         "steel takes 470 J/(kg K), so 0.2 K/s are 94 W in each kilogram; what an empty register shows, 0 degC, is "
-        "further from 20 degC than parts of a measuring machine from each other; modules count in 0.1 degC",
+        "further from 20 degC than parts of a measuring machine from each other; modules count in 0.1 degC; a machine "
+        "that is switched on warms up by some 10 K in an hour",
     ),
     "hPa": UnitLimits(
-        0.1, math.inf, 1.0,
+        0.1, math.inf, 1.0, 5.0,
         "weather changes the air pressure by some hPa an hour; doors and ventilation by tenths of hPa at once",
     ),
     "pct": UnitLimits(
-        3.0, math.inf, 5.0,
-        "a polymer sensor takes 8 s to follow air that is 25 % drier; sensors err by 2 to 3 %",
+        3.0, math.inf, 5.0, 20.0,
+        "a polymer sensor takes 8 s to follow air that is 25 % drier; sensors err by 2 to 3 %; rooms change by tens of "
+        "percent in an hour",
     ),
 }  # fmt: skip
-_UNKNOWN = UnitLimits(math.inf, math.inf, 0.0, "")
+_UNKNOWN = UnitLimits(math.inf, math.inf, 0.0, math.inf, "")
 
 
 def quantity_limits(wire: QuantityWire) -> QuantityLimits:
@@ -55,4 +61,5 @@ def quantity_limits(wire: QuantityWire) -> QuantityLimits:
         unit.fastest_per_s if wire.fastest_change is None else wire.fastest_change,
         unit.apart if wire.apart is None else wire.apart,
         max(unit.tolerance, SAME_VALUE_SIGMAS * (wire.noise or 0.0)),
+        unit.usual_per_h / _S_PER_H,
     )

@@ -7,7 +7,8 @@ is published, and not the reading: scatter that the quantity itself cannot have 
 
 Quantities move slowly beside lengths, so that there is time: an implausible reading is not published, and the last one
 stays as long as it is not stale. A quantity that was implausible for a second, less what it was plausible since, is
-not believed before a person accepts it. One that was away may have changed meanwhile as fast as it can.
+not believed any more. It is believed again when it has come back to what it showed before, as far as it usually drifts,
+for a second; else a person accepts it. One that was away may have changed meanwhile as fast as it can.
 """
 
 from __future__ import annotations
@@ -31,13 +32,20 @@ _MIN_FIRST, _MAX_START_S = 5, 1.0
 # Age (s) from which a neighbour's reading no longer counts.
 _OLD_S = 60.0
 _MIN_NEIGHBOURS = 2
+# What has come back is this much nearer to what it was than while it was wrong.
+_BACK_SHARE = 0.25
+
+
+# Doubts of which a quantity's own readings tell when they are over.
+_MAY_COME_BACK = (Doubt.JUMPED, Doubt.IMPLAUSIBLE, Doubt.APART)
 
 
 class QuantityLimits(NamedTuple):
     """Plausible readings of a quantity in its unit; infinite where unknown.
 
     low, high : its range. fastest_per_s : its fastest change, per second. apart : the largest difference from its
-    neighbours. tolerance : by which two readings of the same value may differ.
+    neighbours. tolerance : by which two readings of the same value may differ. usual_per_s : its usual drift, per
+    second.
     """
 
     low: float = -math.inf
@@ -45,6 +53,7 @@ class QuantityLimits(NamedTuple):
     fastest_per_s: float = math.inf
     apart: float = math.inf
     tolerance: float = 0.0
+    usual_per_s: float = math.inf
 
 
 class _Fault(NamedTuple):
@@ -68,6 +77,7 @@ class QuantityTrust:
         self._expected = math.nan  # follows the readings at the fastest change at most
         self._expected_s = math.nan
         self._implausible_s = 0.0
+        self._back_s = 0.0  # for how long it has been back
         self._judged_s = math.nan
         self._begun_s = math.nan
         self._first: list[Reading] = []  # the last readings since `_begun_s`
@@ -99,9 +109,9 @@ class QuantityTrust:
         if memory.voted[i] != memory.handled[i]:
             memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
-        if Doubt(int(memory.doubt[i])).until_accepted:
-            return bad(reading.time_s, Quality.DISTRUSTED, memory.explanation(i))
         share_s = self._share_s(reading.time_s)
+        if Doubt(int(memory.doubt[i])).until_accepted and not self._is_back(reading, share_s):
+            return bad(reading.time_s, Quality.DISTRUSTED, memory.explanation(i))
         known = self._recall()
         candidates = (reading,) if first is None else (reading, first)
         faults = [self._fault(each.value, each.time_s) for each in candidates]
@@ -117,6 +127,26 @@ class QuantityTrust:
         if self._implausible_s < LASTING_S:
             return bad(reading.time_s, Quality.MISMATCH, faults[0].text)
         return self._distrust(reading, faults[0])
+
+    def _is_back(self, reading: Reading, share_s: float) -> bool:
+        """Whether a quantity that is not believed shows again, and for long enough, what it showed before."""
+        memory, i = self._memory, self._i
+        if memory.doubt[i] not in _MAY_COME_BACK or math.isnan(memory.value[i]):
+            return False
+        amount, away = float(memory.amount[i]), reading.value - float(memory.value[i])
+        was_away = amount - float(memory.value[i]) if memory.doubt[i] == Doubt.IMPLAUSIBLE else amount
+        drift = self._limits.usual_per_s * (reading.time_s - float(memory.time_s[i]))
+        near = abs(away) <= min(self._limits.tolerance + drift, _BACK_SHARE * abs(was_away))
+        self._expected = math.nan
+        if not near or self._fault(reading.value, reading.time_s) is not None:
+            self._back_s = 0.0
+            return False
+        self._back_s += share_s
+        if self._back_s < LASTING_S:
+            return False
+        self._expected, self._expected_s = reading.value, reading.time_s
+        memory.believe(i, reading.value, reading.time_s)
+        return True
 
     def _recall(self) -> bool:
         """Whether a reading is known that the next one follows; that of another process counts, too."""
@@ -196,7 +226,7 @@ class QuantityTrust:
         return reading._replace(value=self._expected)
 
     def _distrust(self, reading: Reading, fault: _Fault) -> Reading:
-        self._implausible_s = 0.0
+        self._implausible_s = self._back_s = 0.0
         self._memory.distrust(self._i, fault.doubt, fault.amount)
         return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i))
 

@@ -4,10 +4,10 @@ A reading that is not where the last ones lead is asked for once more. If the se
 first one was damaged. If it agrees with the first, the measured part has moved, where its acceleration and speed allow
 that; else the gauge has jumped, and is not believed before a person accepts it.
 
-A gauge that was away (its line was lost, or its last reading became stale) may count anew. It
-is believed where it shows what it showed before and no other gauge has moved meanwhile; else a person accepts it. After
-a shorter gap it may have moved, where other gauges have, too; a scale as far as the other links or its own speed say.
-One that is absolute, or goes on counting while its cable is out, is believed at once.
+A gauge was away if a poll has failed and it was not read for as long as its device takes to restart. It may count anew.
+It is believed where it shows what it showed before and no other gauge has moved meanwhile; else a person accepts it.
+The limits of motion judge a shorter gap, and one in which no poll has failed: the daemon itself was silent then. One
+that is absolute, or goes on counting while its cable is out, is believed at once.
 """
 
 from __future__ import annotations
@@ -15,16 +15,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from itertools import pairwise
 
 from compd.gauge import Quality, Reading, bad
+from compd.live.acquisition.motion_before import MotionBefore
 from compd.live.acquisition.motion_estimate import MAX_WINDOW_S, MotionEstimate
-from compd.live.acquisition.motion_while_away import all_back, moved_while_away, scales_stood, stood_still
+from compd.live.acquisition.motion_while_away import moved_while_away, scales_stood, stood_still
 from compd.live.acquisition.possible_motion import (
-    BASE_S,
     WINDOW_S,
     GaugeSample,
-    Interval,
     MotionLimits,
     is_possible,
     mean_speed,
@@ -35,30 +33,22 @@ from compd.live.acquisition.steps import Steps
 from compd.live.acquisition.way_evidence import way_by_itself, way_by_links
 from compd.live.memory import Doubt, TrustMemory
 
-# Wait (s) after a gap until the other gauges of the same motion have been read,
-_WAIT_FOR_MOTION_S = 0.3
-# or this many of the channel's own longest gaps, if that is longer.
-_WAIT_FOR_POLLS = 2.0
-# Motion (tolerances) below which a gauge may move in a short gap unnoticed by the others.
+# Change (tolerances) of a gauge that was away for a moment which is no other count.
 MIN_MOTION = 10.0
-# Longest interval (s) that is no gap: a scale with 300 mm/s2 moves less than 1 mm from rest to rest, and no display
-# restarts.
+# Longest time (s) without an answer in which a part at rest may move unnoticed: with 300 mm/s2 by less than 1 mm.
 MIN_GAP_S = 0.1
-# A gap is also this many times as long as the usual interval between readings.
-_GAP = 2.0
-_USUAL_OF = 8
+# Longest wait (s) after a gap for what others say: somewhat longer than the path of `way_evidence` takes.
+_WAIT_FOR_OTHERS_S = 0.1
 # Smallest step (signal periods): an interpolator that loses counts loses whole periods or quarters of them.
 MIN_PERIODS = 0.25
-# Samples of motion that are kept.
-_HISTORY = 32
 # Two answers agree if they differ by less than this share of the jump that they show.
 _AGREEMENT = 0.2
+# Answers of two polls, and of three, in which hum and noise hardly look like one motion.
+_SOME, _MANY = 4, 6
 # Largest ratio of the speeds of two successive polls, without a limit of acceleration.
 _SPEED_RATIO = 5.0
 # Flicker of a display at rest, in last digits.
 _DIGITS = 2.0
-# Allowed growth of an acceleration that is already present (factor).
-_ACCELERATION_MARGIN = 2.0
 
 
 @dataclass(frozen=True)
@@ -66,13 +56,15 @@ class TrustSettings:
     """Degree of trust in the readings of a channel.
 
     limits : what the measured part can do. returns_by_itself : the device shows the same value again when it is back.
-    stale_after_s : age from which a last reading is lost. signal_period_mm : of a scale, where it is known; nan.
+    stale_after_s : age from which a last reading is lost. restart_s : shortest time in which the device restarts.
+    signal_period_mm : of a scale, where it is known; nan.
     noise_mm : by more than that two readings of the same value do not differ by noise, mm; inf where none is stated.
     """
 
     limits: MotionLimits
     returns_by_itself: bool
     stale_after_s: float
+    restart_s: float
     signal_period_mm: float = math.nan
     noise_mm: float = math.inf
 
@@ -85,11 +77,12 @@ class ReadingTrust:
         self._i = memory.index[channel]
         self._tolerance_mm = float(memory.tolerance_mm[self._i])
         self._settings = settings
-        self._history: deque[GaugeSample] = deque(maxlen=_HISTORY)
+        self._before = MotionBefore(self._tolerance_mm)
         self._candidate: GaugeSample | None = None  # the last answer before any reading is believed
         self._back_s = math.nan  # time at which an absent gauge answered again
         self._missed = False  # whether a poll has failed since its last reading
         self._after: list[GaugeSample] = []  # its value since a gap, waiting for evidence
+        self._unexplained: deque[GaugeSample] = deque(maxlen=_MANY)  # answers since its last reading
         self._scatter = RestScatter(self._tolerance_mm)
         self._latest = LatestScatter(self._tolerance_mm)
         self._motion = MotionEstimate(self._tolerance_mm)
@@ -106,18 +99,27 @@ class ReadingTrust:
         if doubt.until_accepted:
             return False
         return (
-            doubt is Doubt.LOST or not self._recall() or not self._is_expected(sample) or self._needs_evidence(sample)
+            doubt is Doubt.LOST
+            or not self._recall()
+            or not self._before.expects(sample)
+            or self._needs_evidence(sample)
         )
 
     def fail(self, quality: Quality, now_s: float) -> None:
         """Note a poll without a value, at `now_s` (s)."""
         memory, i = self._memory, self._i
-        if quality is Quality.LINE_LOST or now_s - memory.time_s[i] > self._settings.stale_after_s:
-            memory.lose(i, now_s, power=True)
-        if quality is Quality.LINE_LOST or now_s - memory.shown_s[i] > self._settings.stale_after_s:
-            memory.end_order(i)
         self._missed = True
         self._after.clear()
+        self._unexplained.clear()
+        self._lose_if_away(now_s)
+        if quality is Quality.LINE_LOST or now_s - memory.shown_s[i] > self._settings.stale_after_s:
+            memory.end_order(i)
+
+    def _lose_if_away(self, now_s: float) -> None:
+        """Note that the gauge is away, and may have restarted, where it has not answered for long enough."""
+        memory, i, settings = self._memory, self._i, self._settings
+        if self._missed and now_s - memory.time_s[i] > max(settings.stale_after_s, settings.restart_s):
+            memory.lose(i, now_s, power=True)
 
     def show(self, reading: Reading) -> None:
         """Let other channels compare themselves with a good reading, be it believed or not."""
@@ -147,9 +149,7 @@ class ReadingTrust:
         if memory.voted[i] != memory.handled[i]:
             memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
-        back_s = self._after[0].time_s if self._after else sample.time_s
-        if memory.doubt[i] == Doubt.NONE and back_s - memory.time_s[i] > self._settings.stale_after_s:
-            memory.lose(i, sample.time_s)
+        self._lose_if_away(self._after[0].time_s if self._after else sample.time_s)
         doubt = Doubt(int(memory.doubt[i]))
         if doubt.until_accepted:
             return self._reject(reading)
@@ -161,10 +161,10 @@ class ReadingTrust:
 
     def _recall(self) -> bool:
         """Whether the next reading has a predecessor, in this process or another one."""
-        if not self._history:
+        if not self._before.history:
             recent = self._memory.recent(self._i)
-            self._history.extend(GaugeSample(float(value), float(time_s), WINDOW_S) for time_s, value in recent)
-        return bool(self._history)
+            self._before.history.extend(GaugeSample(float(value), float(time_s), WINDOW_S) for time_s, value in recent)
+        return bool(self._before.history)
 
     def _begin(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:
         """Believe a reading without regard to earlier ones if two answers agree."""
@@ -179,7 +179,7 @@ class ReadingTrust:
             return bad(
                 reading.time_s, Quality.MISMATCH, f"two answers disagree: {first.value:.4f}, {sample.value:.4f} mm"
             )
-        self._history.clear()
+        self._before.history.clear()
         self._memory.begin(self._i)
         if earlier.time_s < sample.time_s:  # two samples tell how it moves; a latched gauge answers with one
             self._remember(earlier)
@@ -188,10 +188,11 @@ class ReadingTrust:
     def _accept(self, reading: Reading, sample: GaugeSample) -> Reading:
         self._missed = False
         self._after.clear()
+        self._unexplained.clear()
         self._latest.note(sample.value, self._unexplained_mm(sample))
         self._remember(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
-        motion = self._motion.note(self._history)
+        motion = self._motion.note(self._before.history)
         if self._memory.suspected[self._i]:
             return bad(reading.time_s, Quality.STALE, "stands while all others move")
         return reading._replace(motion=motion._replace(scatter_mm=self._scatter_mm()))
@@ -204,7 +205,7 @@ class ReadingTrust:
     def _unexplained_mm(self, sample: GaugeSample) -> float:
         """Change (mm) of a joint or the frame at rest; 0 within its noise, and over times of possible drift."""
         memory, i = self._memory, self._i
-        if i < memory.scales or not self._history or sample.time_s - memory.time_s[i] > MAX_WINDOW_S:
+        if i < memory.scales or not self._before.history or sample.time_s - memory.time_s[i] > MAX_WINDOW_S:
             return 0.0
         change_mm = abs(sample.value - float(memory.value[i]))
         within_mm = max(self._settings.noise_mm, _DIGITS * float(memory.step_mm[i]))
@@ -212,7 +213,7 @@ class ReadingTrust:
 
     def _remember(self, sample: GaugeSample) -> None:
         """Keep a sample of motion, and count the step that it completes."""
-        self._history.append(sample)
+        self._before.history.append(sample)
         step = None if self._steps is None else self._steps.note(sample)
         if step is not None:
             memory, i = self._memory, self._i
@@ -239,13 +240,15 @@ class ReadingTrust:
                 reading.time_s, Quality.MISMATCH, f"two answers disagree: {first.value:.4f}, {sample.value:.4f} mm"
             )
         if abs(away_mm) > self._tolerance_mm:
-            memory.distrust(i, Doubt.RETURNED, away_mm)
-            return self._reject(reading)
-        moved, compared = moved_while_away(memory, i, self._back_s, sample.time_s)
-        if not compared:
+            return self._returned(reading, away_mm)
+        absence = moved_while_away(memory, i, self._back_s, sample.time_s)
+        if not absence.compared:
             return bad(reading.time_s, Quality.STALE, "is back; the other gauges are not yet")
-        if moved is not None:
-            memory.distrust(i, Doubt.MOVED_MEANWHILE, moved)
+        if absence.moved is not None:
+            memory.distrust(i, Doubt.MOVED_MEANWHILE, absence.moved)
+            return self._reject(reading)
+        if not absence.witnessed:
+            memory.distrust(i, Doubt.UNWITNESSED, math.nan)
             return self._reject(reading)
         if memory.power_lost[i] and i < memory.scales and abs(sample.value) <= self._tolerance_mm:
             memory.distrust(i, Doubt.AT_ZERO, 0.0)
@@ -260,24 +263,21 @@ class ReadingTrust:
         """
         earlier = None if first is None else GaugeSample(first.value, first.time_s, sample.window_s)
         needs_evidence = self._needs_evidence(sample)
-        if self._is_expected(sample) and not needs_evidence:
+        if self._before.expects(sample) and not needs_evidence:
             return self._accept(reading, sample)
         if first is None or earlier is None:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
-        if self._is_expected(earlier) and not self._needs_evidence(earlier):
+        if self._before.expects(earlier) and not self._needs_evidence(earlier):
             return self._accept(first, earlier)
         if abs(sample.value - earlier.value) > self._tolerance_mm:  # one answer may be damaged; two are not
             self._latest.note(earlier.value)
-        last = self._history[-1]
-        stays = abs(sample.value - earlier.value) <= self._tolerance_mm + _AGREEMENT * abs(earlier.value - last.value)
-        limits = self._settings.limits
-        before, base_s = self._speed_before()
+        last, limits = self._before.last, self._settings.limits
         latched = earlier.time_s == sample.time_s
-        if not latched and self._is_from_rest_to_rest(before, earlier, sample):
-            duration_s = earlier.time_s + earlier.window_s - last.time_s
-            possible = abs(earlier.value - last.value) <= rest_to_rest_mm(limits, duration_s, self._tolerance_mm)
-        else:
-            possible = is_possible(before, base_s, last, earlier, sample, self._tolerance_mm, limits)
+        stays = self._stays(earlier, sample)
+        possible = self._is_possible(earlier, sample, latched)
+        self._unexplained += [earlier] if latched else [earlier, sample]
+        if self._jumped():
+            possible, stays = False, len(self._unexplained) >= _MANY
         if possible and (stays or math.isfinite(limits.acceleration) or self._goes_on(last, earlier, sample)):
             if needs_evidence:
                 return self._compared(reading, earlier, sample)
@@ -291,6 +291,38 @@ class ReadingTrust:
         values = ", ".join(f"{value:.4f}" for value in (last.value, earlier.value, sample.value))
         return bad(reading.time_s, Quality.MISMATCH, f"no two of three values agree: {values} mm{self._limits_text()}")
 
+    def _is_possible(self, earlier: GaugeSample, sample: GaugeSample, latched: bool) -> bool:
+        """Whether the part can have come from the last reading over one answer to the other."""
+        last, limits = self._before.last, self._settings.limits
+        if not latched and self._before.rested and abs(sample.value - earlier.value) <= self._tolerance_mm:
+            duration_s = earlier.time_s + earlier.window_s - last.time_s
+            return abs(earlier.value - last.value) <= rest_to_rest_mm(limits, duration_s, self._tolerance_mm)
+        return is_possible([last, earlier, sample], self._tolerance_mm, limits, *self._before.speed())
+
+    def _jumped(self) -> bool:
+        """Whether the answers that were not believed are one motion, which cannot have come from the last reading.
+
+        The more time has passed since that, the more is possible without them.
+        """
+        limits, samples = self._settings.limits, self._unexplained
+        if (
+            math.isinf(limits.acceleration)
+            or len(samples) < _SOME
+            or not is_possible(samples, self._tolerance_mm, limits)
+        ):
+            return False
+        return not is_possible([self._before.last, *samples], self._tolerance_mm, limits, *self._before.speed())
+
+    def _stays(self, earlier: GaugeSample, sample: GaugeSample) -> bool:
+        """Whether the second answer confirms the first one: the part stands there, or goes on as fast as before."""
+        last = self._before.last
+        for mm_per_s in (0.0, self._before.lasting_mm_per_s):
+            jump_mm = earlier.value - last.value - mm_per_s * (earlier.time_s - last.time_s)
+            off_mm = sample.value - earlier.value - mm_per_s * (sample.time_s - earlier.time_s)
+            if abs(off_mm) <= self._tolerance_mm + _AGREEMENT * abs(jump_mm):
+                return True
+        return False
+
     def _limits_text(self) -> str:
         """Keys of the gauge that limit its motion; too small a limit makes motion look like jumps."""
         limits = self._settings.limits
@@ -299,58 +331,52 @@ class ReadingTrust:
         return f"; its motion is limited by {keys}" if keys else ""
 
     def _needs_evidence(self, sample: GaugeSample) -> bool:
-        """Whether a gauge that may count anew shows another value after a gap, or after a poll that has failed."""
-        last = self._history[-1]
-        if self._settings.returns_by_itself or abs(sample.value - last.value) <= MIN_MOTION * self._tolerance_mm:
+        """Whether a gauge that was not read for a while shows another value, by which it may have lost its count."""
+        gap_s = sample.time_s - self._before.last.time_s
+        change_mm = abs(sample.value - self._before.last.value)
+        if self._settings.returns_by_itself or change_mm <= MIN_MOTION * self._tolerance_mm:
             return False
-        return self._missed or bool(self._after) or sample.time_s - last.time_s > max(MIN_GAP_S, self._gap_s())
-
-    def _gap_s(self) -> float:
-        """Shortest interval (s) between two readings that counts as longer than usual."""
-        times = [sample.time_s for sample in self._history][-_USUAL_OF - 1 :]
-        intervals = sorted(later - earlier for earlier, later in pairwise(times))
-        return _GAP * intervals[len(intervals) // 2] if intervals else 0.0
+        return bool(self._after) or (gap_s > MIN_GAP_S and (self._missed or self._before.rested))
 
     def _compared(self, reading: Reading, earlier: GaugeSample, sample: GaugeSample) -> Reading:
-        """A possible value after a gap: believed if others have moved, for a scale if they say how far.
+        """A possible value after a gap: believed unless others contradict it, or its device had time to restart.
 
-        It has no value until they have been read, too, and have moved on for a moment.
+        A part that rested before has not moved where the other scales still stand. On the move, the ways of the other
+        links say how far a scale went, or its own speed does; its limits of motion where neither is known.
         """
         memory, i = self._memory, self._i
-        after, last = self._after, self._history[-1]
+        after, last = self._after, self._before.last
         after += [later for later in (earlier, sample) if not after or later.time_s > after[-1].time_s]
-        alone = stood_still(memory, i)
-        short = after[0].time_s - last.time_s <= MIN_GAP_S
-        if short and not alone:
-            return self._accounted_for(reading, sample)
-        may_wait = sample.time_s - after[0].time_s < max(_WAIT_FOR_MOTION_S, _WAIT_FOR_POLLS * self._gap_s())
-        waits = bad(reading.time_s, Quality.MISMATCH, "has moved in a gap; the others do not show yet how far")
-        if may_wait and (alone or not all_back(memory, i, after[0].time_s)):
-            return waits
-        if not alone and i >= memory.scales:
-            return self._accounted_for(reading, sample)
-        way_mm = after[0].value - last.value
-        by_links = way_by_links(memory, i, self._history, after)
-        by_itself = way_by_itself(self._history, after)
-        if any(way is not None and way.explains(way_mm) for way in (by_links, by_itself)):
-            return self._accounted_for(reading, sample)
-        if may_wait and by_links is None:
-            return waits
-        expected = by_links or by_itself
-        memory.distrust(i, Doubt.RETURNED, way_mm - (expected.way_mm if expected else 0.0))
-        return self._reject(reading)
-
-    def _accounted_for(self, reading: Reading, sample: GaugeSample) -> Reading:
-        """A value after a gap, with the readings since."""
-        for later in self._after:
+        way_mm, waited_s = after[0].value - last.value, sample.time_s - after[0].time_s
+        if self._missed and after[0].time_s - last.time_s > self._settings.restart_s:
+            return self._returned(reading, way_mm)
+        if self._before.rested:
+            stood = stood_still(memory, i, after[0].time_s)
+            if stood:
+                return self._returned(reading, way_mm)
+            waits = stood is None
+        elif i < memory.scales:
+            by_links, by_itself = (
+                way_by_links(memory, i, self._before.history, after),
+                way_by_itself(self._before.history, after),
+            )
+            explained = any(way is not None and way.explains(way_mm) for way in (by_links, by_itself))
+            waits = not explained and by_links is None
+            expected = by_links or (by_itself if waited_s >= _WAIT_FOR_OTHERS_S else None)
+            if expected is not None and not explained:
+                return self._returned(reading, way_mm - expected.way_mm)
+        else:
+            waits = False
+        if waits and waited_s < _WAIT_FOR_OTHERS_S:
+            return bad(reading.time_s, Quality.MISMATCH, "has moved in a gap; the others do not show yet how far")
+        for later in after:
             if later.time_s < sample.time_s:
                 self._remember(later)
         return self._accept(reading, sample)
 
-    def _is_from_rest_to_rest(self, before: Interval, first: GaugeSample, second: GaugeSample) -> bool:
-        """Whether the part was at rest before and two answers show it at rest again."""
-        rested = math.isfinite(before.low) and before.low <= 0.0 <= before.high
-        return rested and abs(second.value - first.value) <= self._tolerance_mm
+    def _returned(self, reading: Reading, away_mm: float) -> Reading:
+        self._memory.distrust(self._i, Doubt.RETURNED, away_mm)
+        return self._reject(reading)
 
     def _goes_on(self, last: GaugeSample, first: GaugeSample, second: GaugeSample) -> bool:
         """Whether the second answer continues the motion that the first one shows; without a limit of acceleration."""
@@ -360,49 +386,3 @@ class ReadingTrust:
         slowest, fastest = sorted((sign * now.low / _SPEED_RATIO, sign * now.high * _SPEED_RATIO))
         low, high = sorted((sign * then.low, sign * then.high))
         return max(low, slowest) <= min(high, fastest)
-
-    def _is_expected(self, sample: GaugeSample) -> bool:
-        """Whether the reading is within its predicted range, given the noise and the present acceleration."""
-        last = self._history[-1]
-        before, base_s = self._speed_before()
-        passed_s = sample.time_s - last.time_s
-        speed, acceleration = 0.0, 0.0
-        tolerance_mm = self._tolerance_mm
-        if math.isfinite(before.low) and math.isfinite(before.high) and (before.low > 0 or before.high < 0):
-            speed = (before.low + before.high) / 2
-            tolerance_mm += (before.high - before.low) / 2 * passed_s
-            acceleration = self._acceleration(speed, base_s)
-        slack_mm = tolerance_mm + abs(speed) * (sample.window_s + last.window_s)
-        slack_mm += _ACCELERATION_MARGIN * acceleration * passed_s * (passed_s + base_s) / 2
-        return abs(sample.value - last.value - speed * passed_s) <= slack_mm
-
-    def _base(self) -> int | None:
-        """Index of the sample from which the speed until the last one is measured."""
-        history = self._history
-        latest_s = history[-1].time_s - max(BASE_S, 4 * history[-1].window_s)
-        for k in range(len(history) - 2, -1, -1):
-            if history[k].time_s <= latest_s:
-                return k
-        return None
-
-    def _speed_before(self) -> tuple[Interval, float]:
-        """Mean speed (mm/s) until the last sample, and over how long (s); without bounds where it is not known."""
-        base = self._base()
-        if base is None:
-            first_s = self._history[-1].time_s - self._history[0].time_s
-            return Interval(-math.inf, math.inf), max(first_s, 0.0)
-        start, last = self._history[base], self._history[-1]
-        return mean_speed(start, last, self._tolerance_mm), last.time_s - start.time_s
-
-    def _acceleration(self, speed: float, base_s: float) -> float:
-        """Acceleration (mm/s2, absolute) shown by the samples: from the speed before to `speed`, over `base_s`."""
-        base = self._base()
-        if base is None or base == 0:
-            return 0.0
-        middle = self._history[base]
-        for k in range(base - 1, -1, -1):
-            start = self._history[k]
-            if middle.time_s - start.time_s >= BASE_S:
-                earlier = (middle.value - start.value) / (middle.time_s - start.time_s)
-                return abs(speed - earlier) / ((middle.time_s - start.time_s + base_s) / 2)
-        return 0.0

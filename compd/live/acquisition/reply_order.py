@@ -19,19 +19,16 @@ a timeout of 0.15 s, a gauge that misses two replies in a row, or is late by 0.2
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from compd.gauge import Gauge, replies_tell_whose
+from compd.lines import USUAL_SHARE, Durations
 
-# Polls of the line whose longest duration is remembered: some ten rounds.
-POLLS_IN_MIND = 256
 # Fewest polls, at least one of each gauge, before a reply must be faster than the line's timeout.
 MIN_POLLS = 4
-# Largest duration of a reply, relative to the longest remembered one; and
+# Largest duration of a reply, relative to the longest usual one: nearly all of the last 256, since this computer may
+# pause, which is no slowness of the device; and
 SLOWER = 1.25
 # its largest excess (s): an adapter hands over received bytes once a millisecond.
 LATER_S = 2e-3
@@ -60,7 +57,7 @@ class ReplyOrder:
         received = [length for gauge in gauges for _, length in gauge.traffic() or [(0, 0)]]
         self._shortest = min(received, default=0)  # length of the replies in bytes; 0 if unknown
         self._timeout_s = timeout_s
-        self._durations_s: deque[float] = deque(maxlen=POLLS_IN_MIND)
+        self._durations = Durations()
         self._fewest_polls = max(MIN_POLLS, len(gauges))
         self._in_doubt_until_s = -math.inf
         self._in_step = False
@@ -92,13 +89,13 @@ class ReplyOrder:
             return self._quickly_s()
         if not self._in_step and self._apart_s > 0.0:
             return min(self._apart_s + JITTER_S, MAX_LISTEN_S)
-        if not self._in_step or len(self._durations_s) < self._fewest_polls:
+        if not self._in_step or len(self._durations) < self._fewest_polls:
             return self._timeout_s
-        return min(self._timeout_s, max(SLOWER * max(self._durations_s) - passed_s, 0.0) + LATER_S)
+        return min(self._timeout_s, max(SLOWER * self._durations.within_s(USUAL_SHARE) - passed_s, 0.0) + LATER_S)
 
     def asks_twice(self) -> bool:
         """Whether to discard the next answer and poll the gauge again at once, after a `pause_s`."""
-        if not self._one or self._in_step or len(self._durations_s) < self._fewest_polls:
+        if not self._one or self._in_step or len(self._durations) < self._fewest_polls:
             return False
         return self.pause_s() < min(self._closest_s, self._timeout_s)
 
@@ -112,7 +109,7 @@ class ReplyOrder:
 
     def _quickly_s(self) -> float:
         """Time (s) of a quick answer: nearly every answer arrives within it."""
-        return SLOWER * float(np.quantile(self._durations_s, NEARLY_EVERY)) + LATER_S
+        return SLOWER * self._durations.within_s(NEARLY_EVERY) + LATER_S
 
     def asked(self, now_s: float) -> None:
         """Note a request made now."""
@@ -128,7 +125,7 @@ class ReplyOrder:
 
     def answered(self, duration_s: float) -> None:
         """A request was answered; `duration_s`: from then to the reply's last byte, s."""
-        self._durations_s.append(duration_s)
+        self._durations.note(duration_s)
 
     def missed(self, now_s: float, absent: bool = False) -> None:
         """A reply is missing or incomplete, and may come later.
@@ -145,7 +142,7 @@ class ReplyOrder:
         Where the line was in step it was that of the last request, and the line still is. Readings wait as after a
         missed reply, in case that it was noise, and the reply is later than any before.
         """
-        if self._in_step and len(self._durations_s) >= self._fewest_polls:
+        if self._in_step and len(self._durations) >= self._fewest_polls:
             self._in_doubt_until_s = now_s + MAX_REPLY_S
             self._quick = False
         else:

@@ -199,8 +199,8 @@ def age_bounds_mm(
     been faster than `fastest` (k,), mm/s. Nor has a scale been more than LINK_SPEED_RATIO times as fast as the fastest
     scale, nor joints and frame faster than the links: while all scales that answer stand, all stands. So a machine that
     has rested for RESTED times as long is taken to rest until the next reading of its scales is due. One that has come
-    to rest just now may have left again, and one whose scales are silent is not taken to rest. Joints and frame that
-    were read before the scales stood have gone on since.
+    to rest just now may have left again, and one whose scales are silent is not taken to rest. What was read before the
+    scales stood has gone on since.
 
     nan where it is not known how a length moves, inf where nothing limits it; 0 for a reading without motion.
     extrapolate : whether readings are carried on, and not used as they were read.
@@ -217,7 +217,7 @@ def age_bounds_mm(
             continue
         links = LINK_SPEED_RATIO * machine if i < scales else machine
         age = now_s - slot.time_s
-        left = unwatched if i < scales else max(unwatched, age - rested)
+        left = max(unwatched, age - rested)
         bound = _age_bound(slot, age, extrapolate, fastest[i], acceleration[i], tolerance_mm[i], links, left)
         bounds_mm[i] = bound if i < scales or math.isnan(bound) else min(bound, largest_mm)
     return machine

@@ -39,6 +39,8 @@ class Doubt(IntEnum):
     """A scale shows zero after its power may have been off: with any direction and unit it would."""
     REPLUGGED = 9
     """Its line is at another port than before, `TrustMemory.evidence`: it may be another gauge."""
+    UNWITNESSED = 10
+    """It came back with the same value, but no scale has kept its power to say that the machine has not moved."""
 
     @property
     def until_accepted(self) -> bool:
@@ -232,6 +234,11 @@ class TrustMemory:
                 return f"{evidence}: look at it, {accept}"
             case Doubt.AT_ZERO:
                 return f"shows zero, as before its power was off, with any direction and unit: look at these, {accept}"
+            case Doubt.UNWITNESSED:
+                return (
+                    "came back with its value, but all scales were away and may count anew: "
+                    f"look whether the machine stands where it stood, {accept}"
+                )
             case Doubt.REPLUGGED:
                 evidence = (self.evidence.read() or {}).get(self.channels[i], "its port is not that of before")
                 return f"look whether it is this gauge, {accept}: {evidence}"  # what is too long is cut off

@@ -88,7 +88,7 @@ def after_a_jump(options: GaugeOptions, poll_s: float, jump_mm: float) -> Readin
     """What a gauge's judge makes of a jump of a part at rest that two answers show, the second one exchange later."""
     limits = MotionLimits(options.fastest_mm_per_s or math.inf, options.acceleration_mm_per_s2 or math.inf)
     memory = TrustMemory(["gauge.value"], [tolerance_mm(options.noise_um)])
-    trust = ReadingTrust(memory, "gauge.value", TrustSettings(limits, False, 0.5))
+    trust = ReadingTrust(memory, "gauge.value", TrustSettings(limits, False, 0.5, 0.5))
     for k in range(20):
         reading = good(0.0, 1000.0 + k * poll_s)
         first = None if k else reading

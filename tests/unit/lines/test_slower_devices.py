@@ -11,7 +11,8 @@ from compd.gauge import LineFault, Quality
 from compd.lines.kinds.modbus_ascii.master import AsciiMaster, lrc
 from compd.lines.kinds.modbus_rtu.master import RtuMaster, crc16
 from compd.lines.modbus_serial import SerialMaster
-from compd.lines.stream import MAX_GIVEN_UP, MIN_REST, MIN_RESTS, StreamLine
+from compd.lines.stream import MIN_REST, StreamLine
+from compd.lines.usual_time import FEWEST, MAX_IN_VAIN
 from tests.support.wire_rig import InstantClock, ScriptedPort
 
 TIMEOUT_S = 0.1
@@ -74,7 +75,7 @@ def test_a_device_that_has_become_slower_costs_one_poll(kind: str, share: float,
     port = PausingPort(clock, frame)
     port.echo = echo
     line = make(StreamLine(port, TIMEOUT_S, 0.001, clock, echo))
-    assert {outcome(line) for _ in range(MIN_RESTS)} == {"ok"}
+    assert {outcome(line) for _ in range(FEWEST)} == {"ok"}
     port.pause_s, port.behind = PAUSE_S, int(share * len(frame))
     outcomes = [outcome(line) for _ in range(10)]
     assert outcomes == [str(Quality.INCOMPLETE)] + 9 * ["ok"]
@@ -90,7 +91,7 @@ def test_a_device_slower_from_the_start_is_never_given_up(kind: str, at: str) ->
     port = PausingPort(clock, frame)
     port.pause_s, port.behind = PAUSE_S, head if at == "head" else head + 1
     line = make(StreamLine(port, TIMEOUT_S, 0.001, clock))
-    assert {outcome(line) for _ in range(3 * MIN_RESTS)} == {"ok"}
+    assert {outcome(line) for _ in range(3 * FEWEST)} == {"ok"}
 
 
 @pytest.mark.parametrize("kind", MASTERS)
@@ -99,11 +100,11 @@ def test_heads_do_not_count_as_replies(kind: str) -> None:
     clock = InstantClock()
     stream = StreamLine(PausingPort(clock, frame), TIMEOUT_S, 0.001, clock)
     line = make(stream)
-    for _ in range(MIN_RESTS - 1):
+    for _ in range(FEWEST - 1):
         assert outcome(line) == "ok"
-    assert stream.rest_timeout_s == TIMEOUT_S
+    assert stream._rest.wait_s == TIMEOUT_S
     assert outcome(line) == "ok"
-    assert stream.rest_timeout_s == MIN_REST * TIMEOUT_S
+    assert stream._rest.wait_s == MIN_REST * TIMEOUT_S
 
 
 @pytest.mark.parametrize("kind", MASTERS)
@@ -113,17 +114,17 @@ def test_the_whole_timeout_is_waited_until_a_frame_is_whole(kind: str) -> None:
     port = PausingPort(clock, frame)
     stream = StreamLine(port, TIMEOUT_S, 0.001, clock)
     line = make(stream)
-    for _ in range(MIN_RESTS):
+    for _ in range(FEWEST):
         outcome(line)
     port.frame = frame[:-1]
     waits_s = []
-    for _ in range(MAX_GIVEN_UP + 3):
-        waits_s.append(stream.rest_timeout_s)
+    for _ in range(MAX_IN_VAIN + 3):
+        waits_s.append(stream._rest.wait_s)
         assert outcome(line) == str(Quality.INCOMPLETE)
-    assert waits_s == MAX_GIVEN_UP * [MIN_REST * TIMEOUT_S] + 3 * [TIMEOUT_S]
+    assert waits_s == MAX_IN_VAIN * [MIN_REST * TIMEOUT_S] + 3 * [TIMEOUT_S]
     port.frame = frame
-    assert outcome(line) == "ok"
-    assert stream.rest_timeout_s == MIN_REST * TIMEOUT_S
+    assert {outcome(line) for _ in range(FEWEST)} == {"ok"}
+    assert stream._rest.wait_s == MIN_REST * TIMEOUT_S
 
 
 def test_what_came_of_a_frame_is_told_with_its_head() -> None:

@@ -20,7 +20,8 @@ from compd.gauge import LineFault, Quality
 from compd.lines import open_line, open_stream
 from compd.lines.kinds.modbus_rtu.master import RtuMaster
 from compd.lines.port import Port, SerialPort, TcpPort
-from compd.lines.stream import MAX_DRAIN_TIMEOUTS, MAX_GIVEN_UP, MIN_REST, MIN_RESTS, StreamLine
+from compd.lines.stream import MAX_DRAIN_TIMEOUTS, MIN_REST, StreamLine
+from compd.lines.usual_time import FEWEST, MAX_IN_VAIN, MIN_WAIT_S
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 
 TIMEOUT_S = 0.1
@@ -356,19 +357,37 @@ def test_tcp_refused_is_a_lost_line() -> None:
 def test_the_rest_of_a_reply_is_waited_for_half_of_the_timeout_and_after_that_for_all_of_it() -> None:
     """A device that has become slower is not given up time and again."""
     clock = InstantClock()
-    port = ScriptedPort(clock, [b"+1.234\r\n"] * MIN_RESTS)
+    port = ScriptedPort(clock, [b"+1.234\r\n"] * FEWEST)
     line = StreamLine(port, 0.15, 0.0, clock)
-    assert line.rest_timeout_s == 0.15
-    for _ in range(MIN_RESTS):
+    assert line._rest.wait_s == 0.15
+    for _ in range(FEWEST):
         line.receive(8)
-    assert line.rest_timeout_s == MIN_REST * 0.15
-    for waited_s in (*[MIN_REST * 0.15] * MAX_GIVEN_UP, 0.15, 0.15):
+    assert line._rest.wait_s == MIN_REST * 0.15
+    for waited_s in (*[MIN_REST * 0.15] * MAX_IN_VAIN, 0.15, 0.15):
         port.script, start_s = [b"+1.23"], clock.now_s
         with pytest.raises(LineFault) as caught:
             line.receive(8)
         assert caught.value.quality is Quality.INCOMPLETE
         assert clock.now_s - start_s == pytest.approx(waited_s)
         line.drain(0.0)
-    port.script = [b"+1.234\r\n"]
-    line.receive(8)
-    assert line.rest_timeout_s == MIN_REST * 0.15, "a whole reply came"
+    port.script = [b"+1.234\r\n"] * FEWEST
+    for _ in range(FEWEST):
+        line.receive(8)
+    assert line._rest.wait_s == MIN_REST * 0.15, "whole replies came"
+
+
+def test_a_reply_is_waited_for_three_times_as_long_as_usual_and_the_silence_after_it_as_long_as_ever() -> None:
+    """What is late by more than that is still not taken for the answer to the next request."""
+    clock = InstantClock()
+    replies = [b"1\r\n"] * FEWEST
+    line = StreamLine(ScriptedPort(clock, device=lambda _: replies.pop() if replies else b""), 0.15, 0.0, clock)
+    for _ in range(FEWEST):
+        line.send(b"?")
+        line.receive(3)
+    line.send(b"?")
+    start_s = clock.now_s
+    with pytest.raises(LineFault, match=f"no byte within {MIN_WAIT_S:g} s"):
+        line.receive(3)
+    assert clock.now_s - start_s == pytest.approx(MIN_WAIT_S)
+    line.drain()
+    assert clock.now_s - start_s == pytest.approx(2 * 0.15)

@@ -9,6 +9,7 @@ import pytest
 import structlog
 
 from compd.gauge import LineFault, Quality, Reading, bad, good
+from compd.live.acquisition.polled_gauge import MAX_FAILURES
 from tests.support.sampled import sampled
 from tests.support.scripted_thread import STALE_AFTER_S, ScriptedGauge, ScriptedThread, polls_with_faults
 
@@ -28,18 +29,19 @@ def test_an_absent_unit_rests_and_the_others_go_on() -> None:
     scripted.run()
     status = scripted.thread.status()["gauges"]
     assert status["g1"]["faults"] == {"timeout": status["g1"]["polls"]}
-    assert status["g1"]["polls"] == 22, "rests of 0.1, 0.2, 0.4 and 0.8 s, then of 0.9 s"
+    assert status["g1"]["polls"] == 31, "ten without a rest, then rests of 0.1, 0.2, 0.4 and 0.8 s, then of 0.9 s"
     assert status["g0"]["polls"] > 1000
     assert scripted.lines[0].drained == 0, "a miss costs the others one timeout"
 
 
-def test_a_unit_that_answers_again_is_polled_at_full_pace() -> None:
+@pytest.mark.parametrize(("misses", "rests_s"), [(3, 0.0), (MAX_FAILURES, 0.0), (MAX_FAILURES + 3, 0.1 + 0.2 + 0.4)])
+def test_a_unit_that_answers_again_is_polled_at_full_pace(misses: int, rests_s: float) -> None:
     polls = 0
 
     def poll() -> list[Reading]:
         nonlocal polls
         polls += 1
-        if polls <= 3:
+        if polls <= misses:
             scripted.clock.now_s += 0.1
             raise LineFault(Quality.TIMEOUT, "no byte")
         scripted.clock.now_s += 0.01
@@ -47,21 +49,20 @@ def test_a_unit_that_answers_again_is_polled_at_full_pace() -> None:
 
     def other() -> list[Reading]:
         scripted.clock.now_s += 0.01
-        if scripted.clock.now_s > 102.0:
+        if scripted.clock.now_s > 104.0:
             scripted.thread.stop()
         return [good(1.0, scripted.clock.now_s)]
 
     scripted = ScriptedThread(ScriptedGauge(poll), ScriptedGauge(other))
     scripted.run()
     times_s = [reading.time_s for name, reading in scripted.latest.history if name == "g0.c0" and reading.ok]
-    assert times_s[0] == pytest.approx(100.0 + 3 * 0.1 + 0.1 + 0.2 + 0.4, abs=0.06), "a rest after each miss"
+    assert times_s[0] == pytest.approx(100.0 + misses * 0.1 + rests_s, abs=0.02 * misses + 0.06)
     assert times_s[-1] - times_s[0] == pytest.approx(0.02 * (len(times_s) - 1)), "then at once"
 
 
-def test_a_gauge_with_a_line_of_its_own_rests_only_once_its_reading_is_stale() -> None:
-    scripted = polls_with_faults(None, *[LineFault(Quality.TIMEOUT, "no byte")] * 7)
-    rests_s = [wait for wait in scripted.clock.waits_s if wait >= 0.05]
-    assert rests_s == pytest.approx([0.9, 0.9]), "after five misses, of 0.1 s each, it goes on as if it had rested"
+def test_a_gauge_with_a_line_of_its_own_rests_after_ten_misses_too() -> None:
+    scripted = polls_with_faults(None, *[LineFault(Quality.TIMEOUT, "no byte")] * (MAX_FAILURES + 2))
+    assert [wait for wait in scripted.clock.waits_s if wait >= 0.05] == pytest.approx([0.1, 0.2])
 
 
 def test_a_channel_that_is_always_faulty_does_not_make_its_neighbours_rest() -> None:

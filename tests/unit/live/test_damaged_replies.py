@@ -175,6 +175,7 @@ def test_a_damaged_reply_costs_at_most_two_poll_intervals(name: str, line: str, 
                 MotionLimits(acceleration=gauges[channel.partition(".")[0]].acceleration_mm_per_s2),
                 False,
                 stale_after_s,
+                restart_s=0.5,
             ),
         )
         for channel in channels

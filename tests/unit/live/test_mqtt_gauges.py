@@ -300,7 +300,7 @@ def test_a_broker_that_stands_still_is_lost(broker: Broker, device: Publisher) -
 
 def test_one_damaged_length_is_not_believed_and_two_that_agree_are(broker: Broker, device: Publisher) -> None:
     memory = TrustMemory(["g.a"], [0.001])
-    judge = ReadingTrust(memory, "g.a", TrustSettings(MotionLimits(acceleration=1.0), False, stale_after_s=30.0))
+    judge = ReadingTrust(memory, "g.a", TrustSettings(MotionLimits(acceleration=1.0), False, 30.0, restart_s=0.5))
     with listening(broker, device, timed(), trust={"g.a": judge}, stale_after_s=30.0) as (_, latest):
         # measured 0.1 s apart, however fast they are sent: of a part whose speed is known
         for age_s in (0.8, 0.7, 0.6):

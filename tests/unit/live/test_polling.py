@@ -9,6 +9,7 @@ import pytest
 import structlog
 
 from compd.gauge import LineFault, Quality, Reading, good
+from compd.live.acquisition.polled_gauge import MAX_FAILURES
 from tests.support.scripted_thread import SETTINGS_TCP, STALE_AFTER_S, ScriptedGauge, ScriptedThread, polls_with_faults
 
 OK = Quality.OK
@@ -18,26 +19,25 @@ class OwnError(Exception):
     """Of a driver, that nobody else knows."""
 
 
-def test_one_damaged_reply_costs_no_rest_but_a_drain() -> None:
+@pytest.mark.parametrize("quality", [Quality.CRC, Quality.TIMEOUT, Quality.DEVICE_ERROR])
+@pytest.mark.parametrize("failures", [1, MAX_FAILURES, MAX_FAILURES + 1])
+def test_a_gauge_rests_after_more_than_ten_failures_in_a_row(quality: Quality, failures: int) -> None:
     polls = 0
 
     def poll() -> list[Reading]:
         nonlocal polls
         polls += 1
         scripted.clock.now_s += 0.01
-        if polls == 1:
-            raise LineFault(Quality.CRC, "b'..'")
-        if polls == 2:
-            raise LineFault(Quality.DEVICE_ERROR, "busy")
+        if polls <= failures:
+            raise LineFault(quality, "b'..'")
         scripted.thread.stop()
         return [good(1.0, scripted.clock.now_s)]
 
     scripted = ScriptedThread(ScriptedGauge(poll))
     scripted.run()
-    assert scripted.lines[0].drained == 1, "after a device's own error nothing is under way"
-    assert [wait for wait in scripted.clock.waits_s if wait >= 0.05] == pytest.approx([0.1]), (
-        "the second in a row rests"
-    )
+    rests_s = [wait for wait in scripted.clock.waits_s if wait >= 0.05]
+    assert rests_s == pytest.approx([0.1] if failures > MAX_FAILURES else [])
+    assert scripted.lines[0].drained == (failures if quality is Quality.CRC else 0)
 
 
 @pytest.mark.parametrize("quality", [Quality.TIMEOUT, Quality.INCOMPLETE, Quality.CRC, Quality.MISMATCH])

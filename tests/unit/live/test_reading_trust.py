@@ -23,6 +23,7 @@ NOISE_UM = 0.1
 POLL_S = 0.005
 REPLY_S = 0.003
 STALE_AFTER_S = 0.5
+RESTART_S = 0.5
 LIMITS = MotionLimits(speed=60.0, acceleration=400.0)
 GAUGES = ("scale_1", "scale_2", "scale_3")
 
@@ -37,7 +38,7 @@ class Shop:
         self.asked = dict.fromkeys(GAUGES, 0)
         self.latest = Latest([f"{name}.value" for name in GAUGES])
         self.memory = TrustMemory(self.latest.channels, [tolerance_mm(NOISE_UM)] * len(GAUGES), scales=len(GAUGES))
-        self._settings = TrustSettings(limits, returns_by_itself, STALE_AFTER_S)
+        self._settings = TrustSettings(limits, returns_by_itself, STALE_AFTER_S, RESTART_S)
         self._random = np.random.default_rng(5)
         self.start_acquisition()
 
@@ -265,21 +266,34 @@ def test_a_link_that_is_jogged_alone_and_loses_its_count_in_a_gap_is_not_believe
     assert "came back -" in shop.reading("scale_1").detail
 
 
-def test_a_new_process_follows_a_machine_on_the_move_and_finds_the_scale_that_has_lost_its_count():
-    for lost_mm in (0.0, -5.0):
-        shop = Shop()
-        shop.poll(20)
-        start_s = shop.now_s
-        for name, way_mm in WAYS_MM.items():
-            shop.shows[name] = driven(start_s, 2 * way_mm, speed=2.5 * abs(way_mm), acceleration=12.5 * abs(way_mm))
-        while shop.now_s < start_s + 0.25:
-            shop.poll()
-        shop.now_s += 0.3
-        move = shop.shows["scale_1"]
-        shop.shows["scale_1"] = lambda time_s, move=move, lost_mm=lost_mm: move(time_s) + lost_mm
+@pytest.mark.parametrize("gone_s", [0.2, 0.3, 1.0])
+@pytest.mark.parametrize("is_replaced", [True, False])
+def test_a_daemon_that_was_silent_itself_follows_a_machine_on_the_move(shop, gone_s, is_replaced):
+    """No poll has failed: the limits of motion judge what every gauge shows then, and all are believed at once."""
+    start_s = shop.now_s
+    for name, way_mm in WAYS_MM.items():
+        shop.shows[name] = driven(start_s, 4 * way_mm, speed=2.5 * abs(way_mm), acceleration=12.5 * abs(way_mm))
+    while shop.now_s < start_s + 0.25:
+        shop.poll()
+    shop.now_s += gone_s
+    if is_replaced:
         shop.start_acquisition()
-        shop.poll(60)
-        assert shop.reading("scale_1").ok == (lost_mm == 0.0)
+    shop.poll(2)
+    assert all(shop.reading(name).ok and shop.reading(name).time_s > shop.now_s - 0.1 for name in GAUGES)
+
+
+@pytest.mark.parametrize("lost_mm", [400.0, -900.0])
+def test_after_its_own_silence_the_daemon_believes_no_count_that_the_limits_of_motion_exclude(shop, lost_mm):
+    start_s = shop.now_s
+    for name, way_mm in WAYS_MM.items():
+        shop.shows[name] = driven(start_s, way_mm)
+    while shop.now_s < start_s + 0.25:
+        shop.poll()
+    shop.now_s += 1.0
+    move = shop.shows["scale_1"]
+    shop.shows["scale_1"] = lambda time_s: move(time_s) + lost_mm
+    shop.poll(2)
+    assert shop.reading("scale_1").quality is Quality.DISTRUSTED
 
 
 @pytest.mark.parametrize("shows_mm", [0.0, 3.0])
@@ -419,12 +433,24 @@ def test_an_absolute_gauge_needs_no_acceptance():
     assert shop.reading("scale_1").value == pytest.approx(0.03, abs=0.001)
 
 
-def test_after_a_power_cut_of_everything_the_gauges_that_show_what_they_showed_are_believed(shop):
+@pytest.mark.parametrize("silent", ["the lines are lost", "polls fail"])
+def test_where_all_scales_were_away_old_counts_are_no_proof_that_nothing_has_moved(shop, silent):
+    """The machine may have been moved while nobody saw it, and displays that lost their power may show their old
+    counts."""
     drive(shop, scale_1=3.0, scale_2=2.0, scale_3=1.0)
-    shop.away_s(2.0, *GAUGES)
-    shop.shows["scale_3"] = lambda _: 0.4
+    if silent == "polls fail":
+        for _ in range(80):
+            shop.damage |= {name: [LineFault(Quality.TIMEOUT)] for name in GAUGES}
+            shop.poll()
+    else:
+        shop.away_s(2.0, *GAUGES)
     shop.poll(5)
-    assert [shop.reading(name).quality for name in GAUGES] == [Quality.OK, Quality.OK, Quality.DISTRUSTED]
+    for name in GAUGES:
+        assert shop.reading(name).quality is Quality.DISTRUSTED
+        assert "all scales were away" in shop.reading(name).detail
+    shop.memory.accept("all")
+    shop.poll(3)
+    assert all(shop.reading(name).ok for name in GAUGES)
 
 
 def test_what_is_not_believed_outlives_the_process_that_polls(shop):

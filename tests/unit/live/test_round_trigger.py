@@ -290,7 +290,7 @@ def test_behind_a_broadcast_the_line_is_silent_as_long_as_between_frames() -> No
 
 def trust(acceleration: float) -> ReadingTrust:
     memory = TrustMemory(["g.v"], [0.001])
-    return ReadingTrust(memory, "g.v", TrustSettings(MotionLimits(acceleration=acceleration), False, 10.0))
+    return ReadingTrust(memory, "g.v", TrustSettings(MotionLimits(acceleration=acceleration), False, 10.0, 0.5))
 
 
 def test_a_latched_gauge_that_begins_to_move_is_believed_and_one_that_jumps_is_not() -> None:

@@ -44,7 +44,7 @@ class Machine:
         self.temperature_degC = 20.0
         self.setpoint: dict[str, object] | None = None
         self.memory = TrustMemory(CHANNELS, [tolerance_mm(NOISE_UM)] * len(CHANNELS))
-        trust = TrustSettings(MotionLimits(), returns_by_itself=False, stale_after_s=0.5)
+        trust = TrustSettings(MotionLimits(), returns_by_itself=False, stale_after_s=0.5, restart_s=0.5)
         self.judges = {channel: ReadingTrust(self.memory, channel, trust) for channel in CHANNELS}
         self.latest = Latest(["cabinet.frame"])
         self._noise_mm = noise_um * 1e-3

@@ -31,6 +31,7 @@ from compd.clock import Clock
 from compd.gauge import LineFault, Quality, RegisterReply
 from compd.lines.modbus_serial import WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS, exception_fault
 from compd.lines.port import TcpPort
+from compd.lines.usual_time import UsualWait
 
 # Every fault becomes a LineFault and reaches STATUS; pymodbus would log each one, and each late reply, as well.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
@@ -67,6 +68,7 @@ class ModbusTcp:
         """
         self._address = (host, port)
         self._timeout_s = timeout_s
+        self._reply = UsualWait(timeout_s)
         self._gateway_wait_s = timeout_s if gateway_wait_s is None else gateway_wait_s
         self._clock = clock
         self._pause_s = pause_s
@@ -182,7 +184,8 @@ class ModbusTcp:
 
         A late reply to an earlier request shows that the gateway has come to the next: the timeout begins anew.
         """
-        until_s = max(time_s, self._busy_until_s) + self._timeout_s
+        wait_s = self._reply.wait_s if self._busy_until_s <= time_s else self._timeout_s
+        until_s = max(time_s, self._busy_until_s) + wait_s
         late = 0
         while data := port.read(until_s - self._clock.monotonic()):
             self._last_bytes_s = self._clock.monotonic()
@@ -190,10 +193,13 @@ class ModbusTcp:
             used, reply = self._framer.handleFrame(bytes(self._received), request.dev_id, request.transaction_id)
             del self._received[:used]
             if reply is not None:
+                self._reply.took(self._last_bytes_s - time_s)
                 return reply
             if used and late < self._unanswered:
                 late += 1
+                self._reply.came_late()
                 until_s = max(until_s, self._last_bytes_s + self._timeout_s)
+        self._reply.missed()
         now_s = self._clock.monotonic()
         self._unanswered += 1
         self._busy_until_s = max(self._busy_until_s, time_s) + self._gateway_wait_s
