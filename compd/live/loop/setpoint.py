@@ -127,8 +127,7 @@ class Setpoint(NamedTuple):
         return cls(*head, None, line=line, packet=packet)
 
     def to_json(self) -> bytes:
-        """One line of JSON, with its newline. Keys without a value are absent; of a valid setpoint `u_tip_um` is null
-        where it is not known, and nothing else ever is.
+        """One line of JSON, with its newline. Keys without a value are absent.
 
         Raises ValueError where a value is not finite.
         """
@@ -202,8 +201,8 @@ class Setpoint(NamedTuple):
             message |= _json_pose(values, moved_mm)
         u_tip_um = self.u_tip_um
         if isinstance(u_tip_um, float):
-            moved_um = u_tip_um + moved_mm * UM_PER_MM
-            message["u_tip_um"] = round(moved_um, _DECIMALS_UM) if math.isfinite(moved_um) else None
+            if math.isfinite(u_tip_um):
+                message["u_tip_um"] = round(u_tip_um + moved_mm * UM_PER_MM, _DECIMALS_UM)
         elif u_tip_um is not None and math.isfinite(u_tip_um.sum()):
             message["u_tip_um"] = _rounded(u_tip_um, _DECIMALS_UM, moved_mm)
         if self.shadow is not None:

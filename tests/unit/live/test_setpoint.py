@@ -77,7 +77,6 @@ def test_json_is_one_line_with_every_documented_key():
         },
         "link_length_mm": [401, 402, 403],
         "scale_setpoint_mm": [11, 12, 13],
-        "u_tip_um": None,
         "correction_mm": [0.01, 0.02, 0.03],
         "sources_mm": {"joints": [0.0033333, 0.0066667, 0.01], "frame": [0.0066667, 0.0133333, 0.02]},
     }
