@@ -21,6 +21,7 @@ from compd.live.loop.packet_layout import (
     FLAG_VALID,
     LAYOUT_VERSION,
     MAGIC,
+    NO_TARGET_ID,
     PACKET_LINKS,
     PACKET_SIZE,
 )
@@ -110,6 +111,11 @@ class Setpoint(NamedTuple):
     def valid(self) -> bool:
         return self.state.valid
 
+    @property
+    def _target(self) -> Target | None:
+        """The target that it answers; None in CMM mode."""
+        return None if self.inputs is None else self.inputs.target
+
     def pack(self, config_hash: bytes | None) -> tuple[bytes, bytes]:
         """Its line, and what clients are sent of it as the content of a ring's entry: the line among it.
 
@@ -149,8 +155,8 @@ class Setpoint(NamedTuple):
             "valid_until": round(self.valid_until_s, _DECIMALS_S),
             "mode": self.mode,
         }
-        if self.inputs is not None and self.inputs.target is not None:
-            message |= _target_named(self.inputs.target)
+        if self._target is not None:
+            message |= _target_named(self._target)
         if self.model:
             message["model"] = self.model
         if math.isfinite(self.age_s):
@@ -218,7 +224,7 @@ class Setpoint(NamedTuple):
 
         config_hash : the first 8 bytes of the configuration's hash.
         """
-        values = self.values
+        values, target = self.values, self._target
         vectors = _NO_VECTORS
         links = flags = 0
         if values is not None:
@@ -255,6 +261,8 @@ class Setpoint(NamedTuple):
             links,
             *vectors,
             config_hash,
+            math.nan if target is None else target.time_s,
+            NO_TARGET_ID if target is None or target.id is None else target.id,
         )
         return body + zlib.crc32(body).to_bytes(4, "little")
 
