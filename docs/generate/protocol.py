@@ -91,8 +91,8 @@ is dropped, and counted in [`STATUS`](#protocol-status).
 Links that the machine does not have are nan. When the setpoint is invalid, every number of the tip, the frame and the
 links is nan.
 
-A field is never moved. A new field comes with another version and size: refuse a packet whose version or size you do not
-know. Packets of releases up to 0.3.0 have version 1 and 276 bytes, without the target.
+A field is never moved. A new field comes with another version and size: refuse a packet whose version or size you do
+not know. Packets of releases up to 0.3.0 have version 1 and 276 bytes, without the target.
 """
 
 
