@@ -179,15 +179,15 @@ class Client(ClientOrders):
             sent meanwhile.
         """
         if not self._watches:
-            self._watch(None)
+            self._watch()
         end_s = time.monotonic() + timeout_s
         while True:
-            in_time = self._connection.has_line(0.0 if self._setpoints else max(end_s - time.monotonic(), 0.0))
             while self._connection.has_line(0.0):
                 self._read()
             if (newest := self._setpoints.newest()) is not None:
                 return newest
-            if not in_time or time.monotonic() >= end_s:
+            left_s = end_s - time.monotonic()
+            if left_s <= 0 or not self._connection.has_line(left_s):
                 raise DaemonError(
                     Problem(
                         where=self._connection.address,
@@ -331,7 +331,7 @@ class Client(ClientOrders):
         self._connection.send(message, descriptor)
         return self._await(answer)
 
-    def _watch(self, rate_hz: float | None) -> None:
+    def _watch(self, rate_hz: float | None = None) -> None:
         self._ask({"class": "WATCH"} if rate_hz is None else {"class": "WATCH", "rate_hz": rate_hz}, "WATCH")
         self._watches = rate_hz != 0
 

@@ -152,6 +152,36 @@ def test_the_latest_setpoint_has_not_expired_and_is_waited_for(tmp_path):
         assert client.latest(TIMEOUT_S)["seq"] == 3
 
 
+class Later:
+    """A connection over which a line comes only to who waits for it."""
+
+    address, same_clock = "here", True
+
+    def __init__(self, *lines):
+        self.lines, self.later = [VERSION, *lines], []
+
+    def has_line(self, wait_s):
+        if not self.lines and wait_s > 0 and self.later:
+            self.lines.append(self.later.pop(0))
+        return bool(self.lines)
+
+    def read(self):
+        line = self.lines.pop(0)
+        return line, json.loads(line)
+
+    def send(self, message, descriptor=None):
+        pass
+
+
+def test_an_expired_setpoint_that_came_with_an_answer_does_not_end_the_wait():
+    connection = Later(b'{"class":"WATCH"}\n', setpoint(1), setpoint(2, valid_for_s=-1.0), b'{"class":"STATUS"}\n')
+    client = Client(connection)
+    assert next(client.watch())["seq"] == 1
+    client.status()
+    connection.later = [setpoint(3, valid_for_s=-1.0), setpoint(4)]
+    assert client.latest(TIMEOUT_S)["seq"] == 4
+
+
 @pytest.mark.parametrize("state", ["stop", "coasting"])
 def test_the_latest_setpoint_may_be_invalid(tmp_path, state):
     """It has expired when it is made."""
