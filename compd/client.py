@@ -16,34 +16,34 @@ setpoints::
 A controller also says where the tip shall be, and commands its drives with the corrected scale readings::
 
     with connect("/run/compd/compd.sock") as client:
-        client.target(tip_B0_mm=[10.0, 0.0, -500.0])
-        for setpoint in client.watch():
-            client.target(tip_B0_mm=[10.0, 0.0, -500.0])  # the next one, or the same again: a target grows old
-            if setpoint["valid"] and setpoint["mode"] == "machine_tool":
+        while True:
+            client.target(tip_B0_mm=[10.0, 0.0, -500.0], id=1)  # the next one, or the same again: a target grows old
+            setpoint = client.latest(timeout_s=1.0)
+            if setpoint["valid"] and setpoint.get("target_id") == 1:
                 drive_to(setpoint["scale_setpoint_mm"])
 
 Messages are dictionaries with the keys of the protocol. Lengths are in mm, angles in rad, times in seconds of the
 daemon's monotonic clock; a vector's name ends in its frame and unit. What is unknown is absent from a message, so a
-key that not every setpoint has is read with `get`. A setpoint must not be used later than its `valid_until`: on the
-daemon's computer compare it with `time.monotonic()`, elsewhere count `valid_until - time_s` from the moment of arrival.
-A target grows old too: a controller repeats it, see `Client.target`.
+key that not every setpoint has is read with `get`. A setpoint must not be used later than its `valid_until`, which
+`Client.latest` sees to. A program that keeps one for longer compares it with `time.monotonic()` on the daemon's
+computer, and elsewhere counts `valid_until - time_s` from the moment of arrival. A target grows old too: a controller
+repeats it, see `Client.target`.
 
 Whatever goes wrong raises `compd.errors.DaemonError`, which says what to do.
 """
 
 from __future__ import annotations
 
-import os
-from collections import deque
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from compd.client_connection import ClientConnection, Message, open_connection
+from compd.client_orders import ClientOrders
+from compd.client_setpoints import ReadSetpoints
 from compd.errors import DaemonError, Problem
-from compd.files import open_regular
-from compd.setpoint_states import state_named
 
 __all__ = ["DEFAULT_ADDRESS", "Client", "Message", "connect"]
 
@@ -94,12 +94,12 @@ def connect(
         raise
 
 
-class Client:
+class Client(ClientOrders):
     """A connection to the daemon, made by `connect`. Each method is named after the message that it is about.
 
     Messages are dictionaries with the keys of the protocol; lengths are in mm, angles in rad, times in s of the
     daemon's monotonic clock. A client is used by one thread. Setpoints that arrive while it waits for another answer
-    are kept for `watch`.
+    are kept for `watch` and `latest`.
 
     Attributes
     ----------
@@ -109,9 +109,10 @@ class Client:
 
     def __init__(self, connection: ClientConnection, token: str | None = None, by: str = "") -> None:
         """`connection`: to the daemon, with nothing read yet; `token`, `by`: as in `connect`."""
+        super().__init__(by)
         self._connection = connection
-        self._by = by
-        self._setpoints: deque[Message] = deque()
+        self._setpoints = ReadSetpoints(connection.same_clock)
+        self._watches = False
         _, greeting = connection.read()
         if greeting["class"] == "AUTH":
             if token is None:
@@ -148,11 +149,53 @@ class Client:
             Where the daemon has gone, or sent nothing within the timeout; or it refused a message that was sent
             meanwhile.
         """
-        self._ask({"class": "WATCH"} if rate_hz is None else {"class": "WATCH", "rate_hz": rate_hz}, "WATCH")
+        self._watch(rate_hz)
         while True:
             if not self._setpoints:
                 self._await("SETPOINT")
-            yield self._setpoints.popleft()
+            yield self._setpoints.next()
+
+    def latest(self, timeout_s: float) -> Message:
+        """Return the newest setpoint that may still be used: for a controller, which acts on no older one.
+
+        Setpoints that came before it are read away. A valid one whose `valid_until` has passed is not returned; an
+        invalid one is, since it says why there is no other. Each is returned once. The first call asks for the setpoint
+        of every cycle, unless `watch` has asked for fewer.
+
+        Parameters
+        ----------
+        timeout_s : float
+            Longest wait for such a setpoint, s.
+
+        Returns
+        -------
+        dict
+            The message. A key whose value is not known is absent.
+
+        Raises
+        ------
+        DaemonError
+            Where no such setpoint came within the timeout, or the daemon has gone; or it refused a message that was
+            sent meanwhile.
+        """
+        if not self._watches:
+            self._watch()
+        end_s = time.monotonic() + timeout_s
+        while True:
+            while self._connection.has_line(0.0):
+                self._read()
+            if (newest := self._setpoints.newest()) is not None:
+                return newest
+            left_s = end_s - time.monotonic()
+            if left_s <= 0 or not self._connection.has_line(left_s):
+                raise DaemonError(
+                    Problem(
+                        where=self._connection.address,
+                        what="no setpoint that may still be used has come in time",
+                        value=f"{timeout_s:g} s",
+                        next_step="look at `compd status`; where the daemon is well, call `latest` more often",
+                    )
+                )
 
     def readings(self, rate_hz: float | None = None) -> Iterator[tuple[bytes, Message]]:
         """Iterate over what the cycles compute from, for a recording: each line as it came, and the message in it.
@@ -226,18 +269,6 @@ class Client:
             given["tip_by_scale"] = [list(row) for row in tip_by_scale]
         self._connection.send({"class": "TARGET", **given})
 
-    def release(self) -> None:
-        """Give the controller's role back: the daemon returns to CMM mode.
-
-        Over the Unix socket it takes the role from whichever client has it.
-
-        Raises
-        ------
-        DaemonError
-            Where this client is not the controller, or nobody is.
-        """
-        self._order({"class": "RELEASE"})
-
     def status(self) -> Message:
         """Ask for STATUS.
 
@@ -284,131 +315,6 @@ class Client:
         """
         return self._ask({"class": "BUDGET"}, "BUDGET")
 
-    def zero(self, replace: bool = False) -> Message:
-        """Take machine zero, with the machine at rest at its zero position. Unix socket only; takes about a second.
-
-        Parameters
-        ----------
-        replace : bool
-            Take it also where a gauge differs by more than 0.5 mm from the machine zero until now, or is not believed.
-
-        Returns
-        -------
-        dict
-            ZERO with `taken_at`, `path` of the file, `readings_mm` by channel, `quantities` by name (those that could
-            not be read are listed in `without`) and, where there was a machine zero before, `changed_mm` by channel.
-
-        Raises
-        ------
-        DaemonError
-            Where a gauge cannot be read, the machine moves, or the file cannot be written; and where it needs
-            `replace`: the problem's value is then "zero_differs".
-        """
-        return self._order({"class": "ZERO", "replace": True} if replace else {"class": "ZERO"})
-
-    def accept(self, gauge: str) -> Message:
-        """Let the daemon believe a gauge again that jumped, or came back with another value. Unix socket only.
-
-        Look at the gauge first: what it reads from now on is taken as it is.
-
-        Parameters
-        ----------
-        gauge : str
-            A gauge, one channel of it as ``"gauge.channel"``, or ``"all"``.
-
-        Returns
-        -------
-        dict
-            ACCEPT, after a second, with `gauges`: the channels that are believed now and were not; `believed_for_s`: of
-            each, for how long, s; `not_believed`: the reason of each that is not believed after it either.
-
-        Raises
-        ------
-        DaemonError
-            Where there is no such gauge.
-        """
-        return self._order({"class": "ACCEPT", "gauge": gauge})
-
-    def poll(self, gauge: str) -> Message:
-        """Have a gauge polled at once that did not answer, and is asked seldom since. Unix socket only.
-
-        Parameters
-        ----------
-        gauge : str
-            Its name in the configuration. It is polled within a second, if its line is open; `status` counts its polls.
-
-        Returns
-        -------
-        dict
-            POLL.
-
-        Raises
-        ------
-        DaemonError
-            Where there is no such gauge, or its device sends by itself.
-        """
-        return self._order({"class": "POLL", "gauge": gauge})
-
-    def model(self, file: str | Path | None = None, shadow: bool = False, descriptor: int | None = None) -> Message:
-        """Ask which models the daemon runs with; with `file`, adopt that model first. Unix socket only.
-
-        The file is opened here, as this process may, and the daemon gets the open descriptor with the request: it
-        opens no file itself.
-
-        Parameters
-        ----------
-        file : str or Path, optional
-            A model file; ``""`` for the machine without effects, or for no shadow; None to change nothing.
-        shadow : bool
-            Compute the correction of this model beside the applied one, and do not apply it.
-        descriptor : int, optional
-            Of the file, where the caller has opened it; `file` is then only its name. It is left open.
-
-        Returns
-        -------
-        dict
-            MODEL with `applied` and, if there is one, `shadow`: `effects`, `not_live`, `from_20_degC`, `model` (the
-            file's hash) and `file`; `kept`, whether the daemon starts with the applied model again, and `kept_text`,
-            what keeps it.
-
-        Raises
-        ------
-        DaemonError
-            Where the file cannot be read, or the daemon cannot use it; the models are as before.
-        """
-        if file is None:
-            return self._ask({"class": "MODEL"}, "MODEL")
-        request: Message = {"class": "MODEL", "file": str(file) and str(Path(file).absolute()), "shadow": shadow}
-        if descriptor is not None or not request["file"]:
-            return self._order(request, descriptor)
-        opened = _opened(Path(file))
-        try:
-            return self._order(request, opened)
-        finally:
-            os.close(opened)
-
-    def adopt_shadow(self, hash: str) -> Message:
-        """Apply the model that runs as the shadow: exactly what has been looked at, whatever has become of its file.
-
-        Unix socket only.
-
-        Parameters
-        ----------
-        hash : str
-            Of the model, as MODEL and STATUS tell it.
-
-        Returns
-        -------
-        dict
-            MODEL, as `model` returns it.
-
-        Raises
-        ------
-        DaemonError
-            Where no model of this hash runs as the shadow; the models are as before.
-        """
-        return self._order({"class": "MODEL", "hash": hash})
-
     def close(self) -> None:
         """Close the connection; a controller's role ends with it."""
         self._connection.close()
@@ -421,36 +327,23 @@ class Client:
     ) -> None:
         self.close()
 
-    def _order(self, message: Message, descriptor: int | None = None) -> Message:
-        """Ask for what changes the machine, in the name of whoever this client asks for."""
-        name: str = message["class"]
-        return self._ask(message | ({"by": self._by} if self._by else {}), name, descriptor)
-
     def _ask(self, message: Message, answer: str, descriptor: int | None = None) -> Message:
         self._connection.send(message, descriptor)
         return self._await(answer)
 
+    def _watch(self, rate_hz: float | None = None) -> None:
+        self._ask({"class": "WATCH"} if rate_hz is None else {"class": "WATCH", "rate_hz": rate_hz}, "WATCH")
+        self._watches = rate_hz != 0
+
     def _await(self, wanted: str) -> Message:
-        """Read until a message of class `wanted`; every setpoint on the way is kept for `watch`."""
-        while True:
-            _, message = self._connection.read()
-            if message["class"] == "SETPOINT":
-                if state_named(message.get("state", "")) is None:
-                    message["valid"] = False
-                self._setpoints.append(message)
-            if message["class"] == wanted:
-                return message
+        """Read until a message of class `wanted`."""
+        while (message := self._read())["class"] != wanted:
+            pass
+        return message
 
-
-def _opened(file: Path) -> int:
-    """A descriptor of a regular file, open for reading. Raises DaemonError."""
-    try:
-        return open_regular(file)
-    except OSError as error:
-        raise DaemonError(
-            Problem(
-                where=str(file),
-                what=f"cannot be read: {error.strerror or error}",
-                next_step="name a model file that you may read",
-            )
-        ) from error
+    def _read(self) -> Message:
+        """Read a message; a setpoint is kept for `watch` and `latest`."""
+        _, message = self._connection.read()
+        if message["class"] == "SETPOINT":
+            self._setpoints.put(message)
+        return message

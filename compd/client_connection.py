@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import socket
+import time
+from collections import deque
 from contextlib import suppress
 from typing import Any
 
@@ -12,6 +14,8 @@ import orjson
 from compd.errors import DaemonError, Problem
 
 _IS_IT_RUNNING = "is `compd run` running? its configuration says where it listens, under `sockets:`"
+
+_RECEIVE_BYTES = 1 << 16
 
 Message = dict[str, Any]
 
@@ -44,14 +48,21 @@ class ClientConnection:
         """`connected`: an open socket with its timeout set; `address`: the name of the other end in errors."""
         self.address = address
         self._socket = connected
-        self._lines = connected.makefile("rb")
+        self._timeout_s = connected.gettimeout()
+        self._lines: deque[bytes] = deque()
+        self._rest = b""
+
+    @property
+    def same_clock(self) -> bool:
+        """Whether the daemon runs on this computer: nothing else reaches its Unix socket."""
+        return self._socket.family == socket.AF_UNIX
 
     def send(self, message: Message, descriptor: int | None = None) -> None:
         """descriptor : open file that goes with the message; over TCP none does. Raises DaemonError where the daemon
         has gone."""
         line = json.dumps(message).encode() + b"\n"
         try:
-            if descriptor is not None and self._socket.family == socket.AF_UNIX:
+            if descriptor is not None and self.same_clock:
                 line = line[socket.send_fds(self._socket, [line], [descriptor]) :]
             self._socket.sendall(line)
         except OSError as error:
@@ -62,12 +73,12 @@ class ClientConnection:
 
         Raises DaemonError where it is an ERROR message or none of compd's, and where nothing came within the timeout.
         """
-        try:
-            line = self._lines.readline()
-        except OSError as error:
-            raise self._lost(error.strerror or "no answer in time") from error
-        if not line.endswith(b"\n"):
-            raise self._lost("it closed the connection")
+        while not self._lines:
+            try:
+                self._receive()
+            except OSError as error:
+                raise self._lost(error.strerror or "no answer in time") from error
+        line = self._lines.popleft() + b"\n"
         try:
             message: Message = orjson.loads(line)
             error_code = message["code"] if message["class"] == "ERROR" else None
@@ -84,15 +95,37 @@ class ClientConnection:
             raise DaemonError(Problem(where=self.address, what=message["text"], value=error_code))
         return line, message
 
+    def has_line(self, wait_s: float) -> bool:
+        """Whether a line has come that was not read, or comes within `wait_s`. Raises DaemonError as `read`."""
+        end_s = time.monotonic() + wait_s
+        try:
+            while not self._lines:
+                self._socket.settimeout(max(end_s - time.monotonic(), 0.0))
+                self._receive()
+        except (TimeoutError, BlockingIOError):
+            return False
+        except OSError as error:
+            raise self._lost(error.strerror or str(error)) from error
+        finally:
+            self._socket.settimeout(self._timeout_s)
+        return True
+
     def shutdown(self) -> None:
         """End both directions: a `read` that waits on another thread raises DaemonError."""
         with suppress(OSError):  # the daemon was first
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """Close the socket and what is buffered of it."""
-        self._lines.close()
+        """Close the socket."""
         self._socket.close()
+
+    def _receive(self) -> None:
+        """Take what has come, or comes within the socket's timeout. Raises OSError, and DaemonError at the end."""
+        piece = self._socket.recv(_RECEIVE_BYTES)
+        if not piece:
+            raise self._lost("it closed the connection")
+        *lines, self._rest = (self._rest + piece).split(b"\n")
+        self._lines += lines
 
     def _lost(self, why: str) -> DaemonError:
         return DaemonError(Problem(where=self.address, what=f"the daemon is gone: {why}", next_step=_IS_IT_RUNNING))

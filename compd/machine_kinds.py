@@ -131,7 +131,7 @@ def machine_text(name: str, kind_name: str, dimensions: Dimensions, tolerance: s
         *(f"  {line}" for line in stated),
         "",
         "lines:",
-        "  cabinet: {kind: modbus_tcp, host: 127.0.0.1, port: 502, timeout_s: 0.3}",
+        "  cabinet: {kind: modbus_tcp, host: 127.0.0.1, port: 502, timeout_s: 0.3, poll_every_s: 0.01}",
         "",
         "gauges:                        # `compd gauge list` has other drivers",
         "  scales:",

@@ -91,6 +91,10 @@ def measured_distances(count: int) -> tuple[FrameDistance, ...]:
     return FRAME_DISTANCES[len(FRAME_DISTANCES) - count :]
 
 
+# Kinds of wires, as keys of `wiring`.
+WIRES = ("scale", "joint", "frame", "quantities")
+
+
 class Wiring(Section):
     """Assignment of gauges to the quantities of the machine."""
 

@@ -22,4 +22,5 @@ from .line_budget import LineBudget as LineBudget
 from .line_budget import line_budgets as line_budgets
 from .line_warnings import budget_warnings as budget_warnings
 from .pushed_periods import period_warnings as period_warnings
+from .refused_setpoints import certain_refusal as certain_refusal
 from .shared_addresses import shared_address_warnings as shared_address_warnings

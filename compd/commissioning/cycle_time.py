@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -17,7 +17,7 @@ from compd.errors import Problem
 from compd.gauge import good
 from compd.link_count import scale_count
 from compd.live.loop import Commands, CyclePacker, Directions, Loop, LoopTiming, Setpoint, build_pipeline
-from compd.live.machine import MachineZero, Models, ModelText, try_model
+from compd.live.machine import LiveModel, MachineWires, MachineZero, ModelLoader, Models, ModelText, try_model
 from compd.model import MachineModel
 
 _CYCLES = 200
@@ -45,13 +45,8 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
     clock = clock or MonotonicClock()
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
     latest, wires, settings = pipeline.latest, pipeline.wires, pipeline.settings
-    file = configuration.state.model_file
-    model = pipeline.loader.load(None if file is None else ModelText.read(Path(file)))
+    model, zero = first_model(configuration, pipeline.loader), zero_of(configuration, wires)
     try_model(settings.model, (), str(configuration.path))
-    lengths, quantities = wires.length_channels, wires.quantity_names
-    zero = MachineZero(
-        configuration.zero_hash, "", dict.fromkeys(lengths, _RAW_MM), dict.fromkeys(quantities, _QUANTITY)
-    )
     commands = Commands(zero, Models(model))
     packer = CyclePacker(Directions(wires.scale.wires))
     numbers = count()
@@ -61,7 +56,7 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
         """Readings for the next cycle, until the last one."""
         number = next(numbers)
         for channel, slot in latest.index.items():
-            value = _value(zero.readings_mm, channel) + _NOISE_MM * (number % 3 - 1)
+            value = raw_value(zero, channel) + _NOISE_MM * (number % 3 - 1)
             latest.put(slot, good(value, clock.monotonic()))
         return number < _CYCLES
 
@@ -71,6 +66,23 @@ def measure_cycle(configuration: Configuration, clock: Clock | None = None) -> C
 
     Loop(settings, latest, commands, [send], clock, timing).run(keep_on)
     return CycleTime(timing.cost.quantile_us(0.5) * 1e-6, timing.cost.largest_us * 1e-6)
+
+
+def first_model(configuration: Configuration, loader: ModelLoader) -> LiveModel:
+    """The model of `state.model_file`, or none. Raises CompdError if that cannot be used."""
+    file = configuration.state.model_file
+    return loader.load(None if file is None else ModelText.read(Path(file)))
+
+
+def zero_of(configuration: Configuration, wires: MachineWires) -> MachineZero:
+    """A machine zero at which all lengths read the same, and all quantities."""
+    readings_mm = dict.fromkeys(wires.length_channels, _RAW_MM)
+    return MachineZero(configuration.zero_hash, "", readings_mm, dict.fromkeys(wires.quantity_names, _QUANTITY))
+
+
+def raw_value(zero: MachineZero, channel: str) -> float:
+    """What a channel reads at that machine zero."""
+    return zero.readings_mm.get(channel, _QUANTITY)
 
 
 def python_effect_times(configuration: Configuration, clock: Clock | None = None) -> dict[str, float]:
@@ -128,7 +140,3 @@ def cycle_warnings(configuration: Configuration, cycle: CycleTime) -> list[Probl
             next_step="lower rate_hz, or take a faster computer",
         )
     ]
-
-
-def _value(readings_mm: Mapping[str, float], channel: str) -> float:
-    return readings_mm.get(channel, _QUANTITY)

@@ -68,11 +68,8 @@ def _tip_errors_um(model: MachineModel, change_mm: FloatArray) -> tuple[float, f
     shown, _ = compensate_cmm(model, _values(model, change_mm), start)
     cmm_um = _away_um(model, shown)
     # in machine-tool mode the drive follows the scale setpoint by the wrong scale
-    on_plate = isinstance(model.arrangement, ToolOnPlate)
-    contact = model.zero.contact
-    target_mm = contact.tip_P_mm if on_plate else _in_B0(model, contact.tip_M_mm)
     try:
-        command, _ = compensate_machine_tool(model, target_mm, None, _values(model, change_mm), start)
+        command, _ = compensate_machine_tool(model, target_at_zero(model), None, _values(model, change_mm), start)
     except KinematicsError:
         return cmm_um, math.nan
     true_scale_mm = command.scale_setpoint_mm - change_mm[: model.scales]
@@ -90,8 +87,12 @@ def _away_um(model: MachineModel, computed: Compensation) -> float:
     return float(np.linalg.norm(computed.tip_M_mm - contact.tip_M_mm) * UM_PER_MM)
 
 
-def _in_B0(model: MachineModel, tip_M_mm: FloatArray) -> FloatArray:
-    return np.asarray(model.frame.zero_rotation_M_B.T @ (tip_M_mm - model.frame.zero_origin_M_mm))
+def target_at_zero(model: MachineModel) -> FloatArray:
+    """(3,) the target of machine zero: in {B0}, with the tool on the plate in {P}."""
+    contact, frame = model.zero.contact, model.frame
+    if isinstance(model.arrangement, ToolOnPlate):
+        return contact.tip_P_mm
+    return np.asarray(frame.zero_rotation_M_B.T @ (contact.tip_M_mm - frame.zero_origin_M_mm))
 
 
 def _values(model: MachineModel, change_mm: FloatArray) -> GaugeValues:

@@ -56,6 +56,14 @@ def figures_of(configuration: Configuration) -> Figures:
                 next_step="`compd check` without --what-cannot-be-seen says how far each gauge may jump unseen",
             )
         )
+    if not configuration.wiring.scale:
+        raise CompdError(
+            Problem(
+                where=configuration.where("wiring"),
+                what="has no `scale`: the commanded pose is corrected, and no fault of a scale costs anything",
+                next_step="`compd check` without --what-cannot-be-seen says what is not measured",
+            )
+        )
     budgets = line_budgets(configuration)
     return Figures(
         configuration,

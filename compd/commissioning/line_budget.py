@@ -116,6 +116,26 @@ def gauges_on(configuration: Configuration, line: str) -> list[str]:
     return [gauge for gauge, options in configuration.gauges.items() if options.line == line]
 
 
+def least_exchanges_s(configuration: Configuration) -> dict[str, dict[str, float]]:
+    """By line and gauge, the shortest time (s) from one reading of the gauge to that of another on the line.
+
+    Without lines of a round trigger, which read all at once, and without gauges whose traffic is not known.
+    """
+    gauges = configuration.gauge_objects()
+    least_s: dict[str, dict[str, float]] = {}
+    for name, line in configuration.lines.items():
+        if not isinstance(line, PolledLineSettings) or line.round_trigger is not None:
+            continue
+        kind = polled_definition(line)
+        traffic = {gauge: gauges[gauge].traffic() for gauge in gauges_on(configuration, name)}
+        least_s[name] = {
+            gauge: sum(kind.pace(line).exchange_s(*kind.bytes_on_wire(*exchange)) for exchange in exchanges)
+            for gauge, exchanges in traffic.items()
+            if exchanges
+        }
+    return least_s
+
+
 def line_budgets(configuration: Configuration) -> list[LineBudget]:
     """The budget of every line that polls a gauge."""
     gauges = configuration.gauge_objects()

@@ -12,7 +12,7 @@ from compd.configuration.sections import Sections
 from compd.documents import Location
 from compd.errors import Problem
 from compd.gauge import Gauge, GaugeOptions
-from compd.operation_settings import FRAME_DISTANCES, measured_distances
+from compd.operation_settings import FRAME_DISTANCES, WIRES, measured_distances
 
 # Packages whose drivers are covered by compd's own tests.
 _OWN_PACKAGES = ("compd", "compd_drivers")
@@ -46,7 +46,7 @@ def warnings(sections: Sections) -> list[Problem]:
         if used_lines and name not in used_lines
     ]
     wired_gauges = {channel.split(".")[0] for _, channel, _ in _wires(sections.wiring)}
-    whole = all(_is_whole(sections.wiring, kind, "gauge") for kind in ("scale", "joint", "frame", "quantities"))
+    whole = all(_is_whole(sections.wiring, kind, "gauge") for kind in WIRES)
     unused += [
         Problem(
             where=sections.document.where(("gauges", name)),
@@ -142,7 +142,7 @@ def _entries(wiring: Any, kind: str) -> list[tuple[int, Any]]:
 
 def _wires(wiring: Any) -> Iterator[tuple[Location, str, str]]:
     """Every wire: its location in the document, the channel that it names, the unit that it must have; "" for any."""
-    for kind in ("scale", "joint", "frame", "quantities"):
+    for kind in WIRES:
         for i, wire in _entries(wiring, kind):
             if wire.gauge is not None:
                 unit = "mm" if kind != "quantities" else (wire.name or "").rpartition("_")[2]

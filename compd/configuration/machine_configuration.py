@@ -14,11 +14,11 @@ from pydantic import Field, ValidationError
 from compd.configuration import crosscheck
 from compd.configuration.effect_files import EffectFile, EffectFiles
 from compd.configuration.external_geometry import EXTERNAL, ExternalGeometry, external_of
-from compd.configuration.geometry import LINKS, Geometry
+from compd.configuration.geometry import Geometry
 from compd.configuration.geometry_checks import contradictions
 from compd.configuration.hashes import NOT_IN_ZERO, hash_of
 from compd.configuration.plausible import implausible
-from compd.configuration.sections import Sections
+from compd.configuration.sections import Sections, count_of, is_framed, is_gauged
 from compd.documents import (
     Document,
     Location,
@@ -76,6 +76,8 @@ SECTIONS: Mapping[str, Any] = {
 EXTERNAL_SECTIONS: Mapping[str, Any] = {"geometry": ExternalGeometry}
 # Defaults of omitted sections.
 OPTIONAL_SECTIONS: Mapping[str, Any] = {"acquisition": AcquisitionSettings(), "votes": VoteSettings(), "effects": ()}
+# Sections that a machine without any gauge leaves out, as `gauges`.
+GAUGE_SECTIONS: Mapping[str, Any] = {"lines": {}, "wiring": Wiring()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -283,15 +285,16 @@ def examine(path: Path) -> Examined:
     problems += [unknown_key(document, (key,), section_names) for key in document.data if key not in section_names]
     sections: dict[str, Any] = {}
     kinds = sections_of(document)
+    defaults = {**OPTIONAL_SECTIONS, **({} if (gauged := is_gauged(document)) else GAUGE_SECTIONS)}
     for name, kind in kinds.items():
         if name in document.data:
             sections[name] = validate(kind, document, (name,), problems)
-        elif name in OPTIONAL_SECTIONS:
-            sections[name] = OPTIONAL_SECTIONS[name]
+        elif name in defaults:
+            sections[name] = defaults[name]
         else:
             sections[name] = None
             problems.append(Problem(where=str(path), what=f"section `{name}` is missing", next_step=f"add `{name}:`"))
-    gauges, drivers = gauges_of(document, problems)
+    gauges, drivers = gauges_of(document, problems) if gauged else ({}, {})
     part = {
         name: sections[name] if sections[name] is not None else readable(kind, document.value((name,)))
         for name, kind in kinds.items()
@@ -302,9 +305,9 @@ def examine(path: Path) -> Examined:
     ]
     checked = Sections(
         document,
-        0 if is_external(document) else _count(part["geometry"], "rods"),
-        getattr(part["geometry"], "links", None) if is_external(document) else _count(part["geometry"], "actuators"),
-        _framed(document, part["geometry"]),
+        0 if is_external(document) else count_of(part["geometry"], "rods"),
+        getattr(part["geometry"], "links", None) if is_external(document) else count_of(part["geometry"], "actuators"),
+        is_framed(document, part["geometry"]),
         part["lines"] or {},
         gauges,
         drivers,
@@ -337,7 +340,7 @@ def gauges_of(
             Problem(
                 where=document.where(("gauges",)),
                 what="section `gauges` is missing or empty",
-                next_step="add `gauges:` with one entry per device",
+                next_step="add `gauges:` with one entry per device; without any, leave all wires out, too",
             )
         )
         return gauges, drivers
@@ -389,17 +392,6 @@ def _why_not_made(driver: type[Gauge[Any]], options: GaugeOptions) -> str | None
     if not names or len(set(names)) < len(names):
         return f"the driver has {'two channels of one name' if names else 'no channels'}"
     return None
-
-
-def _count(geometry: Any, key: str) -> int | None:
-    """Number of rods or actuators of a geometry, or of its readable part; None where it cannot be read."""
-    kinematics, parts = getattr(geometry, "kinematics", None), getattr(geometry, key, None)
-    return LINKS[kinematics] if kinematics is not None else len(parts) if parts else None
-
-
-def _framed(document: Document, geometry: Any) -> bool | None:
-    """Whether the file states the frame's reference points; None where it has no geometry."""
-    return None if geometry is None else document.value(("geometry", "plate_points_M_mm")) is not None
 
 
 def _line_number(where: str) -> int:

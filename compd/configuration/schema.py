@@ -6,7 +6,12 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from compd.configuration.machine_configuration import EXTERNAL_SECTIONS, OPTIONAL_SECTIONS, SECTIONS
+from compd.configuration.machine_configuration import (
+    EXTERNAL_SECTIONS,
+    GAUGE_SECTIONS,
+    OPTIONAL_SECTIONS,
+    SECTIONS,
+)
 from compd.plugins import GAUGES, load, names
 
 
@@ -39,7 +44,8 @@ def json_schema() -> dict[str, Any]:
         "title": "compd machine configuration",
         "type": "object",
         "additionalProperties": False,
-        "required": [*(name for name in SECTIONS if name not in OPTIONAL_SECTIONS), "gauges"],
+        "required": [name for name in SECTIONS if name not in {*OPTIONAL_SECTIONS, *GAUGE_SECTIONS}],
+        "dependentRequired": {"gauges": [*GAUGE_SECTIONS]},
         "properties": properties,
         "$defs": definitions,
     }

@@ -9,8 +9,7 @@ from rich.console import Group, RenderableType
 from rich.progress_bar import ProgressBar
 from rich.table import Table as TerminalTable
 
-from compd.arrays import rms
-from compd.demo.session import KINDS, DemoSession
+from compd.demo.session import ATTEMPTS, KINDS, DemoSession
 from compd.units import UM_PER_MM
 
 LABELS = {"none": "no compensation", "joints": "joints only", "full": "joints and frame"}
@@ -22,7 +21,7 @@ def error_rows(session: DemoSession) -> list[list[str]]:
     for kind in KINDS:
         errors = [visit.error_um[kind] for visit in session.visits]
         p95, largest = (float(np.percentile(errors, 95)), max(errors)) if errors else (float("nan"),) * 2
-        rows.append([LABELS[kind], f"{rms(errors):.2f} um", f"{p95:.2f} um", f"{largest:.2f} um"])
+        rows.append([LABELS[kind], f"{session.rms_um(kind):.2f} um", f"{p95:.2f} um", f"{largest:.2f} um"])
     return rows
 
 
@@ -85,7 +84,9 @@ def summarise(session: DemoSession) -> RenderableType:
 
 def verdict(session: DemoSession) -> str:
     """The result in one sentence."""
-    rms_um = {kind: rms([visit.error_um[kind] for visit in session.visits]) for kind in KINDS}
+    if session.shortcoming:
+        return f"The demo gave no result on this computer in {ATTEMPTS} attempts: {session.shortcoming}."
+    rms_um = {kind: session.rms_um(kind) for kind in KINDS}
     return (
         f"At {len(session.visits)} points the tip missed its target by {rms_um['none']:.1f} um (rms) without "
         f"compensation, by {rms_um['joints']:.1f} um with the joints compensated, and by {rms_um['full']:.2f} um "

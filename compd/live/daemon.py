@@ -35,7 +35,7 @@ from compd.live.loop import (
     TimedKinematics,
     build_pipeline,
 )
-from compd.live.machine import MachineZero, ModelLoader, Models, load_zero, try_model, warn_of_datum
+from compd.live.machine import MachineZero, ModelLoader, Models, try_model, warn_of_datum, zero_at_start
 from compd.live.memory import Control, PollRequests, SharedRing, TrustMemory
 from compd.live.processes import AcquisitionProcess, LoopProcess, ServiceProcess, StateLog
 from compd.live.service import (
@@ -117,7 +117,7 @@ class Daemon:
             raise
         # what follows opens descriptors, and cannot fail
         self.ports = port_names(configuration)
-        self.commands = Commands(self._zero_on_disk())
+        self.commands = Commands(self._first_zero())
         channels = len(self.latest.channels)
         self.setpoints, cycles, self.control = SharedRing(channels), SharedRing(channels), Control()
         adopted = AdoptedModels(models)
@@ -294,7 +294,7 @@ class Daemon:
         }
         groups = {"acquisition": [line for line in lines if line not in own]} | {f"line {line}": [line] for line in own}
         groups = {name: group for name, group in groups.items() if group}
-        first = next(iter(groups))
+        first = next(iter(groups), "")
         return [
             AcquisitionProcess(
                 name,
@@ -356,17 +356,10 @@ class Daemon:
             lines |= process.status()
         return lines
 
-    def _zero_on_disk(self) -> MachineZero | StateError:
-        """The machine zero on disk, or why there is none: the daemon runs without one, so that it can be taken."""
-        configuration = self.configuration
-        directory = Path(configuration.state.directory)
-        try:
-            zero = load_zero(directory, configuration.zero_hash, self._wires.length_channels)
-        except StateError as error:
-            _log.warning("no machine zero", reason=str(error))
-            return error
-        _log.info("machine zero", taken_at=zero.taken_at)
-        return zero
+    def _first_zero(self) -> MachineZero | StateError:
+        configuration, wires = self.configuration, self._wires
+        directory, has_gauges = Path(configuration.state.directory), bool(wires.all_wires)
+        return zero_at_start(directory, configuration.zero_hash, wires.length_channels, has_gauges)
 
 
 def model_columns(model: MachineModel, configuration: Configuration) -> tuple[tuple[str, ...], tuple[float, ...]]:

@@ -22,7 +22,7 @@ Lengths are in mm, angles in radians, times in seconds; a quantity's key ends in
 coordinate frame of a vector: `M` is the surface plate, `B` the base platform, `B0` the base platform at
 {term("machine zero")}, `P` the moving platform. A rotation is a rotation vector: the direction of its axis times the
 angle. Links, joints and {term("comparator", "comparators")} count from 1. A key with the default "-" may be left
-out. A key that is not listed here is an error.
+out. A key that is not listed here is an error. A machine without any gauge leaves `gauges`, `lines` and `wiring` out.
 
 [Describe a machine](../how-to/describe-a-machine.md) goes through the sections in order.
 """

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 from compd.client import connect
 from compd.configuration import load, shipped_configuration
+from compd.demo.machine_zero import wait_for_gauges
 from compd.demo.processes import Command, run_commands
-from compd.demo.session import wait_for_gauges
 from compd.live.service.requests import REQUESTS
 
 ZERO_TRIES = 3

@@ -32,9 +32,9 @@ SENT: dict[type[SentMessage], tuple[str, ...]] = {
     ErrorKeys: (),
 }
 _C_TYPES = {"s": "uint8_t", "x": "uint8_t", "B": "uint8_t", "H": "uint16_t", "I": "uint32_t", "Q": "uint64_t"}
-_C_TYPES |= {"d": "double"}
+_C_TYPES |= {"q": "int64_t", "d": "double"}
 _NAMES_OF_TYPES = {"s": "bytes", "x": "bytes", "B": "uint8", "H": "uint16", "I": "uint32", "Q": "uint64"}
-_NAMES_OF_TYPES |= {"d": "float64"}
+_NAMES_OF_TYPES |= {"q": "int64", "d": "float64"}
 
 INTRODUCTION = f"""\
 The daemon listens on TCP ({TcpSocket().host}:{TcpSocket().port} unless [configured](#configuration-sockets) otherwise)
@@ -90,6 +90,9 @@ is dropped, and counted in [`STATUS`](#protocol-status).
 
 Links that the machine does not have are nan. When the setpoint is invalid, every number of the tip, the frame and the
 links is nan.
+
+A field is never moved. A new field comes with another version and size: refuse a packet whose version or size you do
+not know. Packets of releases up to 0.3.0 have version 1 and 276 bytes, without the target.
 """
 
 

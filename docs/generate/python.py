@@ -134,4 +134,6 @@ def _path(kind: type) -> str:
 
 def _directive(kind: str, name: str) -> str:
     options = f"   :members:\n   :exclude-members: {', '.join(INTERNAL)}\n" if kind == "autoclass" else ""
+    if name == f"{_path(Client)}()":
+        options += "   :inherited-members:\n"
     return f"```{{eval-rst}}\n.. {kind}:: {name}\n{options}```\n"

@@ -15,7 +15,7 @@ import yaml
 
 from compd.demo.linuxcnc.controller import LinuxCnc
 from compd.demo.linuxcnc.motion_log import MotionSample, read_motion_log
-from compd.demo.live import take_zero
+from compd.demo.machine_zero import take_zero
 from compd.demo.processes import Command, run_commands
 from compd.errors import DaemonError
 from tests.injection.injector import Injector

@@ -22,8 +22,9 @@ import yaml
 from numpy.typing import NDArray
 
 from compd.client import connect
+from compd.demo.machine_zero import wait_for_gauges
 from compd.demo.processes import Command, run_commands
-from compd.demo.session import ARRIVED_MM, wait_for_gauges
+from compd.demo.session import ARRIVED_MM
 from compd.documents import read_document
 from compd.simulation import ControlClient
 from tests.support.hidden_visits import Visit

@@ -16,7 +16,7 @@ from typing import Any
 from playwright.sync_api import Error as PlaywrightError
 from playwright.sync_api import sync_playwright
 
-from compd.demo.live import take_zero
+from compd.demo.machine_zero import take_zero
 from compd.demo.processes import Command, run_commands
 from compd.simulation import ControlClient
 from tests.support.paths import CONFIG

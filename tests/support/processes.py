@@ -12,8 +12,8 @@ from typing import Self
 import yaml
 
 from compd.client import Client
+from compd.demo.machine_zero import wait_for_gauges
 from compd.demo.processes import Command, run_commands
-from compd.demo.session import wait_for_gauges
 from compd.errors import DaemonError
 from tests.support.daemon_process import Daemon
 from tests.support.misbehaving import DIAL, Misdeeds

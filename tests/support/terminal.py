@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from compd.client import connect
-from compd.demo.session import wait_for_gauges
+from compd.demo.machine_zero import wait_for_gauges
 from tests.support.paths import CONFIG, ROOT
 from tests.support.simulated import HEXAPOD, TRIPOD, made_patient
 from tests.support.staging import make_stage, staged

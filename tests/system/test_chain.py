@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from compd.client import Client, connect
+from compd.demo.machine_zero import wait_for_gauges
 from compd.demo.processes import Command, run_commands
-from compd.demo.session import wait_for_gauges
 from compd.simulation import ControlClient
 from tests.support.simulated import TRIPOD, made_patient
 

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 import yaml
 
+from compd.demo.machine_zero import wait_for_gauges
 from compd.demo.processes import Command, run_commands
-from compd.demo.session import wait_for_gauges
 from compd.documents import read_document
 from compd.simulation import ControlClient
 from tests.support.daemon_process import Daemon

@@ -56,7 +56,7 @@ def test_the_reference_is_in_it(tmp_path: Path, page: str) -> None:
 
 
 def test_the_demo_runs_and_says_what_the_pictures_need(tmp_path: Path) -> None:
-    shown, said = compd(tmp_path, "demo", "--seconds", "6")
+    shown, said = compd(tmp_path, "demo", "--seconds", "15")
     assert "with joints and frame compensated" in " ".join(shown.split())
     assert install_line("report") in shown
     assert "compiles" not in said

@@ -42,6 +42,7 @@ def check(
     if config is None:
         raise typer.BadParameter("name a configuration file, e.g. config/tripod-cmm.yaml")
     from compd.cli.problems import print_problems
+    from compd.commissioning import certain_refusal
     from compd.errors import ConfigurationError
     from compd.machine_check import examine_whole
     from compd.not_measured import not_measured
@@ -78,6 +79,8 @@ def check(
         f"{len(configuration.gauges)} gauges on {len(configuration.lines)} lines{processes}; "
         f"hash {configuration.config_hash}"
     )
+    if refusal := certain_refusal(configuration):
+        typer.echo(refusal)
 
 
 def print_zero(configuration: Configuration) -> None:
@@ -149,8 +152,10 @@ def print_lines(configuration: Configuration) -> list[Problem]:
 
     budgets = line_budgets(configuration)
     jumps = feigned_jumps(configuration, budgets)
-    _print_budgets(budgets)
-    _print_jumps(jumps)
+    if budgets:
+        _print_budgets(budgets)
+    if jumps:
+        _print_jumps(jumps)
     return [
         *budget_warnings(configuration, budgets),
         *shared_address_warnings(configuration),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def demo(
     config: Annotated[Path | None, typer.Argument(help="The machine; default: the shipped tripod.")] = None,
-    seconds: Annotated[float, typer.Option(min=5, help="Duration, s.")] = 20.0,
+    seconds: Annotated[float, typer.Option(min=10, help="Duration, s.")] = 20.0,
     page: Annotated[Path, typer.Option(help="File of the page with the pictures.")] = Path("out/demo.html"),
     seed: Annotated[int, typer.Option(help="Random seed of weather, joints and targets.")] = 1,
     live: Annotated[
@@ -69,6 +69,11 @@ def demo(
             text.update(progress(session, elapsed_s, seconds, setpoint))
 
         session = run_demo(configuration, seconds, seed, show)
+        if session.shortcoming:
+            text.update("")
+    if session.shortcoming:
+        console.print(verdict(session), markup=False)
+        raise typer.Exit(1)
     console.print(summarise(session))
     console.print(verdict(session))
     if not drawn:

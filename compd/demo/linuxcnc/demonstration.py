@@ -19,7 +19,7 @@ from compd.demo.linuxcnc.artefact import (
 )
 from compd.demo.linuxcnc.controller import LinuxCnc, ProgramStopped
 from compd.demo.linuxcnc.motion_log import MotionSample, TipErrors, read_motion_log, tip_errors
-from compd.demo.live import take_zero
+from compd.demo.machine_zero import take_zero
 from compd.demo.processes import Command, run_commands
 from compd.demo.simulated_daemon import simulated_daemon
 from compd.errors import CompdError, DaemonError, Problem
@@ -170,11 +170,9 @@ class _Session:
     def adopt(self, model: Path) -> None:
         """Give the daemon the model; returns when the correction has slewed to it."""
         with connect(self._directory / "compd.sock", ADOPTED_S) as daemon:
-            daemon.model(str(model.absolute()))
-        with connect(self._directory / "compd.sock", ADOPTED_S) as daemon:
-            for setpoint in daemon.watch(10.0):
-                if setpoint.get("model") and setpoint["state"] == "ok":
-                    return
+            adopted = daemon.model(str(model.absolute()))["applied"]["model"]
+            while (setpoint := daemon.latest(ADOPTED_S)).get("model") != adopted or setpoint["state"] != "ok":
+                pass
 
     def _run(self, program: Path) -> list[MotionSample]:
         """Run a program; repeat it if LinuxCNC stops it, as for a late probe. Raises DaemonError after RUNS."""

@@ -20,4 +20,5 @@ from .setpoint import setpoint_line as setpoint_line
 from .skew import skew_of as skew_of
 from .timing import Histogram as Histogram
 from .timing import LoopTiming as LoopTiming
+from .tip_uncertainty import radius_95 as radius_95
 from .tip_uncertainty import stated_noise as stated_noise

@@ -8,9 +8,10 @@ from typing import NamedTuple
 from compd.setpoint_states import Mode
 
 MAGIC = b"CMPD"
-LAYOUT_VERSION = 1
+LAYOUT_VERSION = 2
 FLAG_VALID = 1
 FLAG_TOOL_ON_PLATE = 2
+NO_TARGET_ID = -1
 # Links that a packet has room for; a machine with fewer leaves the others nan.
 PACKET_LINKS = 6
 
@@ -65,6 +66,8 @@ PACKET_BODY: tuple[PacketField, ...] = (
         "`correction_mm` of each link, mm; with 0 links `tip_correction_mm` and `rotation_correction_rad`",
     ),
     PacketField("config_hash", "8s", "`config_hash`: its 16 hexadecimal digits as 8 bytes"),
+    PacketField("target_time_s", "d", "`target_time_s` of the target that it answers, s; nan in mode cmm"),
+    PacketField("target_id", "q", f"`target_id`; {NO_TARGET_ID} in mode cmm, and of a target without an id"),
 )
 PACKET_CHECKSUM = PacketField("crc32", "I", "CRC-32 of all bytes before it (zlib, IEEE 802.3)")
 PACKET_FIELDS: tuple[PacketField, ...] = (*PACKET_BODY, PACKET_CHECKSUM)

@@ -21,6 +21,7 @@ from compd.live.loop.packet_layout import (
     FLAG_VALID,
     LAYOUT_VERSION,
     MAGIC,
+    NO_TARGET_ID,
     PACKET_LINKS,
     PACKET_SIZE,
 )
@@ -110,6 +111,11 @@ class Setpoint(NamedTuple):
     def valid(self) -> bool:
         return self.state.valid
 
+    @property
+    def _target(self) -> Target | None:
+        """The target that it answers; None in CMM mode."""
+        return None if self.inputs is None else self.inputs.target
+
     def pack(self, config_hash: bytes | None) -> tuple[bytes, bytes]:
         """Its line, and what clients are sent of it as the content of a ring's entry: the line among it.
 
@@ -127,8 +133,7 @@ class Setpoint(NamedTuple):
         return cls(*head, None, line=line, packet=packet)
 
     def to_json(self) -> bytes:
-        """One line of JSON, with its newline. Keys without a value are absent; of a valid setpoint `u_tip_um` is null
-        where it is not known, and nothing else ever is.
+        """One line of JSON, with its newline. Keys without a value are absent.
 
         Raises ValueError where a value is not finite.
         """
@@ -150,8 +155,8 @@ class Setpoint(NamedTuple):
             "valid_until": round(self.valid_until_s, _DECIMALS_S),
             "mode": self.mode,
         }
-        if self.inputs is not None and self.inputs.target is not None:
-            message |= _target_named(self.inputs.target)
+        if self._target is not None:
+            message |= _target_named(self._target)
         if self.model:
             message["model"] = self.model
         if math.isfinite(self.age_s):
@@ -202,8 +207,8 @@ class Setpoint(NamedTuple):
             message |= _json_pose(values, moved_mm)
         u_tip_um = self.u_tip_um
         if isinstance(u_tip_um, float):
-            moved_um = u_tip_um + moved_mm * UM_PER_MM
-            message["u_tip_um"] = round(moved_um, _DECIMALS_UM) if math.isfinite(moved_um) else None
+            if math.isfinite(u_tip_um):
+                message["u_tip_um"] = round(u_tip_um + moved_mm * UM_PER_MM, _DECIMALS_UM)
         elif u_tip_um is not None and math.isfinite(u_tip_um.sum()):
             message["u_tip_um"] = _rounded(u_tip_um, _DECIMALS_UM, moved_mm)
         if self.shadow is not None:
@@ -219,7 +224,7 @@ class Setpoint(NamedTuple):
 
         config_hash : the first 8 bytes of the configuration's hash.
         """
-        values = self.values
+        values, target = self.values, self._target
         vectors = _NO_VECTORS
         links = flags = 0
         if values is not None:
@@ -256,6 +261,8 @@ class Setpoint(NamedTuple):
             links,
             *vectors,
             config_hash,
+            math.nan if target is None else target.time_s,
+            NO_TARGET_ID if target is None or target.id is None else target.id,
         )
         return body + zlib.crc32(body).to_bytes(4, "little")
 

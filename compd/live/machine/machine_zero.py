@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -117,6 +119,28 @@ def _old_file(directory: Path) -> dict[Path, bytes]:
         return {directory / OLD_FILE_NAME: read_small_file(directory / FILE_NAME, _MAX_FILE_BYTES)}
     except FileNotFoundError:
         return {}
+
+
+def zero_at_start(
+    directory: Path, zero_hash: str, channels: tuple[str, ...], has_gauges: bool
+) -> MachineZero | StateError:
+    """The machine zero on disk, or why there is none: the daemon runs without one, so that it can be taken.
+
+    Without any gauge nothing is read at machine zero, and nobody has to take it: it is made, and kept as any other.
+
+    zero_hash, channels : as of `load_zero`.
+    """
+    try:
+        zero = load_zero(directory, zero_hash, channels)
+    except StateError as error:
+        if has_gauges:
+            log.warning("no machine zero", reason=str(error))
+            return error
+        zero = MachineZero(zero_hash, datetime.now(UTC).isoformat(timespec="seconds"), {})
+        with suppress(StateError):  # without a disk it is another one after the next start
+            zero.save(directory)
+    log.info("machine zero", taken_at=zero.taken_at)
+    return zero
 
 
 def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> MachineZero:

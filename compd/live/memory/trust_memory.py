@@ -182,7 +182,7 @@ class TrustMemory:
         name : a gauge, a "gauge.channel", or "all". Raises ValueError where no such gauge is wired.
         """
         channels = [c for c in self.channels if name in ("all", c, c.partition(".")[0])]
-        if not channels:
+        if not channels and name != "all":
             gauges = dict.fromkeys(self._gauges)
             raise ValueError(f"no wired gauge is called {name[:40]!r}, allowed: all, {', '.join(gauges)}")
         doubted = [c for c in channels if Doubt(int(self.doubt[self.index[c]])).until_accepted]

@@ -50,8 +50,8 @@ class BudgetMessage:
         message = {"class": "BUDGET", **{key: setpoint[key] for key in ("seq", "time_s", "valid", "state", "reason")}}
         return message | self._values(setpoint) if setpoint["valid"] else message
 
-    def _external_values(self, setpoint: Mapping[str, Any]) -> dict[str, Any]:
-        """Of a machine whose pose own kinematics or a client gives: its sources are those of the tip."""
+    def _pose_values(self, setpoint: Mapping[str, Any]) -> dict[str, Any]:
+        """Where the pose is corrected: the sources are those of the tip."""
         values = {"tip_um": {cause: _um(-np.array(mm)) for cause, mm in setpoint["sources_mm"].items()}}
         shadow_M_mm = setpoint.get("shadow", {}).get("tip_M_mm")
         if shadow_M_mm is not None and setpoint["mode"] == Mode.CMM:
@@ -60,8 +60,8 @@ class BudgetMessage:
         return values
 
     def _values(self, setpoint: Mapping[str, Any]) -> dict[str, Any]:
-        if isinstance(self._machine, ExternalModel):
-            return self._external_values(setpoint)
+        if "tip_correction_mm" in setpoint:
+            return self._pose_values(setpoint)
         scale_mm = _scale_mm(setpoint)
         supports, mechanism, pose = self._pose(setpoint, scale_mm)
         if pose.reason[0] != Reason.OK:

@@ -7,11 +7,12 @@ from typing import Any
 
 from compd.configuration import Configuration
 from compd.live.machine import MachineWires, Wire
+from compd.text import omit_unknown
 
 
 def machine_message(configuration: Configuration, wires: MachineWires) -> dict[str, Any]:
     """The message as plain data: the sections of the configuration as a person wrote them, and the wiring resolved."""
-    return {
+    message = {
         "class": "MACHINE",
         "machine": configuration.machine,
         "config_hash": configuration.config_hash,
@@ -21,11 +22,13 @@ def machine_message(configuration: Configuration, wires: MachineWires) -> dict[s
         "loop": configuration.loop.model_dump(mode="json", include={"rate_hz", "stale_after_s", "on_stale", "hold_s"}),
         "wiring": _wiring(configuration, wires),
     }
+    known: dict[str, Any] = omit_unknown(message)
+    return known
 
 
 def _geometry(configuration: Configuration) -> dict[str, Any]:
     """The section; of own kinematics its class, without the path, which no remote client needs."""
-    geometry: dict[str, Any] = configuration.geometry.model_dump(mode="json", exclude_none=True, exclude={"sha256"})
+    geometry: dict[str, Any] = configuration.geometry.model_dump(mode="json", exclude={"sha256"})
     if (external := configuration.external) is not None and external.own_class is not None:
         geometry["kinematics"] = external.own_class[1]
     return geometry
@@ -37,7 +40,7 @@ def _mechanism(configuration: Configuration) -> dict[str, Any]:
         return {}
     described = configuration.geometry.mechanism
     parts = {
-        name: [part.model_dump(mode="json", exclude_none=True) for part in getattr(described, name)]
+        name: [part.model_dump(mode="json") for part in getattr(described, name)]
         for name in ("actuators", "rods", "hinges")
     }
     return {"mechanism": {**parts, "target_fixes": list(described.target_fixes)}}

@@ -123,7 +123,9 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
         None if target is None else _parsed_target(target),
         ending=message.get("ending", ""),
     )
-    return RecordedCycle(with_zero_of(from_plain(message["carried"]), zero), inputs, setpoint_line(message["setpoint"]))
+    # up to 0.3.0 a bound of the tip's error that was not known was null
+    sent = setpoint_line(omit_unknown(message["setpoint"]))
+    return RecordedCycle(with_zero_of(from_plain(message["carried"]), zero), inputs, sent)
 
 
 def _reading(reading: Reading) -> dict[str, Any]:

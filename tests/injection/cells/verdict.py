@@ -22,8 +22,7 @@ TARGET_LATE_S = 0.5
 
 def tip_bound_um(setpoint: Message) -> float:
     """The 95 % bound of the tip's error that a setpoint states; nan where it states none."""
-    stated = setpoint.get("u_tip_um")
-    return math.nan if stated is None else float(stated)
+    return float(setpoint.get("u_tip_um", math.nan))
 
 
 @dataclass

@@ -16,7 +16,7 @@ from compd.demo import SHIPPED_PROGRAM, run_linuxcnc_demo
 from compd.demo.linuxcnc.controller import LinuxCnc, obstacle
 from compd.demo.linuxcnc.demonstration import ADOPTED, OFF, ON
 from compd.demo.linuxcnc.motion_log import TipErrors, read_motion_log, tip_errors
-from compd.demo.live import take_zero
+from compd.demo.machine_zero import take_zero
 from compd.demo.simulated_daemon import simulated_daemon
 from compd.simulation import Mechanism
 from tests.support.simulated import HEXAPOD

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+from compd.cli.start.check import print_lines
 from compd.errors import CompdError, ConfigurationError
 from compd.machine_builder import build_model
 from compd.machine_check import load_whole
@@ -88,3 +89,14 @@ def test_impossible_dimensions_are_all_told() -> None:
         machine_text("mine", "rotary-delta", wrong)
     told = str(caught.value)
     assert all(option in told for option in ("--base-radius", "--crank", "--height"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_new_machine_polls_no_faster_than_its_loop_needs_and_is_checked_without_a_warning(
+    tmp_path: Path, kind: str
+) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(machine_text("mine", kind, KINDS[kind].usual))
+    configuration = load_whole(path)
+    assert [line.poll_every_s for line in configuration.lines.values()] == [0.5 / configuration.loop.rate_hz]
+    assert (*configuration.warnings, *print_lines(configuration)) == ()

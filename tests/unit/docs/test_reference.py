@@ -153,7 +153,7 @@ def test_every_code_is_on_its_page_with_its_meaning(kind: Any) -> None:
 
 def test_the_packet_of_a_setpoint_by_the_offsets_of_the_page() -> None:
     packet = Setpoint(7, 2.5, 3.5, 0.25, State.OK, "", Mode.MACHINE_TOOL, None).to_packet(b"12345678")
-    types = {"bytes": "s", "uint8": "B", "uint16": "H", "uint32": "I", "uint64": "Q", "float64": "d"}
+    types = {"bytes": "s", "uint8": "B", "uint16": "H", "uint32": "I", "uint64": "Q", "int64": "q", "float64": "d"}
     read = {}
     for offset, kind, name, _ in packet_rows():
         count, _, letter = kind.rpartition(" ")
@@ -162,6 +162,7 @@ def test_the_packet_of_a_setpoint_by_the_offsets_of_the_page() -> None:
     assert (read["time_s"], read["valid_until_s"], read["age_s"]) == ((2.5,), (3.5,), (0.25,))
     assert (read["state"], read["mode"], read["flags"]) == ((State.OK.code,), (Mode.MACHINE_TOOL.code,), (0,))
     assert read["config_hash"] == (b"12345678",)
+    assert read["target_id"] == (-1,)
     assert len(packet) == PACKET_SIZE == sum(field.size for field in PACKET_FIELDS)
 
 

@@ -97,7 +97,6 @@ def test_what_nothing_shows_is_a_blind_spot() -> None:
 
 def test_a_bound_is_a_number_or_the_norm_of_standard_uncertainties() -> None:
     assert tip_bound_um({"u_tip_um": 0.6}) == 0.6
-    assert math.isnan(tip_bound_um({"u_tip_um": None}))
     assert math.isnan(tip_bound_um({}))
 
 

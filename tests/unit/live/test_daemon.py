@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 import socket
 import struct
@@ -24,6 +25,7 @@ from compd.live import daemon as daemon_module
 from compd.live.daemon import Daemon
 from compd.live.system.systemd import Notifier
 from compd.operation_settings import SocketSettings, StateSettings
+from tests.support.built_machines import drawing
 from tests.support.paths import CONFIG
 from tests.support.running_daemon import supervised
 
@@ -189,6 +191,26 @@ def test_udp_carries_one_packet_per_cycle_and_the_same_numbers(tmp_path):
         if valid:
             assert struct.unpack_from("<3d", packets[seq], 48) == pytest.approx(lines[seq]["tip_M_mm"], abs=1e-7)
         assert packets[seq][264:272].hex() == configured.config_hash[:16]
+        assert struct.unpack_from("<q", packets[seq], 280) == (-1,)
+
+
+@pytest.mark.usefixtures("still")
+@pytest.mark.parametrize(("name", "tip_B0_mm"), [("tripod-cmm.yaml", [10, 0, -500]), ("3-prs", [0, 0, 500])])
+def test_udp_names_the_target_that_a_setpoint_answers(tmp_path, name, tip_B0_mm):
+    machine = name if name.endswith(".yaml") else drawing(name, tmp_path)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(TIMEOUT_S)
+        with running(configuration(tmp_path, machine, receiver.getsockname()[1])) as (_, client):
+            client.zero()
+            made_s = MonotonicClock().monotonic()
+            client.target(tip_B0_mm=tip_B0_mm, time_s=made_s, id=7)
+            named = (math.nan, -1)
+            for _ in range(2000):
+                named = struct.unpack_from("<dq", receiver.recv(2048), 272)
+                if named[1] == 7:
+                    break
+    assert named == (made_s, 7)
 
 
 @pytest.mark.usefixtures("still")

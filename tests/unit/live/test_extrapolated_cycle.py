@@ -123,7 +123,7 @@ def test_the_age_of_the_scales_does_not_count_where_they_are_not_used():
 def test_a_motion_that_is_not_known_yet_leaves_the_bound_unknown_and_is_named_with_a_limit():
     setpoint = moving(with_noise(unlimited(), 0.1), u=float("nan"))
     assert setpoint.valid
-    assert json.loads(setpoint.to_json())["u_tip_um"] is None
+    assert "u_tip_um" not in json.loads(setpoint.to_json())
     refused = moving(with_noise(unlimited(), 0.1, tip_error_um=100.0), u=float("nan"))
     assert refused.state is State.REFUSED
     assert "scale 1 (scale_1.position), scale 2 (scale_2.position)" in refused.reason
@@ -189,7 +189,7 @@ def test_what_joints_and_frame_may_do_counts_while_a_set_is_held_and_the_machine
 def test_a_set_held_before_its_motion_is_known_leaves_the_bound_unknown():
     live = with_noise(unlimited(on_stale="hold"), 0.1)
     moving(live, u=float("nan"))
-    assert json.loads(held(live).to_json())["u_tip_um"] is None
+    assert "u_tip_um" not in json.loads(held(live).to_json())
 
 
 def test_a_held_set_replays_bit_for_bit(tmp_path):

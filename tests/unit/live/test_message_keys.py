@@ -3,28 +3,42 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 
 import pytest
 from pydantic import ValidationError
 
+from compd.configuration import load
 from compd.live.machine.model_loader import ModelLoader, Models
 from compd.live.service.message_keys.message import Keys
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import SENT_MESSAGES
-from tests.support.live_machine import machine
+from compd.setpoint_states import State
+from tests.support.built_machines import drawing
+from tests.support.live_machine import Machine, machine
 from tests.support.live_models import file_with
 from tests.support.recorded_run import Run
-from tests.unit.live.test_daemon import configuration, running, still
+from tests.unit.live.test_daemon import configuration, first, running, still
 
 __all__ = ["still"]
 
 
 def checked(line: bytes) -> dict:
-    """The message in a line, held to its model."""
+    """The message in a line, held to its model; null is nowhere in it."""
     message = json.loads(line)
+    assert list(nulls(message)) == []
     name = message.pop("class")
     SENT_MESSAGES[name].model_validate_json(json.dumps(message))
     return message
+
+
+def nulls(value: object, where: str = "") -> Iterator[str]:
+    """Where null is in a message."""
+    if value is None:
+        yield where
+    parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, part in parts:
+        yield from nulls(part, f"{where}.{key}")
 
 
 def sent(message: dict) -> dict:
@@ -73,6 +87,34 @@ def test_answers_of_a_running_daemon(tmp_path):
         assert status["model"]["shadow"]["effects"] == ["link_zero"]
         status["lines"] = {}  # no real ones here: test_acquisition holds those to their model
         sent(status)
+
+
+@pytest.mark.usefixtures("still")
+@pytest.mark.parametrize("kind", ["3-prs", "linear-delta", "6-ups"])
+def test_a_client_of_a_machine_without_frame_gauges_reads_no_null(kind, tmp_path):
+    """The bound of the tip's error is unknown there."""
+    with running(configuration(tmp_path, drawing(kind, tmp_path))) as (_, client):
+        for message in (client.version, client.zero(), client.machine(), client.budget(), client.model()):
+            sent(message)
+        setpoint = sent(first(client.watch(), "ok"))
+        assert "u_tip_um" not in setpoint
+        assert "correction_mm" in setpoint
+        sent(client.status() | {"lines": {}})
+    with running(configuration(tmp_path, drawing(kind, tmp_path))) as (_, client):
+        readings = client.readings(rate_hz=100)
+        sent(next(readings)[1])
+        assert "u_tip_um" not in checked(next(readings)[0])["setpoint"]
+
+
+@pytest.mark.parametrize("kind", ["3-rps", "rotary-delta"])
+def test_setpoints_and_readings_of_a_machine_without_frame_gauges(kind, tmp_path):
+    run = Run(Machine(load(drawing(kind, tmp_path))))
+    states = set()
+    for line, _, setpoint in run.eventful(200):
+        checked(setpoint.to_json())
+        checked(line)
+        states.add(setpoint.state)
+    assert {State.OK} < states, "the run is eventful"
 
 
 @pytest.mark.parametrize("code", list(ErrorCode))

@@ -13,6 +13,7 @@ import pytest
 import typer
 
 from compd.cli.live.replay import replay as replay_command
+from compd.configuration import load
 from compd.errors import Problem, RecordingError, StateError
 from compd.kernel_versions import versions_text_here
 from compd.live.loop.cycle import step
@@ -25,7 +26,8 @@ from compd.live.service.state_json import from_plain, to_plain
 from compd.model import EffectMemory
 from compd.model.kinematics import Motion
 from compd.setpoint_states import State
-from tests.support.live_machine import CONFIG, machine
+from tests.support.built_machines import drawing
+from tests.support.live_machine import CONFIG, Machine, machine
 from tests.support.live_models import file_with
 from tests.support.recorded_run import ROOMY, Run
 from tests.support.sampled import sampled
@@ -96,6 +98,22 @@ def test_replay_says_which_cell_of_the_csv_was_changed(tmp_path, capsys):
     said = capsys.readouterr().err
     assert f"{table}:4, scale_1_mm was changed: 0.5, by the cycle {float(recorded)!r}" in said
     assert "the CSV is not what was recorded" in said
+
+
+def test_a_recording_of_0_3_0_whose_setpoints_have_null_replays_bit_for_bit(tmp_path):
+    run = Run(Machine(load(drawing("linear-delta", tmp_path))), seed=11)
+    sent = record(run, tmp_path / "run", 60)
+    path = tmp_path / "run-0001.cycles.jsonl"
+    first, watch, *cycles = map(json.loads, path.read_text().splitlines())
+    for message in cycles:
+        if message["setpoint"]["valid"]:
+            message["setpoint"] = {**message["setpoint"], "u_tip_um": None}
+    lines = [json.dumps(message, separators=(",", ":")) for message in (first, watch, *cycles)]
+    path.write_text("\n".join(lines) + "\n")
+    replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))
+    assert [cycle.replayed for cycle in replayed] == [setpoint.to_json() for setpoint in sent]
+    assert [cycle.where for cycle in replayed if cycle.differs] == []
+    assert any(setpoint.valid for setpoint in sent)
 
 
 def test_a_thinned_recording_replays_bit_for_bit_too(tmp_path):

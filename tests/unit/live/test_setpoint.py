@@ -12,8 +12,12 @@ import pytest
 
 from compd.compensation import Compensation
 from compd.compensation.values import Contributions
+from compd.errors import Problem, StateError
+from compd.live.loop.commands import Target
+from compd.live.loop.cycle_state import CycleInputs
 from compd.live.loop.packet_layout import PACKET_SIZE
 from compd.live.loop.setpoint import Setpoint
+from compd.live.memory import Snapshot
 from compd.model.kinematics import Frame
 from compd.setpoint_states import Mode, State
 
@@ -77,7 +81,6 @@ def test_json_is_one_line_with_every_documented_key():
         },
         "link_length_mm": [401, 402, 403],
         "scale_setpoint_mm": [11, 12, 13],
-        "u_tip_um": None,
         "correction_mm": [0.01, 0.02, 0.03],
         "sources_mm": {"joints": [0.0033333, 0.0066667, 0.01], "frame": [0.0066667, 0.0133333, 0.02]},
     }
@@ -107,14 +110,14 @@ def test_packet_by_the_offsets_of_its_documentation(links, mode, mode_code):
     """Every field read at its documented offset, one at a time: no shared format string."""
     sent = setpoint(numbers(links), State.CLAMPED, mode)
     packet = sent.to_packet(HASH)
-    assert len(packet) == PACKET_SIZE == 276
+    assert len(packet) == PACKET_SIZE == 292
 
     def at(offset, kind):
         return struct.unpack_from("<" + kind, packet, offset)
 
     assert packet[0:4] == b"CMPD"
-    assert at(4, "H") == (1,)
-    assert at(6, "H") == (276,)
+    assert at(4, "H") == (2,)
+    assert at(6, "H") == (292,)
     assert at(8, "Q") == (42,)
     assert at(16, "d") == (1234.5678901,)
     assert at(24, "d") == (1234.6678901,)
@@ -136,7 +139,9 @@ def test_packet_by_the_offsets_of_its_documentation(links, mode, mode_code):
         assert vector[:links] == tuple(wanted)
         assert all(map(math.isnan, vector[links:]))
     assert packet[264:272] == HASH
-    assert at(272, "I") == (zlib.crc32(packet[:272]),)
+    assert math.isnan(*at(272, "d"))
+    assert at(280, "q") == (-1,)
+    assert at(288, "I") == (zlib.crc32(packet[:288]),)
 
 
 def test_packet_of_an_invalid_setpoint_is_all_nan():
@@ -145,7 +150,18 @@ def test_packet_of_an_invalid_setpoint_is_all_nan():
     assert packet[42] == 1
     assert packet[44] == 0
     assert all(map(math.isnan, struct.unpack_from("<27d", packet, 48)))
-    assert struct.unpack_from("<I", packet, 272) == (zlib.crc32(packet[:272]),)
+    assert struct.unpack_from("<I", packet, 288) == (zlib.crc32(packet[:288]),)
+
+
+@pytest.mark.parametrize("state", [State.OK, State.STOP])
+@pytest.mark.parametrize(("id_", "packed"), [(0, 0), (2**53, 2**53), (None, -1)])
+def test_packet_names_the_target_as_the_json_does(state, id_, packed):
+    target = Target((0.0, 0.0, -500.0), time_s=1234.5, id=id_)
+    inputs = CycleInputs(42, Snapshot(1234.5678901, ()), StateError(Problem(where="zero", what="is not there")), target)
+    answer = setpoint(numbers() if state.valid else None, state, Mode.MACHINE_TOOL)._replace(inputs=inputs)
+    message = json.loads(answer.to_json())
+    assert (message["target_time_s"], message.get("target_id")) == (1234.5, id_)
+    assert struct.unpack_from("<dq", answer.to_packet(HASH), 272) == (1234.5, packed)
 
 
 def test_packet_with_the_tool_on_the_plate_carries_the_touched_place_and_says_so():

@@ -112,7 +112,7 @@ class SetpointKeys(SentMessage):
     u_tip_um: float | None = Field(
         default=None,
         description="how far the tip may be from `tip_M_mm`, with the tool on the plate `tip_P_mm`, um: 95 % bound "
-        "of the distance, in every valid setpoint; null where it is not known. It has the gauges' noise and the errors "
+        "of the distance, in every valid setpoint for which it is known. It has the gauges' noise and the errors "
         "of the fitted parameters, how far each length may have gone since it was read, and what is not corrected. "
         "`limits.tip_error_um` limits it",
     )

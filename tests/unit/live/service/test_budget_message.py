@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
+from compd.configuration import load
+from compd.live.loop import Target
 from compd.live.machine.model_loader import Models
 from compd.live.service.budget_message import BudgetMessage
 from compd.rotation import rotation_matrix
-from tests.support.live_machine import machine
+from tests.support.bare_machines import bare_machine
+from tests.support.live_machine import Machine, machine
 from tests.support.live_models import file_with, thermal
 
 LINKS = {"tripod-cmm.yaml": 3, "hexapod.yaml": 6}
@@ -88,3 +91,15 @@ def test_without_a_valid_setpoint_there_is_no_number():
     assert not {"tip_um", "platform"} & set(budget)
     before_the_first = BudgetMessage(live.model, lambda: None).message()
     assert (before_the_first["valid"], bool(before_the_first["reason"])) == (False, True)
+
+
+@pytest.mark.parametrize("kind", ["6-ups", "rotary-delta"])
+def test_where_the_pose_is_corrected_the_causes_are_those_of_the_tip(kind, tmp_path):
+    live = Machine(load(bare_machine(kind, tmp_path)))
+    live.commands.models = Models(live.loader.read(file_with(tmp_path / "a.yaml", "link_zero", name=kind, links=6)))
+    live.commands.target = Target(tuple(live.model.zero.contact.tip_M_mm.tolist()))
+    setpoint = live.settle()
+    budget = budget_of(live, setpoint)
+    assert list(budget["tip_um"]) == ["joints", "frame", "link_zero"]
+    assert np.linalg.norm(budget["tip_um"]["link_zero"]) > 0.5
+    assert budget["tip_um"]["link_zero"] == pytest.approx(-1e3 * setpoint.values.pose_correction[:3], abs=0.01)
