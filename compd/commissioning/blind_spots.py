@@ -197,10 +197,12 @@ BLIND_SPOTS: tuple[BlindSpot, ...] = (
     BlindSpot(
         "count_lost_in_a_gap",
         "a gauge loses its count while its replies are lost, or it is not read",
-        "at rest: it shows another value, and no other gauge has moved. On the move: its limits of motion; after more "
-        "than its `restart_s` without an answer a person is asked for",
+        "at rest: it shows another value, and no other scale has moved. On the move: its limits of motion, and the "
+        "ways of the other links where they say how far it went; after more than its `restart_s` without an answer a "
+        "person is asked for",
         "",
-        "on the move, what its limits of motion allow in a shorter gap",
+        "on the move, what its limits of motion allow in a gap of the daemon itself, or where the other links say "
+        "nothing",
         gap,
     ),
     BlindSpot(

@@ -96,6 +96,11 @@ PLAUSIBLE: tuple[PlausibleRange, ...] = (
         "a reading that old still counts as good; even a temperature changes in ten minutes",
     ),
     PlausibleRange(
+        "gauges.*.restart_s", 0.05, 60, "s",
+        "one lost reply would need a person: no display restarts in 50 ms",
+        "a display that restarts in this time would be believed with any count that its limits of motion allow",
+    ),
+    PlausibleRange(
         "gauges.*.noise_um", 0.0005, 50, "um",
         "no length gauge of a workshop repeats to half a nanometre",
         "a comparator this noisy corrects nothing",

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tests.worlds.wires import Fault, lost, whole
-from tests.worlds.world import World
+from tests.worlds.hub import usually_late
+from tests.worlds.wires import lost, whole
+from tests.worlds.world import ACQUISITION, World
+
+# Of a busy computer: how long it stalls, s, and share of the replies that are lost.
+STALL_S = (0.02, 0.3)
+LOST_SHARE = 1e-4
 
 
 def scales(world: World) -> list[str]:
@@ -49,12 +55,6 @@ def unplug(world: World, line: str, duration_s: float) -> None:
     world.hub.at(world.hub.now_s + duration_s, wire.replug)
 
 
-def late(share: float, by_s: float, world: World) -> Fault:
-    """A `share` of the replies is late by `by_s` (s)."""
-    rng = world.hub.rng
-    return lambda reply: [(by_s if rng.random() < share else 0.0, reply)]
-
-
 def shift(world: World, gauge: str, by: float | Callable[[str], float]) -> None:
     """The gauge shows as much more from now on, in its unit."""
     add = by if callable(by) else lambda _: by
@@ -67,3 +67,20 @@ def lose_counts(world: World, was_mm: np.ndarray) -> None:
     for link, (gauge, mm) in enumerate(zip(scales(world), (was_mm - world.scale_mm()).tolist(), strict=True)):
         sign = world.configuration.wiring.scale[link].sign
         shift(world, gauge, sign * mm)
+
+
+def keep_busy(world: World, stalls_every_s: float, late_share: float = 0.03, late_s: float = 8e-3) -> None:
+    """Other programs compute: some polls are late, replies are lost now and then, and all lines stall for a moment."""
+    hub = world.hub
+
+    def lateness(rng: random.Random) -> float:
+        return usually_late(rng) + (rng.uniform(0.0, late_s) if rng.random() < late_share else 0.0)
+
+    def stall() -> None:
+        hub.pause(ACQUISITION, hub.now_s + hub.rng.uniform(*STALL_S))
+        hub.at(hub.now_s + hub.rng.expovariate(1.0 / stalls_every_s), stall)
+
+    hub.lateness[ACQUISITION] = lateness
+    for line in world.configuration.lines:
+        world.wires[line].fault = lambda reply: [] if hub.rng.random() < LOST_SHARE else whole(reply)
+    hub.at(hub.now_s + hub.rng.expovariate(1.0 / stalls_every_s), stall)

@@ -169,6 +169,7 @@ class World:
             self._timing,
             sleep_until=self.hub.sleep_until,
         )
+        loop.collector.collect_if_due = lambda _: None  # type: ignore[method-assign]  the collector of this process rests
         self._looping = [self.hub.spawn(lambda: loop.run(lambda: True), LOOP)]
 
     def kill_acquisition(self) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from itertools import pairwise
 
-from compd.live.acquisition.possible_motion import ANY_SPEED, BASE_S, GaugeSample, Interval, mean_speed
+from compd.live.acquisition.possible_motion import ANY_SPEED, BASE_S, GaugeSample, Interval, MotionLimits, mean_speed
 
 # Samples of motion that are kept.
 KEPT = 32
@@ -24,10 +25,11 @@ class MotionBefore:
     history : in the order of time; empty before the first.
     """
 
-    def __init__(self, tolerance_mm: float) -> None:
-        """`tolerance_mm`: by which two readings of the same value may differ."""
+    def __init__(self, tolerance_mm: float, limits: MotionLimits) -> None:
+        """`tolerance_mm`: by which two readings of the same value may differ. `limits`: of the part's motion."""
         self.history: deque[GaugeSample] = deque(maxlen=KEPT)
         self._tolerance_mm = tolerance_mm
+        self._limits = limits
 
     @property
     def last(self) -> GaugeSample:
@@ -41,31 +43,32 @@ class MotionBefore:
         return math.isfinite(before.low) and before.low <= 0.0 <= before.high
 
     @property
-    def certain_mm_per_s(self) -> float:
-        """Speed of a part that certainly moves, mm/s; 0 of one that may stand."""
-        before, _ = self.speed()
-        moves = math.isfinite(before.low) and math.isfinite(before.high) and (before.low > 0 or before.high < 0)
-        return (before.low + before.high) / 2 if moves else 0.0
-
-    @property
     def lasting_mm_per_s(self) -> float:
-        """The same of a part that has gone one way for a while; 0 of one that hums."""
+        """Speed of a part that has gone one way for a while, mm/s; 0 of one that stands or hums."""
         values = [sample.value for sample in self.history][-_MOVES_FOR:]
         ways = {later > earlier for earlier, later in pairwise(values)}
-        return self.certain_mm_per_s if len(ways) == 1 else 0.0
+        return _certain(self.speed()[0]) if len(ways) == 1 else 0.0
 
-    def expects(self, sample: GaugeSample) -> bool:
-        """Whether a sample is within its predicted range, given the noise and the present acceleration."""
+    def expects(self, sample: GaugeSample, others: Iterable[GaugeSample] = ()) -> bool:
+        """Whether a sample is within its predicted range, given the noise and the present acceleration.
+
+        others : answers out of that range. A sample that is as far from the prediction as they are confirms them.
+        """
         last = self.last
         before, base_s = self.speed()
         passed_s = sample.time_s - last.time_s
-        acceleration, tolerance_mm = 0.0, self._tolerance_mm
-        if speed := self.certain_mm_per_s:
+        speed, acceleration, tolerance_mm = 0.0, 0.0, self._tolerance_mm
+        if speed := _certain(before):
             tolerance_mm += (before.high - before.low) / 2 * passed_s
-            acceleration = self._acceleration(speed, base_s)
+            acceleration = min(_ACCELERATION_MARGIN * self._acceleration(speed, base_s), self._limits.acceleration)
         slack_mm = tolerance_mm + abs(speed) * (sample.window_s + last.window_s)
-        slack_mm += _ACCELERATION_MARGIN * acceleration * passed_s * (passed_s + base_s) / 2
-        return abs(sample.value - last.value - speed * passed_s) <= slack_mm
+        slack_mm += acceleration * passed_s * (passed_s + base_s) / 2
+        off = self.off_mm(sample, speed)
+        return abs(off) <= slack_mm and all(abs(off) <= abs(off - self.off_mm(other, speed)) for other in others)
+
+    def off_mm(self, sample: GaugeSample, mm_per_s: float) -> float:
+        """Distance (mm) of a sample from where the last one leads with this speed."""
+        return sample.value - self.last.value - mm_per_s * (sample.time_s - self.last.time_s)
 
     def _base(self) -> int | None:
         """Index of the sample from which the speed until the last one is measured."""
@@ -97,3 +100,9 @@ class MotionBefore:
                 earlier = (middle.value - start.value) / (middle.time_s - start.time_s)
                 return abs(speed - earlier) / ((middle.time_s - start.time_s + base_s) / 2)
         return 0.0
+
+
+def _certain(speed: Interval) -> float:
+    """The middle of a speed (mm/s) that is certainly not 0; else 0."""
+    moves = math.isfinite(speed.low) and math.isfinite(speed.high) and (speed.low > 0 or speed.high < 0)
+    return (speed.low + speed.high) / 2 if moves else 0.0

@@ -77,7 +77,7 @@ class ReadingTrust:
         self._i = memory.index[channel]
         self._tolerance_mm = float(memory.tolerance_mm[self._i])
         self._settings = settings
-        self._before = MotionBefore(self._tolerance_mm)
+        self._before = MotionBefore(self._tolerance_mm, settings.limits)
         self._candidate: GaugeSample | None = None  # the last answer before any reading is believed
         self._back_s = math.nan  # time at which an absent gauge answered again
         self._missed = False  # whether a poll has failed since its last reading
@@ -103,6 +103,7 @@ class ReadingTrust:
             or not self._recall()
             or not self._before.expects(sample)
             or self._needs_evidence(sample)
+            or bool(self._unexplained)
         )
 
     def fail(self, quality: Quality, now_s: float) -> None:
@@ -262,22 +263,24 @@ class ReadingTrust:
         damaged, and nothing of motion.
         """
         earlier = None if first is None else GaugeSample(first.value, first.time_s, sample.window_s)
+        latched = earlier is not None and earlier.time_s == sample.time_s
         needs_evidence = self._needs_evidence(sample)
-        if self._before.expects(sample) and not needs_evidence:
-            return self._accept(reading, sample)
+        before = [*self._unexplained]
+        self._unexplained += [sample] if earlier is None or latched else [earlier, sample]
+        jumped = self._is_a_motion_from_elsewhere()
+        if not jumped:
+            others = before if earlier is None else [*before, earlier]
+            if self._before.expects(sample, others) and not needs_evidence:
+                return self._accept(reading, sample)
         if first is None or earlier is None:
             return bad(reading.time_s, Quality.MISMATCH, f"{sample.value:.4f} mm is not confirmed by a second answer")
-        if self._before.expects(earlier) and not self._needs_evidence(earlier):
+        if not jumped and self._before.expects(earlier, [*before, sample]) and not self._needs_evidence(earlier):
             return self._accept(first, earlier)
         if abs(sample.value - earlier.value) > self._tolerance_mm:  # one answer may be damaged; two are not
             self._latest.note(earlier.value)
         last, limits = self._before.last, self._settings.limits
-        latched = earlier.time_s == sample.time_s
-        stays = self._stays(earlier, sample)
-        possible = self._is_possible(earlier, sample, latched)
-        self._unexplained += [earlier] if latched else [earlier, sample]
-        if self._jumped():
-            possible, stays = False, len(self._unexplained) >= _MANY
+        stays = len(self._unexplained) >= _MANY if jumped else self._stays(earlier, sample)
+        possible = not jumped and self._is_possible(earlier, sample, latched)
         if possible and (stays or math.isfinite(limits.acceleration) or self._goes_on(last, earlier, sample)):
             if needs_evidence:
                 return self._compared(reading, earlier, sample)
@@ -285,7 +288,8 @@ class ReadingTrust:
                 self._remember(earlier)
             return self._accept(reading, sample)
         if stays:
-            self._memory.distrust(self._i, Doubt.JUMPED, sample.value - last.value)
+            jumped_mm = self._before.off_mm(sample, self._before.lasting_mm_per_s)
+            self._memory.distrust(self._i, Doubt.JUMPED, jumped_mm)
             return self._reject(reading)
         self._latest.note(sample.value)
         values = ", ".join(f"{value:.4f}" for value in (last.value, earlier.value, sample.value))
@@ -299,27 +303,28 @@ class ReadingTrust:
             return abs(earlier.value - last.value) <= rest_to_rest_mm(limits, duration_s, self._tolerance_mm)
         return is_possible([last, earlier, sample], self._tolerance_mm, limits, *self._before.speed())
 
-    def _jumped(self) -> bool:
+    def _is_a_motion_from_elsewhere(self) -> bool:
         """Whether the answers that were not believed are one motion, which cannot have come from the last reading.
 
-        The more time has passed since that, the more is possible without them.
+        The more time has passed since that, the more is possible without them. Noise below what the acceleration makes
+        from one answer to the next is no jump.
         """
-        limits, samples = self._settings.limits, self._unexplained
-        if (
-            math.isinf(limits.acceleration)
-            or len(samples) < _SOME
-            or not is_possible(samples, self._tolerance_mm, limits)
-        ):
+        before, limits, samples = self._before, self._settings.limits, self._unexplained
+        if math.isinf(limits.acceleration) or len(samples) < _SOME:
             return False
-        return not is_possible([self._before.last, *samples], self._tolerance_mm, limits, *self._before.speed())
+        passed_s = samples[0].time_s - before.last.time_s
+        if abs(before.off_mm(samples[0], before.lasting_mm_per_s)) <= limits.acceleration * passed_s**2:
+            return False
+        if not is_possible(samples, self._tolerance_mm, limits):
+            return False
+        return not is_possible([before.last, *samples], self._tolerance_mm, limits, *before.speed())
 
     def _stays(self, earlier: GaugeSample, sample: GaugeSample) -> bool:
         """Whether the second answer confirms the first one: the part stands there, or goes on as fast as before."""
-        last = self._before.last
-        for mm_per_s in (0.0, self._before.lasting_mm_per_s):
-            jump_mm = earlier.value - last.value - mm_per_s * (earlier.time_s - last.time_s)
-            off_mm = sample.value - earlier.value - mm_per_s * (sample.time_s - earlier.time_s)
-            if abs(off_mm) <= self._tolerance_mm + _AGREEMENT * abs(jump_mm):
+        before = self._before
+        for mm_per_s in (0.0, before.lasting_mm_per_s):
+            jump_mm = before.off_mm(earlier, mm_per_s)
+            if abs(before.off_mm(sample, mm_per_s) - jump_mm) <= self._tolerance_mm + _AGREEMENT * abs(jump_mm):
                 return True
         return False
 

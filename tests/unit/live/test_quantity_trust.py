@@ -114,6 +114,50 @@ def test_a_person_accepts_a_thermometer_as_a_length(warm):
     assert warm.step().state is State.OK
 
 
+@pytest.mark.parametrize("shown", [327.67, 60.0, 0.0, 28.0, 22.0], ids=lambda shown: f"{shown:g} degC")
+@pytest.mark.parametrize("is_restarted", [False, True])
+def test_a_thermometer_that_is_right_again_is_believed_by_itself(each, shown, is_restarted):
+    right_mm = each.step().values.tip_M_mm
+    each.cabinet.shows["link_1"] = lambda _: shown
+    each.run(4.0)
+    assert reading(each).quality is Quality.DISTRUSTED
+    if is_restarted:
+        each.start_acquisition()
+    each.cabinet.shows["link_1"] = lambda _: 23.0
+    setpoints = each.run(2.0)
+    assert setpoints[-1].state is State.OK
+    assert worst_um(each, setpoints, right_mm) < 1.0
+
+
+@pytest.mark.parametrize("away_K", [5.0, 1.0, -0.8])
+def test_time_alone_makes_no_wrong_thermometer_right(warm, away_K):
+    """Whatever the room does meanwhile: as far as a thermometer usually drifts in an hour."""
+    warm.cabinet.shows["link_1"] = lambda _: 23.0 + away_K
+    warm.run(2.0)
+    assert reading(warm).quality is Quality.DISTRUSTED
+    warm.now_s += 3600.0
+    warm.run(5.0)
+    assert reading(warm).quality is Quality.DISTRUSTED
+
+
+def test_a_thermometer_that_was_wrong_for_an_hour_is_believed_where_it_can_have_drifted_to(warm):
+    warm.cabinet.shows["link_1"] = lambda _: 60.0
+    warm.run(2.0)
+    warm.now_s += 3600.0
+    warm.cabinet.shows["link_1"] = lambda _: 25.0
+    warm.run(2.0)
+    assert reading(warm).value == pytest.approx(25.0, abs=0.1)
+
+
+def test_a_thermometer_that_is_right_for_a_moment_is_still_not_believed(warm):
+    start_s = warm.now_s
+    warm.cabinet.shows["link_1"] = lambda time_s: (
+        23.0 if (time_s - start_s) % 1.0 < 0.5 and time_s > start_s + 3 else 60.0
+    )
+    warm.run(10.0)
+    assert reading(warm).quality is Quality.DISTRUSTED
+
+
 def test_one_that_is_still_broken_is_not_believed_though_it_is_accepted(warm):
     warm.cabinet.shows["link_1"] = lambda _: 327.67
     warm.run(2.0)
