@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from compd.line_settings import LOCAL_BACK_OFF_S, NETWORK_BACK_OFF_S
 from compd.operation_settings import TargetSettings, VoteSettings
 
 # Keys about the trust in a gauge, not its value.
@@ -102,6 +103,8 @@ def hash_of(configuration: object, fields: tuple[str, ...], without: tuple[str, 
 def _stated_options(options: Mapping[str, Any]) -> dict[str, Any]:
     """The effective options: an omitted option of a later release changes no hash."""
     stated = {k: v for k, v in options.items() if k not in _LATER_OPTIONS or v != _LATER_OPTIONS[k]}
+    if tuple(stated.get("back_off_s", ())) == LOCAL_BACK_OFF_S:  # that of a network if left out, up to 0.3.0
+        stated["back_off_s"] = NETWORK_BACK_OFF_S
     if "low_latency" in stated:  # false if left out, up to 0.2.0
         stated["low_latency"] = bool(stated["low_latency"])
     if (driver := str(stated.get("driver"))) in _FORMER_SPEED_LIMITS and "fastest_mm_per_s" not in stated:

@@ -1,5 +1,7 @@
 from .line_settings import ECHO as ECHO
 from .line_settings import HOST as HOST
+from .line_settings import LOCAL_BACK_OFF_S as LOCAL_BACK_OFF_S
+from .line_settings import NETWORK_BACK_OFF_S as NETWORK_BACK_OFF_S
 from .line_settings import ROUND_TRIGGER as ROUND_TRIGGER
 from .line_settings import LineSettings as LineSettings
 from .line_settings import NetworkPort as NetworkPort

@@ -16,6 +16,8 @@ NetworkPort = Annotated[int, Field(ge=1, le=65535)]
 BackOff = tuple[Positive, Positive]
 SettingsT = TypeVar("SettingsT", bound="LineSettings")
 
+# Waits (s) after a lost line: first and longest. A port of this computer is back as soon as it is there.
+NETWORK_BACK_OFF_S, LOCAL_BACK_OFF_S = (0.5, 10.0), (0.1, 0.5)
 # Descriptions of keys that several kinds have.
 BACK_OFF = "wait after a lost line: first and longest, doubling between"
 ECHO = "the adapter repeats every request (two-wire RS-485): take that out"
@@ -52,7 +54,7 @@ class PolledLineSettings(LineSettings):
     """Keys of a line whose gauges are polled."""
 
     timeout_s: Positive = Field(description="wait for the first byte of a reply")
-    back_off_s: BackOff = Field(default=(0.5, 10.0), description=BACK_OFF)
+    back_off_s: BackOff = Field(default=NETWORK_BACK_OFF_S, description=BACK_OFF)
     poll_every_s: NotNegative = Field(
         default=0.0, description="time from one round to the next; 0 = as fast as the line goes"
     )
@@ -70,7 +72,7 @@ class PushedLineSettings(LineSettings):
     period_key: ClassVar[str] = "period_s"
 
     timeout_s: Positive = Field(description="how long the other end may take to accept a connection, or to answer")
-    back_off_s: BackOff = Field(default=(0.5, 10.0), description=BACK_OFF)
+    back_off_s: BackOff = Field(default=NETWORK_BACK_OFF_S, description=BACK_OFF)
     user: Text | None = Field(default=None, description="name for the login; omitted for none")
     password_file: AbsolutePath | None = Field(default=None, description="file with the password of `user`, one line")
 

@@ -7,7 +7,15 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from compd.documents import Section, Text, refusal
-from compd.line_settings.line_settings import BACK_OFF, ECHO, ROUND_TRIGGER, BackOff, NotNegative, PolledLineSettings
+from compd.line_settings.line_settings import (
+    BACK_OFF,
+    ECHO,
+    LOCAL_BACK_OFF_S,
+    ROUND_TRIGGER,
+    BackOff,
+    NotNegative,
+    PolledLineSettings,
+)
 from compd.line_settings.round_trigger import TriggerWrite
 
 Format = Annotated[str, Field(pattern=r"^[78][NEO][12]$")]
@@ -30,7 +38,7 @@ class SerialPortSettings(PolledLineSettings):
     )
     baud: Annotated[int, Field(ge=50, le=4_000_000)] = Field(description="bits per second")
     format: Format = Field(description="data bits, parity, stop bits: 8N1, 7E2, ...")
-    back_off_s: BackOff = Field(default=(0.1, 0.5), description=BACK_OFF)
+    back_off_s: BackOff = Field(default=LOCAL_BACK_OFF_S, description=BACK_OFF)
     low_latency: bool | None = Field(
         default=None,
         description="false: do not ask the adapter to hold no bytes back (FTDI: up to 16 ms); left out: ask",
