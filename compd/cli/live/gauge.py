@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compd.cli.options import OverwriteOption
+from compd.cli.paths import PathKind
 
 if TYPE_CHECKING:
     from compd.gauge import Reading
@@ -21,6 +22,7 @@ gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and desc
 TargetArgument = Annotated[
     str,
     typer.Argument(help="A driver's name, or a file (.yaml): a machine, or gauges and their lines."),
+    PathKind.NAME_OR_FILE,
 ]
 NameArgument = Annotated[str | None, typer.Argument(help="Name of the gauge, for a file of several.")]
 Port = Annotated[
@@ -28,6 +30,7 @@ Port = Annotated[
     typer.Option(
         help="/dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port, unless a file names the line."
     ),
+    PathKind.NAME_OR_FILE,
 ]
 Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
 Format = Annotated[
