@@ -127,9 +127,10 @@ def read(
     assignments: Set = None,
 ) -> None:
     """Read one gauge once, and show every byte. Exit code 1 if a channel has no value, or one that is stale."""
+    from compd.cli.problems import print_problems
     from compd.clock import MonotonicClock
     from compd.gauge import LineFault
-    from compd.gauge_tools import aged, read_gauge
+    from compd.gauge_tools import aged, option_doubts, read_gauge
 
     gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
     clock = MonotonicClock()
@@ -148,6 +149,7 @@ def read(
     for channel, reading in zip(gauge_target.gauge.channels, readings, strict=True):
         age = f", {(now_s - reading.time_s) * 1e3:.3g} ms old" if reading.ok else ""
         typer.echo(f"{gauge_target.name}.{channel.name}: {_reading_text(reading, channel.unit)}{age}")
+    print_problems(option_doubts(gauge_target), "note: ", sys.stdout)
     raise typer.Exit(0 if all(reading.ok for reading in readings) else 1)
 
 
