@@ -54,7 +54,7 @@ from typing import Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeVa
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from compd.reading import LineFault, Quality, Reading, ReadingMotion, bad, good
+from compd.reading import LineFault, Quality, Reading, ReadingMotion, bad, good, stands_for_no_number
 
 __all__ = [
     "ByteLine",
@@ -74,6 +74,7 @@ __all__ = [
     "bad",
     "good",
     "replies_tell_whose",
+    "stands_for_no_number",
 ]
 
 

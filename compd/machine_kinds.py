@@ -122,6 +122,7 @@ def machine_text(name: str, kind_name: str, dimensions: Dimensions, tolerance: s
     scales = max(rod.actuator for rod in rods)
     tip = dimensions.height_mm + math.copysign(dimensions.tool_mm, dimensions.height_mm)
     stated = [*_geometry(kind, dimensions, rods), *_tool(dimensions, tip, tolerance)]
+    limits = f"lowest: -{_largest(dimensions)}, highest: {_largest(dimensions)}"
     what = "mm of arc: radius times angle" if kind.actuator == "turns" else "mm"
     lines = [
         f"# A {kind_name}: {kind.meaning}. Made by `compd machine new`; put in the numbers of your drawing.",
@@ -141,8 +142,9 @@ def machine_text(name: str, kind_name: str, dimensions: Dimensions, tolerance: s
         "    noise_um: 0.02             # standard deviation of a reading at rest",
         "    acceleration_mm_per_s2: 2000   # the largest of what they measure",
         f"    channels:                  # {what}, counted from anywhere: machine zero is where `compd zero` is done",
+        "      # lowest, highest: what the scale can show at most, from its data sheet",
         *(
-            f"      - {{name: scale_{i + 1}, function: 4, address: {2 * i}, type: float32, unit: mm}}"
+            f"      - {{name: scale_{i + 1}, function: 4, address: {2 * i}, type: float32, unit: mm, {limits}}}"
             for i in range(scales)
         ),
         "",
@@ -159,6 +161,12 @@ def machine_text(name: str, kind_name: str, dimensions: Dimensions, tolerance: s
         f"state: {{directory: /var/lib/compd/{name}}}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _largest(dimensions: Dimensions) -> int:
+    """A length (mm) that no scale of the machine shows: four times its size, in whole metres."""
+    size = max(abs(value) for name, value in dimensions._asdict().items() if name.endswith("_mm"))
+    return 1000 * math.ceil(float(4 * size) / 1000)
 
 
 def _geometry(kind: MachineKind, dimensions: Dimensions, rods: Sequence[_Rod]) -> list[str]:

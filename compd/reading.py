@@ -28,12 +28,29 @@ class Quality(StrEnum):
     OVER_RANGE = "over_range", "the device says that the value is above its range"
     UNDER_RANGE = "under_range", "the device says that the value is below its range"
     SENSOR_FAULT = "sensor_fault", "the device says that its sensor is faulty or absent"
-    NOT_FINITE = "not_finite", "the reply is no finite number"
+    NOT_FINITE = "not_finite", "the reply is no finite number, or one that stands for none, such as 9.9E37"
     SILENT = "silent", "the device is silent by design, for instance in its menu, and not lost"
     LINE_LOST = "line_lost", "the port is gone; the line is opened again after a pause"
     DRIVER_ERROR = "driver_error", "the driver itself failed: a defect in it, to be reported"
     STALE = "stale", "there was a value, which is too old now"
     DISTRUSTED = "distrusted", "there is a value, which is not believed before a person has accepted it: `compd accept`"
+
+
+# No quantity of a machine is as large, in any unit.
+LARGEST_READING = 1e20
+# Numbers that instruments send in place of a reading. SCPI 1999, volume 1, 7.2.1: 9.9E37 is infinity, 9.91E37 is not a
+# number; others: the largest numbers of 32 and 64 bits, and NetCDF's 9.97E36. As float32 they differ in the 8th digit.
+_PLACEHOLDERS = (9.9e37, 9.91e37, 3.4028235e38, 1.7976931348623157e308, 9.969209968386869e36)
+
+
+def stands_for_no_number(value: float) -> bool:
+    """Whether a number is one that instruments send in place of a reading: SCPI's 9.9E37, 9.91E37 and their kind."""
+    return any(math.isclose(abs(value), placeholder, rel_tol=1e-4) for placeholder in _PLACEHOLDERS)
+
+
+def is_reading(value: float) -> bool:
+    """Whether a number can be a reading: finite, and not as large as what instruments send in place of one."""
+    return abs(value) < LARGEST_READING
 
 
 # Intervals of a gauge's readings after which the next one is due.
@@ -95,8 +112,11 @@ class Reading(NamedTuple):
 
 
 def good(value: float, time_s: float) -> Reading:
-    """A reading with a value, in the channel's unit; one that is not finite becomes `bad` with NOT_FINITE."""
-    if not math.isfinite(value):
+    """A reading with a value, in the channel's unit.
+
+    A value that is not finite, or so large that it stands for no number, becomes `bad` with NOT_FINITE.
+    """
+    if not is_reading(value):
         return bad(time_s, Quality.NOT_FINITE, repr(value))
     return Reading(value, time_s, Quality.OK)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from compd.columns import ID_COLUMNS, is_header
 from compd.errors import Problem, RecordingError
+from compd.files import folder_problem
 from compd.tables import ParquetTable, ProblemList, Table, TableBlock, csv_blocks, csv_row_count, read_table
 
 CSV, PARQUET = ".csv", ".parquet"
@@ -16,8 +17,9 @@ SUFFIXES = (CSV, PARQUET)
 def table_path(path: Path) -> Path:
     """The table's file of a recording, given by itself or by its sidecar NAME.yaml.
 
-    Raises RecordingError if two tables have this sidecar: a copy may have been changed since.
+    Raises RecordingError for a folder, and if two tables have this sidecar: a copy may have been changed since.
     """
+    _refuse_folder(path)
     if path.suffix not in (".yaml", ".yml"):
         return path
     tables = [table for suffix in SUFFIXES if (table := path.with_suffix(suffix)).exists()]
@@ -29,8 +31,14 @@ def table_path(path: Path) -> Path:
     return tables[0] if tables else path.with_suffix(CSV)
 
 
+def _refuse_folder(path: Path) -> None:
+    if problem := folder_problem(path, allowed="NAME.csv or NAME.parquet"):
+        raise RecordingError(problem)
+
+
 def written_path(path: Path) -> Path:
-    """The path for writing a recording: NAME.csv if `path` has no suffix of a table."""
+    """The path for writing a recording: NAME.csv if `path` has no suffix of a table. RecordingError for a folder."""
+    _refuse_folder(path)
     return path if path.suffix in SUFFIXES else path.with_name(f"{path.name}{CSV}")
 
 

@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from compd.cli.paths import PathKind
+
 if TYPE_CHECKING:
     from compd.configuration import Configuration
 
 DEFAULT_SOCKET = "/run/compd/compd.sock"
 
 DaemonOption = Annotated[
-    str, typer.Option("--daemon", help="The daemon's Unix socket, or the configuration (YAML) that names it.")
+    str,
+    typer.Option("--daemon", help="The daemon's Unix socket, or the configuration (YAML) that names it."),
+    PathKind.NAME_OR_FILE,
 ]
 MachineOption = Annotated[
     Path | None, typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name.")
@@ -26,6 +30,7 @@ EffectsOption = Annotated[
         help="Effects of your own beside the library's: FILE.yaml, FILE.py, a directory of them, or the name of a file "
         "that comes with compd. May be repeated.",
     ),
+    PathKind.ANY,
 ]
 RangesOption = Annotated[
     list[str] | None,

@@ -7,11 +7,21 @@ from typing import Any, TypeVar
 
 from typer.core import TyperCommand, TyperGroup
 
+from compd.cli.paths import check_paths
+
 Printed = TypeVar("Printed")
 
 
 class PlainCommand(TyperCommand):
-    """A command."""
+    """A command. Its path arguments are checked before it begins."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words of the command line. Raises CompdError for a path that is empty or a folder."""
+        typed = list(args)
+        rest: list[str] = super().parse_args(ctx, args)
+        if self.callback is not None and not ctx.resilient_parsing:
+            check_paths(self.callback, ctx.params, typed)
+        return rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help."""

@@ -23,6 +23,7 @@ from compd.configuration import Configuration, Machine, load_machine, shipped_na
 from compd.errors import Problem, RecordingError
 from compd.parameter_ranges import read_range
 from compd.recording import EXTERNAL, Recording, read_recording, read_sidecar
+from compd.table_file import table_path
 
 
 def open_recording(
@@ -90,6 +91,7 @@ def read_with_machine(
     machine : as in `open_recording`.  needs_reference : False accepts a recording without a reference.
     Raises RecordingError as `open_recording` does, CompdError where the file `machine` cannot be used.
     """
+    path = table_path(path)
     problems: list[Problem] = []
     configuration = recorded_machine(path, machine, problems)
     try:

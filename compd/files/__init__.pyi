@@ -15,4 +15,5 @@ from .file_trust import own_users as own_users
 from .file_trust import trust_problem as trust_problem
 from .output_file import check_directory as check_directory
 from .output_file import check_replaceable as check_replaceable
+from .output_file import folder_problem as folder_problem
 from .output_file import refused_path as refused_path

@@ -1,4 +1,4 @@
-"""A file that a command is to write: what is there already is not written over, unless compd has made it itself."""
+"""The path of a file that a command reads or writes: no folder, and written over only if compd has made it itself."""
 
 from __future__ import annotations
 
@@ -42,6 +42,18 @@ def check_replaceable(path: Path, marks: Sequence[bytes], what: str, overwrite: 
     if problem is not None:
         next_step = "choose another name, or " + ("remove it" if overwrite is None else "write over it: --overwrite")
         raise CompdError(Problem(where=str(path), what=problem, next_step=next_step))
+
+
+def folder_problem(path: Path, where: str = "", allowed: str = "") -> Problem | None:
+    """The problem of a path that names a folder in place of a file; None for any other."""
+    if path.name and not path.is_dir():
+        return None
+    return Problem(
+        where=where or str(path),
+        what="is a folder, not a file",
+        allowed=allowed,
+        next_step=f"give a file in it: {path / 'NAME'}",
+    )
 
 
 def check_directory(path: Path) -> None:

@@ -69,7 +69,10 @@ def describe_replies(captured: Sequence[CapturedReply], answers: Answers) -> Gau
     options["channels"] = channels.options()
     if answers.errors:
         options["errors"] = [{"in": escaped(text, "%"), "quality": quality} for text, quality in answers.errors.items()]
-    return GaugeDescription(options, tuple(dict.fromkeys(note for some in notes for note in some)))
+    every = [note for some in notes for note in some]
+    if without := [channel["name"] for channel in options["channels"] if "range" not in channel]:
+        every.append(f"no range of {', '.join(without)}: write `range: [LOWEST, HIGHEST]` from the sensor's data sheet")
+    return GaugeDescription(options, tuple(dict.fromkeys(every)))
 
 
 def _questions(exchange: ObservedExchange, channels: ObservedChannels, answers: Answers) -> list[Problem]:

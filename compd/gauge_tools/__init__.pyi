@@ -10,6 +10,7 @@ from .open_gauge import aged as aged
 from .open_gauge import byte_line_settings as byte_line_settings
 from .open_gauge import gauge_of_driver as gauge_of_driver
 from .open_gauge import open_tapped_stream as open_tapped_stream
+from .open_gauge import option_doubts as option_doubts
 from .open_gauge import poll_gauge as poll_gauge
 from .open_gauge import read_gauge as read_gauge
 from .probe import announcements as announcements

@@ -67,6 +67,14 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
     return GaugeTarget(driver, gauge, line, gauge.options.stale_after_s or STALE_AFTER_S)
 
 
+def option_doubts(target: GaugeTarget) -> list[Problem]:
+    """What is probably a slip among the gauge's options: a channel without a range, an odd factor."""
+    return [
+        Problem(where=".".join(map(str, (target.name, *location))), what=what, value=value, next_step=next_step)
+        for location, what, value, next_step in target.gauge.doubts()
+    ]
+
+
 def line_settings(port: PortArguments, carries: LineKind) -> LineSettings:
     """Settings of a line that carries bytes, registers, nodes or topics.
 

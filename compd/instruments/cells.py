@@ -9,6 +9,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.instruments.export_problems import ExportProblems
+from compd.reading import stands_for_no_number
 
 NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 _WITH_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[.,' ]\d{3})+(?:[.,]\d+)?", re.ASCII)
@@ -161,6 +162,9 @@ def numbers(cells: Sequence[str], line: IntArray, what: str, problems: ExportPro
 
 
 def _check_size(values: FloatArray, cells: Sequence[str], line: IntArray, what: str, problems: ExportProblems) -> None:
+    """Empty the cells that stand for no number, such as 9.9E37. Add a problem for other numbers that are too large."""
+    large = np.flatnonzero(np.abs(values) > LARGEST)
+    values[[i for i in large.tolist() if stands_for_no_number(values[i])]] = np.nan
     beyond = np.flatnonzero(np.abs(values) > LARGEST)
     if len(beyond):
         problems.add(int(line[beyond[0]]), f"{what} is larger than anything measured", cells[int(beyond[0])])

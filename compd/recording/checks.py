@@ -25,6 +25,7 @@ import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.columns import DISTANCE_COLUMN, ID_COLUMNS
+from compd.reading import LARGEST_READING
 from compd.tables import ProblemList, Table, rows_text, values_text
 
 
@@ -94,6 +95,9 @@ def limit_of(name: str) -> Limit | None:
 
 def check_values(table: Table, problems: ProblemList) -> None:
     """Check every column but the time: rules first (problems), then plausible limits (warnings)."""
+    for name, values in table.columns.items():
+        wrong = np.abs(values) >= LARGEST_READING
+        _report(table, name, wrong, problems, "stands for no number", "a measured number", "empty the cell")
     for name in ID_COLUMNS:
         if name in table.columns and name not in table.labels:
             values = table.columns[name]

@@ -6,13 +6,14 @@ One key `unit` says what the device sends; the channel delivers mm, degC, N, hPa
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from compd.gauge import Channel, Quality, Reading, Unit, bad, good
+from compd.gauge import Channel, OptionDoubt, Quality, Reading, Unit, bad, good, stands_for_no_number
 from compd_drivers.linearisation import Linearisation
+from compd_drivers.no_number import range_doubts, unless_missing
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 WireUnit = Literal[
@@ -52,6 +53,8 @@ CONVERSIONS: Mapping[str, _Conversion] = {
 SIGNALS = ("V", "mA")
 
 
+RANGE_OPTION = "range"
+RANGE = f"`{RANGE_OPTION}`"
 # Smallest (besides 0) and largest plausible float; floats with exchanged bytes lie outside.
 MIN_FLOAT, MAX_FLOAT = 1e-20, 1e20
 
@@ -96,8 +99,20 @@ class MeasuredChannel(DescriptionSection):
         """The gauge's channel."""
         return Channel(self.name, self.measures if self.linearisation else CONVERSIONS[self.unit].unit)
 
-    def reading(self, number: float, time_s: float) -> Reading:
-        """The reading for a number from the wire."""
+    @property
+    def states_range(self) -> bool:
+        """Whether the values are limited by a range, or by the ends of the linearisation."""
+        return self.range is not None or self.linearisation is not None
+
+    def reading(
+        self, number: float, time_s: float, raw: float | None = None, full_scale: Collection[float] = ()
+    ) -> Reading:
+        """The reading for a number from the wire.
+
+        raw : the number as it was sent, where that is another. full_scale : the full-scale words of its type.
+        """
+        if stands_for_no_number(number):
+            return bad(time_s, Quality.NOT_FINITE, f"{number:g} stands for no number")
         scaled = number * self.scale
         if self.linearisation is not None:
             reading = self.linearisation.reading(scaled, time_s)
@@ -109,7 +124,16 @@ class MeasuredChannel(DescriptionSection):
                 return bad(time_s, Quality.UNDER_RANGE, f"{reading.value:g} {self.channel.unit}")
             if reading.value > self.range[1]:
                 return bad(time_s, Quality.OVER_RANGE, f"{reading.value:g} {self.channel.unit}")
-        return reading
+        if self.states_range:
+            return reading
+        return unless_missing(reading, number if raw is None else raw, full_scale, RANGE)
+
+
+def doubts(channels: Sequence[MeasuredChannel], range_option: str) -> Iterator[OptionDoubt]:
+    """Doubts about channels without a range. range_option : the key that states it, for a preset its own."""
+    without = [channel.name for channel in channels if not channel.states_range]
+    location = ("channels",) if range_option == RANGE_OPTION else (range_option,)
+    return range_doubts(without, f"`{range_option}: [LOWEST, HIGHEST]`" if range_option else "", location)
 
 
 def repeated(names: list[str]) -> str:

@@ -12,7 +12,7 @@ public register map was found, so the map is yours, out of your module's manual;
 A number may be part of its registers: a Beckhoff IP5209 (M) has its status in the low byte of the first register, and
 the 24 bits of its counter in the other three bytes
     {name: position, function: 3, address: 0, type: uint24, word_order: low_first, unit: mm, scale: 0.001,
-     status: {address: 0, mask: MASK}}
+     lowest: -1, highest: 300, status: {address: 0, mask: MASK}}
 and its manual says which bits of the status mean an error: they are the mask.
 `write_first` switches the unit or starts the device, `write_before_poll` latches; `identity` makes sure that it is this
 device. What is written is confirmed by the device, or the poll has failed.
@@ -38,11 +38,13 @@ from compd.gauge import (
     RegisterReply,
     bad,
     good,
+    stands_for_no_number,
 )
 from compd_drivers.measured import not_measured
 from compd_drivers.modbus_description import ModbusChannel, ModbusOptions, ModbusWrite, Status
-from compd_drivers.modbus_doubts import doubts
+from compd_drivers.modbus_doubts import RANGE, doubts
 from compd_drivers.modbus_number import FLOATS, READ_BITS, decode
+from compd_drivers.no_number import unless_missing
 
 # Most registers of a read: fewer than Modbus allows, as a serial master asks for one more.
 MAX_REGISTERS, MAX_BITS = 124, 1992
@@ -68,6 +70,7 @@ class Modbus(Gauge[RegisterLine]):
 
     Options: ClassVar[type[GaugeOptions]] = ModbusOptions
     line_kind = "registers"
+    range_option: ClassVar[str | None] = None  # of a preset, which has its own keys
     sample_options: ClassVar[Mapping[str, Any]] = {
         "unit": 1,
         "channels": [
@@ -114,7 +117,7 @@ class Modbus(Gauge[RegisterLine]):
         return self._channels
 
     def doubts(self) -> Iterable[OptionDoubt]:
-        return doubts(self._map)
+        return doubts(self._map, RANGE if self.range_option is None else "")
 
     def traffic(self) -> Sequence[tuple[int, int]]:
         writes = [
@@ -209,6 +212,8 @@ def _reading(channel: ModbusChannel, registers: tuple[int, ...], status_value: i
         return bad(time_s, Quality.OVER_RANGE, f"raw value {raw:g}")
     if raw in channel.under_range:
         return bad(time_s, Quality.UNDER_RANGE, f"raw value {raw:g}")
+    if stands_for_no_number(raw):
+        return bad(time_s, Quality.NOT_FINITE, f"{raw:g} stands for no number")
     if channel.type in FLOATS and not_measured(raw):
         return bad(time_s, Quality.MISMATCH, _other_orders(channel, registers, raw))
     value = raw * channel.scale + channel.offset
@@ -217,7 +222,7 @@ def _reading(channel: ModbusChannel, registers: tuple[int, ...], status_value: i
         return bad(time_s, Quality.OVER_RANGE, f"{reading.value:g} {channel.unit}")
     if channel.lowest is not None and reading.value < channel.lowest:
         return bad(time_s, Quality.UNDER_RANGE, f"{reading.value:g} {channel.unit}")
-    return reading
+    return reading if channel.states_range else unless_missing(reading, raw, channel.full_scale, RANGE)
 
 
 def _status_quality(status: Status, status_value: int) -> Quality:

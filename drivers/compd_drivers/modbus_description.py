@@ -65,6 +65,11 @@ class ModbusChannel(RegisterNumber):
         return self
 
     @property
+    def states_range(self) -> bool:
+        """Whether the values are limited on both sides, by a range or by the ends of the linearisation."""
+        return self.linearisation is not None or None not in (self.lowest, self.highest)
+
+    @property
     def status_function(self) -> int:
         """The function for reading the status."""
         return self.status.function if self.status and self.status.function else self.function

@@ -9,6 +9,7 @@ from itertools import combinations
 from compd.gauge import OptionDoubt
 from compd_drivers.modbus_description import ModbusChannel
 from compd_drivers.modbus_number import FLOATS
+from compd_drivers.no_number import range_doubts
 
 # First digits of Modbus's "reference numbers": in a manual 10001 is the first discrete input, 30001 the first input
 # register, 40001 the first holding register.
@@ -22,8 +23,13 @@ _COARSEST = {"mm": 0.1, "degC": 2.0}
 _FLOATS_FACTOR = {"degC": 1.0}
 
 
-def doubts(channels: Sequence[ModbusChannel]) -> Iterator[OptionDoubt]:
-    """Doubts about a register map."""
+RANGE = "`lowest` and `highest`"
+
+
+def doubts(channels: Sequence[ModbusChannel], range_key: str = RANGE) -> Iterator[OptionDoubt]:
+    """Doubts about a register map. range_key : what states a channel's range; "" where there is no such key."""
+    without = [channel.name for channel in channels if not channel.states_range and channel.type != "bit"]
+    yield from range_doubts(without, range_key, ("channels",))
     for (_, one), (k, other) in combinations(enumerate(channels), 2):
         if _share(one, other):
             yield OptionDoubt(

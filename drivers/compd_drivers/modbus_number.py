@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from compd_drivers.measured import DescriptionSection
+from compd_drivers.no_number import MIN_BITS, full_scale
 
 # fmt: off
 NumberType = Literal[
@@ -47,6 +49,20 @@ class RegisterNumber(DescriptionSection):
     def length(self) -> int:
         """Registers, or bits by function 1 and 2, that are read for the number."""
         return 1 if self.type == "bit" else -(-(self.at_byte + self.bytes) // 2)
+
+    @cached_property
+    def full_scale(self) -> frozenset[float]:
+        """Its full-scale words as numbers; of decimal digits all nines."""
+        if self.type in FLOATS or self.type == "bit":
+            return frozenset()
+        bits = (8 * self.bytes if self.mask is None else (self.mask >> self.shift).bit_length()) - (
+            self.minus is not None and self.mask is None
+        )
+        if self.type.startswith("bcd"):
+            words = frozenset({10.0 ** (bits // 4) - 1}) if bits >= MIN_BITS else frozenset()
+        else:
+            words = full_scale(bits, self.type.startswith("int"))
+        return words | {-word for word in words} if self.minus is not None else words
 
     @model_validator(mode="after")
     def _bits_fit(self) -> Self:

@@ -4,11 +4,11 @@ A plain number, which its device publishes ten times a second, whether or not it
 
     gauges:
       joint_1: {driver: mqtt, line: broker, period_s: 0.1,
-                channels: [{name: value, topic: cell/joint1, unit: mm}]}
+                channels: [{name: value, topic: cell/joint1, unit: mm, range: [-1, 1]}]}
 
 JSON such as `{"t": "2026-11-23T18:00:00.120Z", "probe": {"um": 12.34, "state": "ok"}}`:
 
-    channels: [{name: value, topic: cell/joint1, value: /probe/um, unit: um, time: /t,
+    channels: [{name: value, topic: cell/joint1, value: /probe/um, unit: um, range: [-1, 1], time: /t,
                 status: {at: /probe/state, ok: [ok]}}]
 
 A path is a JSON Pointer (RFC 6901): `/a/b/0` is the first entry of `b` in `a`. A number is a JSON number, or the whole
@@ -24,15 +24,15 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from compd.gauge import Channel, GaugeOptions, LineFault, LineKind, Quality, Reading, bad
+from compd.gauge import Channel, GaugeOptions, LineFault, LineKind, OptionDoubt, Quality, Reading, bad
 from compd.pushed_gauge import Message, PushedGauge, PushedGaugeOptions, Stamp
-from compd_drivers.measured import DescriptionSection, MeasuredChannel, repeated
+from compd_drivers.measured import RANGE_OPTION, DescriptionSection, MeasuredChannel, doubts, repeated
 
 Pointer = str
 _POINTER = r"^(/([^/~]|~[01])*)*$"
@@ -107,6 +107,7 @@ class Mqtt(PushedGauge):
 
     Options: ClassVar[type[GaugeOptions]] = MqttOptions
     line_kind: ClassVar[LineKind] = "topics"
+    range_option: ClassVar[str] = RANGE_OPTION
     sample_options: ClassVar[Mapping[str, Any]] = {
         "channels": [
             {
@@ -130,6 +131,9 @@ class Mqtt(PushedGauge):
     @property
     def channels(self) -> Sequence[Channel]:
         return [described.channel for described in self._described]
+
+    def doubts(self) -> Iterable[OptionDoubt]:
+        return doubts(self._described, self.range_option)
 
     @property
     def addresses(self) -> Sequence[str]:

@@ -1,7 +1,10 @@
 """OPC UA gauge: numbers in nodes of a server, such as a PLC or a measuring system.
 
     gauges:
-      joint_1: {driver: opc_ua, line: plc, channels: [{name: value, node: "ns=2;s=Probe1", unit: um}]}
+      joint_1:
+        driver: opc_ua
+        line: plc
+        channels: [{name: value, node: "ns=2;s=Probe1", unit: um, range: [-1, 1]}]   # the range is in mm
 
 A node is named by its id, with the index of its namespace (`ns=2;s=Probe1`), or with its name, which stays the same
 when the server is configured anew (`nsu=http://maker.example/probes;s=Probe1`). The value is any number of OPC UA, or,
@@ -14,14 +17,15 @@ of its range `over_range` or `under_range`, most others `device_error`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from compd.gauge import Channel, GaugeOptions, LineFault, LineKind, Quality, Reading
+from compd.gauge import Channel, GaugeOptions, LineFault, LineKind, OptionDoubt, Quality, Reading
 from compd.pushed_gauge import Message, PushedGauge, PushedGaugeOptions
-from compd_drivers.measured import MeasuredChannel, repeated
+from compd_drivers.measured import RANGE_OPTION, MeasuredChannel, doubts, repeated
+from compd_drivers.no_number import FULL_SCALE
 
 _NODE = r"^((ns=[0-9]+|nsu=[^;]+);)?([is]=.+|[gb]=\S+)$"
 SHOWN = 60  # characters of a value that is no number
@@ -51,6 +55,7 @@ class OpcUa(PushedGauge):
 
     Options: ClassVar[type[GaugeOptions]] = OpcUaOptions
     line_kind: ClassVar[LineKind] = "nodes"
+    range_option: ClassVar[str] = RANGE_OPTION
     sample_options: ClassVar[Mapping[str, Any]] = {
         "channels": [
             {"name": "value", "node": "nsu=http://maker.example/probes;s=Probe1", "unit": "um", "range": [-1, 1]}
@@ -66,6 +71,9 @@ class OpcUa(PushedGauge):
     def channels(self) -> Sequence[Channel]:
         return [described.channel for described in self._described]
 
+    def doubts(self) -> Iterable[OptionDoubt]:
+        return doubts(self._described, self.range_option)
+
     @property
     def addresses(self) -> Sequence[str]:
         return [described.node for described in self._described]
@@ -79,4 +87,5 @@ class OpcUa(PushedGauge):
             value = value[described.index]
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise LineFault(Quality.MISMATCH, f"no number: {type(value).__name__} {value!r}"[:SHOWN])
-        return described.reading(float(value), time_s)
+        words = FULL_SCALE if isinstance(value, int) else ()
+        return described.reading(float(value), time_s, full_scale=words)

@@ -107,6 +107,7 @@ def driver_class(name: str, preset: Preset, base: type[Gauge[Any]]) -> type[Gaug
             "__module__": f"{__name__}.{name}",
             "Options": options_model,
             "absolute": preset.absolute,
+            "range_option": next((key for key, each in preset.options.items() if each.like == "channels.range"), ""),
             "about": f"{preset.title}\n\nSource: {preset.source}".strip(),
             "sample_options": preset.sample,
             "sample_range": preset.sample_range,

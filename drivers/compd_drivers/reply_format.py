@@ -38,6 +38,7 @@ from typing import Literal, cast
 
 from compd.lines import CHECKSUMS, ChecksumField, ChecksumKind
 from compd.text import unescape
+from compd_drivers.no_number import full_scale
 from compd_drivers.number_form import DecimalMark, FactorWords, NumberForm, characters
 
 OPEN_LENGTH = 32  # most bytes of a number without width: above those of any instrument
@@ -98,6 +99,11 @@ class ReplyFormat:
     @property
     def channels(self) -> tuple[str, ...]:
         return tuple(number.channel for number in self._numbers)
+
+    def full_scale(self, number: int) -> frozenset[float]:
+        """The full-scale words of a hexadecimal number of known width, by its index among the numbers."""
+        form = self._numbers[number]
+        return full_scale(4 * (form.width or 0), "+" in form.flags) if form.kind == "x" else frozenset()
 
     @property
     def has_checksum(self) -> bool:

@@ -12,8 +12,8 @@ Magnescale MG80-SC1, page 39: module, counter, mode N, unit M, judgement, 8 char
       in: "00NM%*[UGLE]%(a)+08.4f 01NM%*[UGLE]%(b)+08.4f"
       in_terminator: "\r\n"
       channels:
-        - {name: a, unit: mm, instead: {"   Error": sensor_fault}}
-        - {name: b, unit: mm, instead: {"   Error": sensor_fault}}
+        - {name: a, unit: mm, range: [-99, 99], instead: {"   Error": sensor_fault}}
+        - {name: b, unit: mm, range: [-99, 99], instead: {"   Error": sensor_fault}}
 
 Sylvac OPTO-RS, page 12: sign, digits, point, digits, CR; ERR0 sensor, ERR1 command, ERR2 parity, ERR3 range
     sylvac:
@@ -35,7 +35,7 @@ Wagner Force Ten, page 25: blank or minus, 5 digits and point, blank, unit, Peak
       line: force
       in: "% 7.2f LB "
       in_terminator: "\r\n"
-      channels: [{name: force, unit: N, scale: 4.4482216152605}]
+      channels: [{name: force, unit: N, scale: 4.4482216152605, range: [-450, 450]}]
       errors: [{in: "%*?[ ]HELP%*?[ LB]", quality: over_range}]
 
 A device that is asked by a pulse of DTR has `dtr_pulse_s` in place of `out`; `line_needs` powers its cable.
@@ -54,13 +54,14 @@ a second time, as those of all gauges are. Other quantities are not: set a parit
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
+from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, OptionDoubt, Quality, Reading, bad
 from compd.text import unescape
 from compd_drivers.ascii_description import Description, ErrorReply, PollForm, SerialAsciiOptions
 from compd_drivers.exchange import MenuSilence, ask, nothing_behind, receive, receive_line
+from compd_drivers.measured import RANGE_OPTION, doubts
 from compd_drivers.reply_format import ReplyFormat
 
 
@@ -69,6 +70,7 @@ class SerialAscii(Gauge[ByteLine]):
 
     Options: ClassVar[type[GaugeOptions]] = SerialAsciiOptions
     line_kind = "bytes"
+    range_option: ClassVar[str] = RANGE_OPTION
     sample_options: ClassVar[Mapping[str, Any] | None] = {
         "out": "M",
         "out_terminator": r"\r\n",
@@ -88,6 +90,7 @@ class SerialAscii(Gauge[ByteLine]):
         self._protocol = options
         self._channels = tuple(channel.channel for channel in options.channels)
         self._places = [self._place(channel.name) for channel in options.channels]
+        self._full_scale = [self._description.polls[poll].reply.full_scale(number) for poll, number in self._places]
         self._instead = [{unescape(word): quality for word, quality in c.instead.items()} for c in options.channels]
         terminator = unescape(options.out_terminator)
         exchanges = [*options.init, *([options.echo] if options.echo else [])]
@@ -106,6 +109,9 @@ class SerialAscii(Gauge[ByteLine]):
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
+
+    def doubts(self) -> Iterable[OptionDoubt]:
+        return doubts(self._measured, self.range_option)
 
     @property
     def reply_identity(self) -> str | None:
@@ -261,7 +267,7 @@ class SerialAscii(Gauge[ByteLine]):
         channel = self._measured[k]
         if isinstance(value, bytes):
             return bad(time_s, Quality(self._instead[k][value]), value.decode("ascii", "backslashreplace").strip())
-        return channel.reading(value / 10**channel.decimals, time_s)
+        return channel.reading(value / 10**channel.decimals, time_s, value, self._full_scale[k])
 
 
 def _shown(reply: bytes, error: ErrorReply) -> str:

@@ -10,7 +10,7 @@ Micro-Epsilon MSC7401, appendix 4.4.4:
     frame: "68 0B 0B 68 01 7E 08 .. .. .. .. .. .. .. .. CS 16"
     checksum: {kind: sum8, first: 4}
     channels:
-      - {name: gap, at: 11, type: float32, byte_order: little, unit: mm, invalid: {0: device_error}}
+      - {name: gap, at: 11, type: float32, byte_order: little, unit: mm, range: [-1, 1], invalid: {0: device_error}}
 
 A frame without a checksum must have fixed bytes, or nothing could tell a reply from noise. Its lengths are asked for a
 second time where they are not where the last ones lead, as those of all gauges are. `errors` are frames that stand for
@@ -22,15 +22,36 @@ from __future__ import annotations
 import itertools
 import re
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from compd.gauge import ByteLine, Channel, Gauge, GaugeOptions, LineFault, Quality, Reading, bad
+from compd.gauge import (
+    ByteLine,
+    Channel,
+    Gauge,
+    GaugeOptions,
+    LineFault,
+    OptionDoubt,
+    Quality,
+    Reading,
+    bad,
+    stands_for_no_number,
+)
 from compd.lines import CHECKSUMS, ChecksumKind
 from compd_drivers.exchange import ExchangeOptions, ask, following, nothing_behind, receive
-from compd_drivers.measured import DescriptionSection, MeasuredChannel, ReplyQuality, not_measured, repeated
+from compd_drivers.measured import (
+    RANGE_OPTION,
+    DescriptionSection,
+    MeasuredChannel,
+    ReplyQuality,
+    doubts,
+    not_measured,
+    repeated,
+)
+from compd_drivers.no_number import full_scale
 
 NumberType = Literal["int8", "uint8", "int16", "uint16", "int24", "uint24", "int32", "uint32", "float32", "float64"]
 _TOKEN = re.compile(r"[0-9A-Fa-f]{2}|\.\.|CS")
@@ -111,6 +132,12 @@ class FrameChannel(MeasuredChannel):
         """Length of the number in bytes."""
         return int(re.sub(r"\D", "", self.type)) // 8
 
+    @cached_property
+    def full_scale(self) -> frozenset[float]:
+        """Its full-scale words as numbers."""
+        whole = self.type not in _FLOATS
+        return full_scale(8 * self.length, self.type.startswith("int")) if whole else frozenset()
+
     def number(self, data: bytes) -> float:
         """The number in a whole frame, unscaled."""
         raw = data[self.at : self.at + self.length]
@@ -182,6 +209,7 @@ class SerialFrame(Gauge[ByteLine]):
 
     Options: ClassVar[type[GaugeOptions]] = SerialFrameOptions
     line_kind = "bytes"
+    range_option: ClassVar[str] = RANGE_OPTION
     integrity: ClassVar[Literal["checksum", "format"]] = "checksum"
     sample_options: ClassVar[Mapping[str, Any] | None] = {
         "out": "02 41 00 43",
@@ -220,6 +248,9 @@ class SerialFrame(Gauge[ByteLine]):
     @property
     def channels(self) -> Sequence[Channel]:
         return self._channels
+
+    def doubts(self) -> Iterable[OptionDoubt]:
+        return doubts(self._protocol.channels, self.range_option)
 
     @property
     def reply_identity(self) -> str | None:
@@ -273,6 +304,8 @@ def _reading(channel: FrameChannel, data: bytes, time_s: float) -> Reading:
     number = channel.number(data)
     if number in channel.invalid:
         return bad(time_s, Quality(channel.invalid[number]), f"number {number:g}")
+    if stands_for_no_number(number):
+        return bad(time_s, Quality.NOT_FINITE, f"{number:g} stands for no number")
     if channel.type in _FLOATS and not_measured(number):
         return bad(time_s, Quality.MISMATCH, f"byte order? {number:.4g} is no measurement")
-    return channel.reading(number, time_s)
+    return channel.reading(number, time_s, full_scale=channel.full_scale)

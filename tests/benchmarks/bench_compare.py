@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from compd.comparison import AlignedRecording
 from compd.model.kinematics import closure_at
 from tests.benchmarks.figures import show
+from tests.benchmarks.limits import run_limited
 from tests.support.measured import aligned, gauges, hidden, record
 
 ROWS = (1_000, 10_000, 100_000)
@@ -150,4 +151,4 @@ def compare_with_scipy(one: AlignedRecording) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, ROWS=(1_000, 2_000), SCIPY_ROWS=3)

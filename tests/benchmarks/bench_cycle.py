@@ -16,6 +16,7 @@ from compd.model import GaugeNoise
 from compd.model.effects import FittedEffect, needed_quantities
 from compd.model.library import load_library
 from tests.benchmarks.figures import median_and_p99, show
+from tests.benchmarks.limits import run_limited
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine, machine
 
 CYCLES = 5000
@@ -153,4 +154,4 @@ def _cycles(measured: Machine) -> dict[str, list[float]]:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, CYCLES=20)

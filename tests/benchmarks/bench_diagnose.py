@@ -12,6 +12,7 @@ from pathlib import Path
 from compd.diagnosis import diagnose
 from compd.model.library import load_library
 from tests.benchmarks.figures import show
+from tests.benchmarks.limits import run_limited
 from tests.support.hidden_effects import record_with_effects
 
 VISITS = 480  # every fourth is repeated: 600 rows
@@ -52,4 +53,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, VISITS=48, CASES={"one effect": CASES["one effect"]})

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from compd.instruments import ReadOptions, read_export
 from tests.benchmarks.figures import show
+from tests.benchmarks.limits import run_limited
 
 ROWS = 1_000_000
 BUDGET_S = 10.0
@@ -78,4 +79,4 @@ def clock(second: int) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, ROWS=100)

@@ -23,8 +23,10 @@ from compd.fleet.examine import BATCH
 from compd.fleet.fleet_recording import FleetRecording
 from compd.simulation import simulate_campaign
 from tests.benchmarks.figures import show
+from tests.benchmarks.limits import run_limited
 
 # Recordings that are simulated; the others are copies.
+RECORDINGS = 60
 DIFFERENT = 5
 BUDGET = 0.85
 # By wall time, which other programs stretch; by processor time, on cores that nobody else uses.
@@ -33,7 +35,7 @@ HEAD = ("efficiency", "eff. / budget", "by processor time")
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.bench_fleet", description=__doc__)
-    parser.add_argument("--recordings", type=int, default=60)
+    parser.add_argument("--recordings", type=int, default=RECORDINGS)
     parser.add_argument("--command", choices=["compare", "diagnose"], default="compare")
     options = parser.parse_args()
     cores = len(os.sched_getaffinity(0))
@@ -90,4 +92,4 @@ def measure(work: Examination, paths: Sequence[FleetRecording], workers: int) ->
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, RECORDINGS=2, DIFFERENT=1)

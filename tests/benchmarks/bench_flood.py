@@ -15,6 +15,7 @@ from compd.live import daemon as daemon_module
 from tests.benchmarks.bench_latency import AllAtOnce
 from tests.benchmarks.bench_loop import configuration
 from tests.benchmarks.figures import median_and_p99, quiet, show
+from tests.benchmarks.limits import first_good, run_limited
 from tests.support.running_daemon import supervised
 
 RATE_HZ = 200
@@ -73,6 +74,7 @@ def main() -> None:
     daemon_module.Acquisition = AllAtOnce  # type: ignore[misc, assignment]
     rows = []
     with tempfile.TemporaryDirectory(prefix="bench-") as directory, supervised(configuration(Path(directory), RATE_HZ)):
+        first_good(f"{directory}/s")
         alone_s = 0.0
         for name, flood in FLOODS.items():
             median_s, p99_s = median_and_p99(measure(f"{directory}/s", *flood))
@@ -86,4 +88,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, SETPOINTS=10, FLOODS=dict(list(FLOODS.items())[:2]))

@@ -18,12 +18,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from compd.client import connect
 from compd.live import daemon as daemon_module
 from tests.benchmarks.bench_cycle import EFFECTS
 from tests.benchmarks.bench_latency import CLIENT, AllAtOnce
 from tests.benchmarks.bench_loop import PRIORITY, configuration
 from tests.benchmarks.figures import median_and_p99, quiet, show
+from tests.benchmarks.limits import first_good, run_limited
 from tests.support.live_models import file_with
 from tests.support.running_daemon import supervised
 
@@ -31,6 +31,7 @@ RATE_HZ = 1000
 PERIOD_US = 1_000_000 // RATE_HZ
 # So small that no limit is reached.
 PARAMETER = 0.01
+SECONDS = 10
 # A share of the readings, which come at 88 a second, is left for the start.
 READINGS_PER_S = 60
 
@@ -50,9 +51,8 @@ def daemon_run(seconds: int) -> Run:
         settings = configuration(Path(directory), RATE_HZ)
         state = settings.state.model_copy(update={"model_file": str(model)})
         with supervised(replace(settings, state=state)) as daemon:
-            with connect(Path(directory) / "s") as client:
-                setpoint = next(setpoint for setpoint in client.watch() if setpoint["state"] == "ok")
-                assert len(setpoint["sources_mm"]) == 2 + len(EFFECTS)
+            setpoint = first_good(Path(directory) / "s")
+            assert len(setpoint["sources_mm"]) == 2 + len(EFFECTS)
             missed = daemon.loop_process.timing.missed
             process = subprocess.Popen(
                 [sys.executable, "-c", CLIENT, f"{directory}/s"], stdout=subprocess.PIPE, text=True
@@ -86,7 +86,7 @@ def measure(seconds: int, rounds: int, tell: Callable[[str], None]) -> list[tupl
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=int, default=10)
+    parser.add_argument("--seconds", type=int, default=SECONDS)
     parser.add_argument("--rounds", type=int, default=1)
     options = parser.parse_args()
     if shutil.which("cyclictest") is None:
@@ -114,4 +114,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, SECONDS=1, READINGS_PER_S=20)

@@ -23,6 +23,7 @@ from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensat
 from compd.model.kinematics import distances_mm, forward_kinematics, inverse_kinematics, solve_frame
 from compd.rotation import to_inner
 from tests.benchmarks.figures import median_and_p99, show
+from tests.benchmarks.limits import run_limited
 from tests.support.model_machines import tripod
 
 SOURCE = Path(__file__).with_name("kinematics.c")
@@ -221,4 +222,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, ROWS=10, CALLS=10, TURNS=1)

@@ -19,6 +19,7 @@ from compd.live import daemon as daemon_module
 from compd.live.memory import Latest
 from tests.benchmarks.bench_loop import configuration
 from tests.benchmarks.figures import median_and_p99, quiet, show
+from tests.benchmarks.limits import first_good, run_limited
 from tests.support.live_machine import RAW_AT_ZERO_MM
 from tests.support.running_daemon import supervised
 
@@ -73,6 +74,7 @@ class AllAtOnce:
 def measure(rate_hz: float) -> list[tuple[float, ...]]:
     """Reading to tick, tick to client, reading to client (s), for READINGS rounds."""
     with tempfile.TemporaryDirectory(prefix="bench-") as directory, supervised(configuration(Path(directory), rate_hz)):
+        first_good(f"{directory}/s")
         client = subprocess.Popen([sys.executable, "-c", CLIENT, f"{directory}/s"], stdout=subprocess.PIPE, text=True)
         assert client.stdout is not None
         found = [tuple(map(float, client.stdout.readline().split())) for _ in range(READINGS)]
@@ -106,4 +108,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, RATES_HZ=(200,), READINGS=5)

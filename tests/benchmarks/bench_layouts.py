@@ -43,6 +43,7 @@ from compd.operation_settings import LoopSettings
 from compd.setpoint_states import Mode, State
 from tests.benchmarks.bench_loop import PRIORITY, BusyDrivers, load_beside
 from tests.benchmarks.figures import quiet, show
+from tests.benchmarks.limits import BEGINS_WITHIN_S, run_limited
 from tests.support.live_machine import machine
 
 RATES_HZ = (200, 1000)
@@ -58,6 +59,7 @@ SCHEDULES = {
 }
 PERCENTILES = (50, 99, 99.9)
 LOAD_PROCESSES = 2
+SECONDS, ROUNDS = 8.0, 5
 SETTLE_S = 1.5
 WARM_UP_CYCLES = 200
 HISTOGRAM_US = 20_000
@@ -155,7 +157,7 @@ def unflat(head: Any, names: Any, vectors: Any, frame: Any, contributions: Any, 
         **dict.fromkeys(Compensation._fields, absent)
         | arrays
         | {"frame": Frame(**dict.fromkeys(Frame._fields, absent) | of_frame)}
-        | {"contributions": Contributions(tuple(parts), np.array(list(parts.values())))}
+        | {"contributions": Contributions(tuple(parts), np.array(list(parts.values()))), "own_columns": ()}
     )
     return Setpoint(*head, State(names[0]), names[1], Mode(names[2]), values, names[3], u_tip_um=u_tip_um)
 
@@ -213,7 +215,7 @@ def run_loop(latest: Any, put: Callable[[Setpoint | None], None], rate_hz: float
 def acquire(latest: Any, meanwhile: Callable[[], Figures]) -> Figures:
     """The drivers, for as long as something else takes; its figures, and how often the drivers asked."""
     realtime.shorten_switch_interval()
-    drivers = BusyDrivers(None, latest, None)
+    drivers = BusyDrivers(None, None, latest, None)
     drivers.start()
     start_s = time.monotonic()
     figures = meanwhile()
@@ -264,7 +266,7 @@ def run_together(client: socket.socket, rate_hz: float, seconds: float, go: Any)
 
 def run_layout(layout: str, scheduling: str, scheduling_client: str, rate_hz: float, seconds: float) -> Figures:
     """The figures of one run."""
-    go, done = FORK.Barrier(2, timeout=60), FORK.Event()
+    go, done = FORK.Barrier(2, timeout=BEGINS_WITHIN_S), FORK.Event()
 
     def wait() -> Figures:
         done.wait()
@@ -328,8 +330,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--load", action="store_true", help=f"{LOAD_PROCESSES} busy processes beside")
     parser.add_argument("--schedules", action="store_true", help="compare how service and client are scheduled")
-    parser.add_argument("--seconds", type=float, default=8, help="of each run")
-    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of each run")
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
     options = parser.parse_args()
     quiet()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # no loop with priority is left behind
@@ -346,4 +348,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, RATES_HZ=(200,), SECONDS=0.5, ROUNDS=1)

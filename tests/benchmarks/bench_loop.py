@@ -26,7 +26,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.client import connect
 from compd.configuration import Configuration, load
 from compd.gauge import good
 from compd.live import daemon as daemon_module
@@ -35,6 +34,7 @@ from compd.live.machine import MachineZero
 from compd.live.memory import Latest
 from compd.operation_settings import SocketSettings, StateSettings
 from tests.benchmarks.figures import quiet, show
+from tests.benchmarks.limits import first_good, run_limited
 from tests.support.live_machine import CONFIG, RAW_AT_ZERO_MM
 from tests.support.running_daemon import supervised
 
@@ -145,6 +145,7 @@ def configuration(directory: Path, rate_hz: float) -> Configuration:
             for name, gauge in loaded.gauge_objects().items()
             for channel in gauge.channels
         },
+        {quantity.name: RAW_AT_ZERO_MM for quantity in loaded.wiring.quantities},
     )
     (directory / "state").mkdir()
     zero.save(directory / "state")
@@ -203,8 +204,7 @@ def measure(rate_hz: float) -> Round:
         directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bench-")))
         settings = configuration(directory, rate_hz)
         daemon = stack.enter_context(supervised(settings))
-        with connect(directory / "s") as client:
-            next(setpoint for setpoint in client.watch() if setpoint["state"] == "ok")
+        first_good(directory / "s")
         timing = daemon.loop_process.timing
         counts, missed = timing.lateness.counts, timing.missed
         beside = cyclictest(rate_hz)
@@ -265,4 +265,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, RATES_HZ=(200,), SECONDS=1)

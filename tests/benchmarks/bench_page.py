@@ -24,6 +24,7 @@ from compd.page.recordings import Recordings
 from compd.page.server import STATIC
 from compd.setpoint_states import State
 from tests.benchmarks.figures import quiet, show
+from tests.benchmarks.limits import run_limited
 from tests.support.event_stream import EventStream
 from tests.support.hand_clock import HandClock
 from tests.support.live_page import CHROMIUM, browser, opened, page_process, running_machine, served, until
@@ -167,7 +168,7 @@ async def hour() -> list[list[str]]:
     browsers = Browsers(clock)
     broadcast = Broadcast(link, browsers, Recordings(Path("/nowhere"), "/no/socket"))
     token = Token("a person", LOOKS, "")
-    streams = [broadcast.events(browsers.connect(token.name, "127.0.0.1", token.role)) for _ in range(10)]
+    streams = [broadcast.events(browsers.connect(token, "127.0.0.1")) for _ in range(10)]
     await anext(streams[0])  # and it reads no more
     taken = [0] * len(streams[1:])
     readers = [asyncio.create_task(_read(stream, taken, k)) for k, stream in enumerate(streams[1:])]
@@ -207,4 +208,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, MEASURED_S=0.5, BROWSERS=(1,), EVENTS=100, LOOKED_AT=(1, 100))

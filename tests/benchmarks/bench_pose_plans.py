@@ -20,6 +20,7 @@ from compd.configuration import load
 from compd.machine_builder import build_model
 from compd.machine_kinds import KINDS, machine_text
 from compd.model import MachineModel
+from tests.benchmarks.limits import run_limited
 
 POSES = 20
 NOISE = Noise(5.0, 5.0)
@@ -75,4 +76,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, POSES=10, KINDS=dict(list(KINDS.items())[:1]))

@@ -11,8 +11,8 @@ place at which the tip was within the last second: a tip that is late, and else 
 
 from __future__ import annotations
 
+import argparse
 import heapq
-import sys
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,6 +33,7 @@ from compd.live.memory import Readings, Snapshot
 from compd.simulation import World
 from compd.stated_noise import tolerance_mm
 from tests.benchmarks.figures import show
+from tests.benchmarks.limits import run_limited
 from tests.support.paths import CONFIG
 
 BAUDS = (9600, 19200, 115200)
@@ -43,7 +44,7 @@ NOISE_UM = 0.1
 PERIOD_S = 5e-3
 AT_REST_S = 1.0
 ZERO_AT_S = 0.5
-TOUR_S = float(sys.argv[1]) if len(sys.argv) > 1 else 12.0
+TOUR_S = 12.0
 SEED = 5
 
 
@@ -116,8 +117,8 @@ class Move(NamedTuple):
     within: FloatArray
 
 
-def measured(configuration: Configuration, nine: Sequence[str], baud: int, trigger: bool) -> Move:
-    """Tour the simulated machine with these nine units on one line."""
+def measured(configuration: Configuration, nine: Sequence[str], baud: int, trigger: bool, tour_s: float) -> Move:
+    """Tour the simulated machine with these nine units on one line for `tour_s` (s)."""
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
     world = World(configuration.geometry, configuration.wiring, SEED, zero_hold_s=AT_REST_S)
     channels = channels_by_name(configuration, pipeline.wires)
@@ -190,7 +191,7 @@ def measured(configuration: Configuration, nine: Sequence[str], baud: int, trigg
     for k, line in enumerate(lines(tuple(channels), nine, baud, trigger)):
         begin_round(line, ZERO_AT_S + 1e-3 * k)
     push(ZERO_AT_S, lambda: tick(0))
-    while events[0][0] < AT_REST_S + TOUR_S:
+    while events[0][0] < AT_REST_S + tour_s:
         time_s, _, action = heapq.heappop(events)
         advance(time_s)
         action()
@@ -261,13 +262,16 @@ def rms(values: FloatArray) -> float:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("seconds", nargs="?", type=float, default=TOUR_S)
+    tour_s = parser.parse_args().seconds
     configuration = shipped()
     for what, nine in WHICH.items():
         rows = []
         at_once_um = 0.0
         for baud in BAUDS:
             for trigger in (False, True):
-                move = measured(configuration, nine, baud, trigger)
+                move = measured(configuration, nine, baud, trigger, tour_s)
                 at_once_um = max(at_once_um, rms(move.at_once_um))
                 rows.append(
                     [
@@ -304,4 +308,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, BAUDS=(115200,), TOUR_S=0.2, WHICH=dict(list(WHICH.items())[:1]))

@@ -17,6 +17,7 @@ import numpy as np
 from compd.model_file import ModelFile
 from tests.benchmarks.bench_compare import COMMAND, Cost, cost
 from tests.benchmarks.figures import show
+from tests.benchmarks.limits import run_limited
 from tests.support.measured import SIGMA_UM, gauges, hidden, record, tripod
 
 ROWS = 2_000_000
@@ -138,4 +139,4 @@ def fitted_model(path: Path, model: Path) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, ROWS=2_000, REPEATED_ROWS=1_000, FEW_ROWS=1_000, PANDAS_ROWS=1_000)

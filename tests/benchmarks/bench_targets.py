@@ -15,6 +15,7 @@ import llvmlite.binding
 from compd.kernel_target import LEVELS
 from tests.benchmarks.bench_cycle import whole_cycles
 from tests.benchmarks.figures import quiet, show
+from tests.benchmarks.limits import run_limited
 
 ROUNDS = 5
 CASES = [(name, mode, 3) for name in ("tripod-cmm.yaml", "hexapod.yaml") for mode in ("cmm", "machine_tool")]
@@ -78,7 +79,7 @@ def _computes() -> None:
 
 if __name__ == "__main__":
     quiet()
-    if len(sys.argv) > 1:
+    if sys.argv[1:] == ["computes"]:
         _computes()
     else:
-        main()
+        run_limited(main, ROUNDS=1, CASES=CASES[:1])

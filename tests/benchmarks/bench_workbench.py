@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from tests.benchmarks.figures import quiet, show
+from tests.benchmarks.limits import run_limited
 from tests.support.live_page import CHROMIUM, browser, page_process, until
 from tests.support.measured import gauges, hidden, record
 
@@ -127,4 +128,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main, ROWS=(600,), PICTURES=PICTURES[:1])

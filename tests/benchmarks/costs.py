@@ -20,6 +20,7 @@ from tests.benchmarks.bench_cycle import EFFECTS, whole_cycles
 from tests.benchmarks.bench_latency import AllAtOnce
 from tests.benchmarks.cost_table import Cost, save
 from tests.benchmarks.figures import median_and_p99, quiet, show
+from tests.benchmarks.limits import run_limited
 
 MACHINES = ("tripod-cmm.yaml", "hexapod.yaml")
 MODES = ("cmm", "machine_tool")
@@ -121,4 +122,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_limited(main)

@@ -21,7 +21,8 @@ LINKS = {"tripod-cmm": 3, "hexapod": 6}
 @pytest.mark.parametrize("machine", LINKS)
 def test_its_configurations_are_machines(machine: str) -> None:
     configuration = load(FILES / f"{machine}.yaml")
-    assert configuration.warnings == ()
+    # their frame comparators and thermometers state no range, of which no release before this one warned
+    assert all("no range is stated" in warning.what for warning in configuration.warnings)
     assert build_model(configuration.geometry, configuration.wiring).links == LINKS[machine]
 
 

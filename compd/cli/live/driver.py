@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from compd.cli.paths import PathKind
+
 if TYPE_CHECKING:
     from compd.conformance import CaseResult, DriverUnderTest
 
@@ -21,13 +23,17 @@ def _drivers() -> None:
 @driver.command("test")
 def try_on_wires(
     name: Annotated[
-        str | None, typer.Argument(help="Entry point, or /absolute/file.py:ClassName; default: all installed ones.")
+        str | None,
+        typer.Argument(help="Entry point, or /absolute/file.py:ClassName; default: all installed ones."),
+        PathKind.NAME_OR_FILE,
     ] = None,
     options: Annotated[
         Path | None, typer.Option(help="YAML with the gauge's options; default: the driver's own `sample_options`.")
     ] = None,
     simulator: Annotated[
-        str | None, typer.Option(help="Its simulated device: entry point or file; default: the driver's own.")
+        str | None,
+        typer.Option(help="Its simulated device: entry point or file; default: the driver's own."),
+        PathKind.NAME_OR_FILE,
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only in virtual time, without ptys and ports.")] = False,
 ) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compd.cli.options import OverwriteOption
+from compd.cli.paths import PathKind
 
 if TYPE_CHECKING:
     from compd.gauge import Reading
@@ -21,6 +22,7 @@ gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and desc
 TargetArgument = Annotated[
     str,
     typer.Argument(help="A driver's name, or a file (.yaml): a machine, or gauges and their lines."),
+    PathKind.NAME_OR_FILE,
 ]
 NameArgument = Annotated[str | None, typer.Argument(help="Name of the gauge, for a file of several.")]
 Port = Annotated[
@@ -28,6 +30,7 @@ Port = Annotated[
     typer.Option(
         help="/dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port, unless a file names the line."
     ),
+    PathKind.NAME_OR_FILE,
 ]
 Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
 Format = Annotated[
@@ -124,9 +127,10 @@ def read(
     assignments: Set = None,
 ) -> None:
     """Read one gauge once, and show every byte. Exit code 1 if a channel has no value, or one that is stale."""
+    from compd.cli.problems import print_problems
     from compd.clock import MonotonicClock
     from compd.gauge import LineFault
-    from compd.gauge_tools import aged, read_gauge
+    from compd.gauge_tools import aged, option_doubts, read_gauge
 
     gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
     clock = MonotonicClock()
@@ -145,6 +149,7 @@ def read(
     for channel, reading in zip(gauge_target.gauge.channels, readings, strict=True):
         age = f", {(now_s - reading.time_s) * 1e3:.3g} ms old" if reading.ok else ""
         typer.echo(f"{gauge_target.name}.{channel.name}: {_reading_text(reading, channel.unit)}{age}")
+    print_problems(option_doubts(gauge_target), "note: ", sys.stdout)
     raise typer.Exit(0 if all(reading.ok for reading in readings) else 1)
 
 

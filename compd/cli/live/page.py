@@ -10,13 +10,16 @@ from urllib.parse import quote, urlsplit
 import typer
 
 from compd.cli.options import DEFAULT_SOCKET
+from compd.cli.paths import PathKind
 
 _TLS = "put a proxy with TLS in front (--behind): tokens pass in the clear otherwise"
 
 
 def page(
     address: Annotated[
-        str, typer.Argument(metavar="CONFIG", help="The daemon's configuration (YAML), or its Unix socket.")
+        str,
+        typer.Argument(metavar="CONFIG", help="The daemon's configuration (YAML), or its Unix socket."),
+        PathKind.NAME_OR_FILE,
     ] = DEFAULT_SOCKET,
     port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port of the page; 0: any free port.")] = 7760,
     listen: Annotated[
@@ -41,9 +44,13 @@ def page(
     workbench: Annotated[
         str | None, typer.Option(metavar="NAME", help="Print the address that opens this recording in the workbench.")
     ] = None,
-    recordings: Annotated[Path, typer.Option(help="The directory of recordings.")] = Path("recordings"),
+    recordings: Annotated[Path, typer.Option(help="The directory of recordings."), PathKind.FOLDER] = Path(
+        "recordings"
+    ),
     models: Annotated[
-        Path | None, typer.Option(help="The directory of model files to choose from; default: that of CONFIG.")
+        Path | None,
+        typer.Option(help="The directory of model files to choose from; default: that of CONFIG."),
+        PathKind.FOLDER,
     ] = None,
 ) -> None:
     """Show the machine live in the browser: state, errors, gauges, the last hour.

@@ -8,11 +8,14 @@ from typing import Annotated
 import typer
 
 from compd.cli.options import DEFAULT_SOCKET, unix_address
+from compd.cli.paths import PathKind
 
 
 def status(
     address: Annotated[
-        str, typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names it.")
+        str,
+        typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names it."),
+        PathKind.NAME_OR_FILE,
     ] = DEFAULT_SOCKET,
     timeout_s: Annotated[float, typer.Option("--timeout", min=0.1, help="Wait (s) for an answer.")] = 5.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the same and all of STATUS as JSON.")] = False,

@@ -15,6 +15,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from compd.cli.paths import PathKind
 from compd.cli.waiting import connect_patiently
 from compd.client import DEFAULT_ADDRESS, Client, connect
 from compd.clock import Clock, MonotonicClock
@@ -39,7 +40,9 @@ _END_WITHIN_S = 0.5
 
 def watch(
     address: Annotated[
-        str, typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names one.")
+        str,
+        typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names one."),
+        PathKind.NAME_OR_FILE,
     ] = DEFAULT_ADDRESS,
     rate_hz: Annotated[float, typer.Option(min=0.1, help="Setpoints per second.")] = 10.0,
     count: Annotated[int, typer.Option(min=0, help="Stop after this many setpoints; 0 = until Ctrl-C.")] = 0,

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from compd.cli.options import DEFAULT_SOCKET
+from compd.cli.paths import PathKind
 from compd.units import UM_PER_MM
 
 # Timeout (s) of the answer: the daemon averages the gauges for a second, and a slow disk takes time.
@@ -18,7 +19,9 @@ _SHOWN = 9
 
 def zero(
     address: Annotated[
-        str, typer.Argument(help="The daemon's Unix socket, or the configuration (YAML) that names it.")
+        str,
+        typer.Argument(help="The daemon's Unix socket, or the configuration (YAML) that names it."),
+        PathKind.NAME_OR_FILE,
     ] = DEFAULT_SOCKET,
     yes: Annotated[
         bool, typer.Option("--yes", help="Do not ask about gauges that are distrusted or far from the previous zero.")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from compd.cli.options import EffectsOption, HoldOption, MachineOption, OverwriteOption, RangesOption
+from compd.cli.paths import PathKind
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -50,7 +51,7 @@ def list_effects(effects: EffectsOption = None) -> None:
 
 @effect.command()
 def show(
-    name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP)],
+    name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP), PathKind.NAME_OR_FILE],
     machine: Annotated[
         Path | None, typer.Option("--machine", help="Machine configuration (YAML); default: the shipped tripod.")
     ] = None,
@@ -81,7 +82,7 @@ def show(
 
 @effect.command()
 def add(
-    name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP)],
+    name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP), PathKind.NAME_OR_FILE],
     recording: RecordingOption,
     model: ModelOption,
     machine: MachineOption = None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from compd.cli.options import EffectsOption, OverwriteOption
+from compd.cli.paths import PathKind
 from compd.fleet import MachinesBy
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ PlacesArgument = Annotated[
         help="Where the recordings are: directories, with all below them, or patterns in quotes: 'data/2026-*/*.csv'; "
         "'data/{machine}_*.csv' where the file's name says which machine it is.",
     ),
+    PathKind.ANY,
 ]
 MachinesOption = Annotated[
     list[str] | None,
@@ -40,6 +42,7 @@ MachinesOption = Annotated[
         help="The configuration of a machine outside compd's, for the recordings that name it; or a "
         "pattern of several ('machines/*.yaml'). May be repeated.",
     ),
+    PathKind.ANY,
 ]
 ModelsOption = Annotated[
     list[str] | None,
@@ -49,6 +52,7 @@ ModelsOption = Annotated[
         help="A model file, for the recordings of its machine; or a pattern: 'models/{machine}.yaml' where machines "
         "that are built alike have a model each. May be repeated.",
     ),
+    PathKind.ANY,
 ]
 MachinesByOption = Annotated[
     MachinesBy,
@@ -141,6 +145,7 @@ def report(
             help="The table that `compd fleet diagnose` or `compd fleet compare` wrote; or recordings, which are "
             "diagnosed first.",
         ),
+        PathKind.ANY,
     ],
     html: Annotated[Path, typer.Option("--html", help="The page to write; works offline.")] = Path("fleet.html"),
     out: OutOption = Path("fleet.parquet"),

@@ -7,12 +7,16 @@ from typing import Annotated
 
 import typer
 
+from compd.cli.paths import PathKind
+
 NO_FAULT = "none"
 
 
 def fault(
     simulation: Annotated[
-        Path, typer.Argument(metavar="DIRECTORY", help="The directory that `compd simulate` runs in.")
+        Path,
+        typer.Argument(metavar="DIRECTORY", help="The directory that `compd simulate` runs in."),
+        PathKind.FOLDER,
     ],
     line: Annotated[str | None, typer.Argument(help="The line's name in the configuration; default: list all.")] = None,
     kind: Annotated[

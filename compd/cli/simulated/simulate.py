@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from compd.cli.paths import PathKind
+
 if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
@@ -23,6 +25,7 @@ def simulate(
     directory: Annotated[
         Path | None,
         typer.Option(help="Directory of ports, sockets and the daemon's configuration; default: a new one."),
+        PathKind.FOLDER,
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Random seed of weather, joints and points.")] = 1,
     speedup: Annotated[float, typer.Option(min=0.001, max=100_000, help="Speed-up of weather and warm-up.")] = 1.0,

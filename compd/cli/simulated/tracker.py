@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from compd.cli.options import OverwriteOption
+from compd.cli.paths import PathKind
 from compd.instruments import LENGTH_AXES, POSITION_AXES, written_forms
 from compd.units import UM_PER_MM
 
@@ -30,7 +31,7 @@ _REST_S = 0.5
 
 
 def tracker(
-    simulation: Annotated[Path, typer.Argument(help="The directory that `compd simulate` runs in.")],
+    simulation: Annotated[Path, typer.Argument(help="The directory that `compd simulate` runs in."), PathKind.FOLDER],
     out: Annotated[Path, typer.Option(help="The export, for `compd join`.")],
     seconds: Annotated[
         float | None, typer.Option(min=1, help="End after this many seconds; default: at Ctrl-C.")

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from compd.cli.paths import PathKind
 from compd.errors import CompdError, Problem
 
 _ROOT = Path(__file__).parents[3]
@@ -18,7 +19,9 @@ _SUFFIXES = (".html", ".md")
 
 def docs(
     page: Annotated[
-        str, typer.Argument(help="A page by its name, such as effects or tutorials/missing-effect.")
+        str,
+        typer.Argument(help="A page by its name, such as effects or tutorials/missing-effect."),
+        PathKind.NAME_OR_FILE,
     ] = "index",
     path: Annotated[bool, typer.Option("--path", help="Print the page's path and open no browser.")] = False,
 ) -> None:

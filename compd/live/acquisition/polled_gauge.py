@@ -14,6 +14,7 @@ from compd.live.acquisition.gauge_trust import GaugeTrust, Judge
 from compd.live.acquisition.round_trigger import RoundBuffer, stamped
 from compd.live.memory import MAX_DETAIL, Latest
 from compd.pushed_gauge import Heard
+from compd.reading import is_reading
 
 log = structlog.get_logger()
 
@@ -245,5 +246,5 @@ def _check(reading: Reading, now_s: float) -> None:
     """Raises ValueError for an impossible reading, which is a defect of the driver."""
     if not reading.time_s <= now_s + MAX_CLOCK_AHEAD_S:
         raise ValueError(f"reading of time {reading.time_s}, it is {now_s}")
-    if reading.ok and not math.isfinite(reading.value):
+    if reading.ok and not is_reading(reading.value):
         raise ValueError(f"{reading.value} given as ok")

@@ -29,7 +29,9 @@ def entries(section: str) -> Iterator[Any]:
 @pytest.mark.parametrize("entry", list(entries("gauges")))
 def test_a_gauge_on_a_page(entry: dict[str, Any]) -> None:
     driver = load(GAUGES, entry["driver"], entry["driver"])
-    assert driver(driver.Options.model_validate(entry)).channels
+    made = driver(driver.Options.model_validate(entry))
+    assert made.channels
+    assert not list(made.doubts())
 
 
 @pytest.mark.parametrize("entry", list(entries("lines")))

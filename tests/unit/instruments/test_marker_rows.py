@@ -68,3 +68,10 @@ def test_a_length_of_nothing_is_a_length(tmp_path: Path) -> None:
     lengths = "".join(f"{k}.5,{100 + k}.25\n" for k in range(20))
     assert len(read(tmp_path, f"time_s,length_mm\n20.5,0\n21.5,0\n{lengths}").values) == 22
     assert len(read(tmp_path, f"time_s,length_mm\n20.5,-9999\n{lengths}").values) == 20
+
+
+@pytest.mark.parametrize("word", ["9.9E37", "-9.9E+37", "9.91E37", "3.4028235e+38"])
+def test_what_scpi_sends_for_no_number_is_no_measurement(tmp_path: Path, word: str) -> None:
+    assert len(read(tmp_path, points([f"{word},{word},{word}", f"2400.1,-950.3,{word}"])).values) == 20
+    lengths = "\n".join(f"{20 + i},{240 + i / 1000}" for i in range(20))
+    assert len(read(tmp_path, f"time_s,length_mm\n{lengths}\n50,{word}\n").values) == 20

@@ -49,6 +49,8 @@ MISTAKES: dict[str, tuple[Edit, list[str]]] = {
     "NaN": (set_cell(3, "pressure_hPa", "NaN"), ["missing value", "'NaN'"]),
     "inf": (set_cell(3, "pressure_hPa", "inf"), ["not a finite number"]),
     "too large": (set_cell(3, "pressure_hPa", "1e999"), ["not a finite number"]),
+    "SCPI's infinity": (set_cell(3, "pressure_hPa", "-9.9E37"), ["row 3: stands for no number", "empty the cell"]),
+    "SCPI's not-a-number": (set_cell(7, "reference_x_mm", "9.91E37"), ["row 7: stands for no number"]),
     "a date": (set_cell(3, "time_s", "2026-11-20 12:00:01"), ["column time_s (A), row 3: a date", "=(A2-A$2)*86400"]),
     "a time of day": (set_cell(3, "time_s", "12:00:01"), ["a time of day"]),
     "unit in a cell": (set_cell(3, "temperature_room_degC", "20.1 °C"), ["a unit behind the number", "20.1 °C"]),
