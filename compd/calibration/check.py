@@ -109,6 +109,7 @@ def check_calibration(
     use, C = _known(calibration, parameters, all(one.target is not None for one in learned))
     free = np.isin(np.arange(len(parameters.names)), use)
     outlier = unexplained_poses([now], [sigma_mm], np.zeros(len(free)), parameters, free)[0]
+    now = poses.now(calibration.fitted, outlier)
     part = whitened_poses(now, now.use & ~outlier, sigma_mm)
     both = without(np.column_stack([part.J, part.z]), part.R)
     J, d = both[:, :-1][:, use], both[:, -1]

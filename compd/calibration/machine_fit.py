@@ -97,7 +97,7 @@ def fit_machine(
     sigmas = [] if start is None else list(start.sigma_mm)
     x = result.x
     for turn in range(_ROUNDS):
-        x, now = _reaching(recordings, parameters, blocks, result.x, x)
+        x, now = _reaching(recordings, parameters, blocks, result.x, x, out)
         result = result._replace(x=x)
         rows = [one.use & ~left for one, left in zip(now, out, strict=True)]
         if start is None:
@@ -118,13 +118,19 @@ def fit_machine(
 
 
 def _reaching(
-    recordings: Sequence[MeasuredPoses], parameters: Parameters, blocks: list[int], x: FloatArray, before: FloatArray
+    recordings: Sequence[MeasuredPoses],
+    parameters: Parameters,
+    blocks: list[int],
+    x: FloatArray,
+    before: FloatArray,
+    left_out: Sequence[BoolArray],
 ) -> tuple[FloatArray, list[PosesNow]]:
     """The numbers x (P,) in tolerances and the poses with them; halfway back to those before as long as a machine with
     such numbers has no pose in most of the rows: the step was too long for derivatives."""
     none = np.zeros((len(x), len(x)))
     while True:
-        now = [one.now(parameters.split(x * parameters.prior_std, none, blocks)) for one in recordings]
+        fitted = parameters.split(x * parameters.prior_std, none, blocks)
+        now = [one.now(fitted, out) for one, out in zip(recordings, left_out, strict=True)]
         most = all(2 * own.use.sum() >= one.use.sum() for own, one in zip(now, recordings, strict=True))
         if most or np.abs(x - before).max(initial=0.0) < _SETTLED:
             return x, now

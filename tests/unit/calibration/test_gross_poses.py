@@ -89,6 +89,17 @@ def test_gross_poses_of_a_machine_are_named_and_no_good_one(kind: str, poses: in
         assert found == gross
 
 
+def test_errors_of_50_mm_turn_neither_the_frame_nor_the_numbers(tmp_path: Path) -> None:
+    rng = np.random.default_rng(9)
+    world = built(drawing("3-spr", tmp_path), rng)
+    off = {7: 50.0, 11: 48.0, 13: -50.0, 14: 55.0, 34: 51.0}
+    learned = compd.open_recording(record(tmp_path / "monday.csv", world, rng, 40, gross_mm=off))
+    other = compd.open_recording(record(tmp_path / "other.csv", world, rng, 40, noise=0.0))
+    result = compd.calibrate(learned, other)
+    assert [pose.row - 2 for pose in result.gross] == list(off)
+    assert result.sealed[0].after_rms_um < 0.5 * 1e3 * NOISE_MM
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_of_20_machines_of_each_kind_the_gross_poses_of_19_are_named(kind: str, tmp_path: Path) -> None:
