@@ -19,7 +19,7 @@ from compd.arrays import FloatArray, IntArray, rms
 from compd.calibration.calibration import Calibration, PoseErrors
 from compd.calibration.criteria import CalibrationCriteria
 from compd.calibration.jacobian import without
-from compd.calibration.machine_fit import declared_mm, gross_rows, registered_mm, scatter_mm, whitened_poses
+from compd.calibration.machine_fit import declared_mm, registered_mm, scatter_mm, unexplained_poses, whitened_poses
 from compd.calibration.parameters import Parameters, calibration_parameters
 from compd.calibration.pose_errors import errors_alone
 from compd.calibration.poses import MeasuredPoses, PosesNow, links_of_pose
@@ -106,10 +106,12 @@ def check_calibration(
         poses = replace(poses, to_links=to_links)
     now = poses.now(calibration.fitted)
     sigma_mm = _sigma_mm(calibration, learned[0], now)
-    outlier = gross_rows(now, registered_mm(now, now.use, sigma_mm)[0] / sigma_mm)
+    use, C = _known(calibration, parameters, all(one.target is not None for one in learned))
+    free = np.isin(np.arange(len(parameters.names)), use)
+    outlier = unexplained_poses([now], [sigma_mm], np.zeros(len(free)), parameters, free)[0]
+    now = poses.now(calibration.fitted, outlier)
     part = whitened_poses(now, now.use & ~outlier, sigma_mm)
     both = without(np.column_stack([part.J, part.z]), part.R)
-    use, C = _known(calibration, parameters, all(one.target is not None for one in learned))
     J, d = both[:, :-1][:, use], both[:, -1]
     unit = (parameters.prior_std * parameters.per_theta)[use]
     dof = len(d) - part.R.shape[1]

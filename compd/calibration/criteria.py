@@ -83,6 +83,18 @@ class CalibrationCriteria:
         meaning="what is left takes the place of the declared noise where it contradicts it with this confidence",
         reason="one recording in a hundred that is as noisy as declared is weighed by its own scatter",
     )
+    gross_chance: float = threshold(
+        0.001,
+        unit="1",
+        meaning="probability that a recording with normal noise has a pose that is left out as gross",
+        reason="a good pose in a thousand recordings is lost; for 40 poses the limit is near five standard deviations",
+    )
+    gross_share: float = threshold(
+        0.2,
+        unit="1",
+        meaning="share of the poses that may be gross",
+        reason="a choice: where more poses disagree, the machine has something that its numbers lack",
+    )
     much_left: float = threshold(
         3.0,
         unit="1",

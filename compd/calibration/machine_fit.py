@@ -16,6 +16,7 @@ from scipy.special import fdtri
 from compd.arrays import BoolArray, FloatArray, rms
 from compd.calibration.block_sets import BlockSets
 from compd.calibration.criteria import CalibrationCriteria
+from compd.calibration.gross_poses import PoseRows, gross_poses
 from compd.calibration.parameters import Parameters
 from compd.calibration.poses import MeasuredPoses, PosesNow, links_of_pose
 from compd.calibration.prior_fit import Normal, PriorFit, Whitened, fit_with_prior, normal_equations
@@ -26,8 +27,9 @@ from compd.units import UM_PER_MM
 _ROUNDS = 12
 # A change of the numbers, in tolerances, that ends the rounds.
 _SETTLED = 1e-4
-# A change, in tolerances, from which on outliers are sought: what numbers still explain makes none.
-_NEAR = 0.05
+# Gross poses are sought from this change on, in tolerances, or from this round on, which gross poses may keep from
+# settling: derivatives far from the result make good poses gross.
+_NEAR, _LATE = 0.05, 4
 # Share of the measured values that count as degrees of freedom where a fit has nearly as many numbers.
 _FEWEST_SHARE = 0.1
 # Rounds in which the weights of lengths and angles settle.
@@ -94,8 +96,8 @@ def fit_machine(
     numbers = float(free.sum()) / len(recordings)
     sigmas = [] if start is None else list(start.sigma_mm)
     x = result.x
-    for _ in range(_ROUNDS):
-        x, now = _reaching(recordings, parameters, blocks, result.x, x)
+    for turn in range(_ROUNDS):
+        x, now = _reaching(recordings, parameters, blocks, result.x, x, out)
         result = result._replace(x=x)
         rows = [one.use & ~left for one, left in zip(now, out, strict=True)]
         if start is None:
@@ -106,11 +108,8 @@ def fit_machine(
         change = float(np.abs(new.x - result.x).max(initial=0.0))
         result = new
         found = out
-        if outlier is None and change < _NEAR:
-            found = [
-                gross_rows(one, registered_mm(one, use, sigma)[0] / sigma)
-                for one, use, sigma in zip(now, rows, sigmas, strict=True)
-            ]
+        if outlier is None and (change < _NEAR or turn >= _LATE):
+            found = unexplained_poses(now, sigmas, result.x, parameters, free, sets)
         same = all((a == b).all() for a, b in zip(found, out, strict=True))
         out = found
         if change < _SETTLED and same:
@@ -119,26 +118,66 @@ def fit_machine(
 
 
 def _reaching(
-    recordings: Sequence[MeasuredPoses], parameters: Parameters, blocks: list[int], x: FloatArray, before: FloatArray
+    recordings: Sequence[MeasuredPoses],
+    parameters: Parameters,
+    blocks: list[int],
+    x: FloatArray,
+    before: FloatArray,
+    left_out: Sequence[BoolArray],
 ) -> tuple[FloatArray, list[PosesNow]]:
     """The numbers x (P,) in tolerances and the poses with them; halfway back to those before as long as a machine with
     such numbers has no pose in most of the rows: the step was too long for derivatives."""
     none = np.zeros((len(x), len(x)))
     while True:
-        now = [one.now(parameters.split(x * parameters.prior_std, none, blocks)) for one in recordings]
+        fitted = parameters.split(x * parameters.prior_std, none, blocks)
+        now = [one.now(fitted, out) for one, out in zip(recordings, left_out, strict=True)]
         most = all(2 * own.use.sum() >= one.use.sum() for own, one in zip(now, recordings, strict=True))
         if most or np.abs(x - before).max(initial=0.0) < _SETTLED:
             return x, now
         x = (x + before) / 2
 
 
-def gross_rows(now: PosesNow, left: FloatArray) -> BoolArray:
-    """(N,) rows with an error (N, w), in standard deviations, that neither the others nor the noise explain.
+def unexplained_poses(
+    now: Sequence[PosesNow],
+    sigmas: Sequence[FloatArray],
+    x: FloatArray,
+    parameters: Parameters,
+    free: BoolArray,
+    sets: BlockSets | None = None,
+) -> list[BoolArray]:
+    """(N,) gross poses of each recording, which no repeat of the same visit confirms.
 
-    Of few rows the fit takes most of the scatter, so that the scatter alone would make outliers.
+    They come from the linear problem about the numbers x (P,), in which those `free` (P,) are fitted.
+    sigmas : (w,) noise of each recording.  sets : as of `fit_machine`.
     """
-    far = np.abs(left).max(axis=1) > now.aligned.criteria.outlier_sigmas
-    return np.asarray(now.poses.aligned.outliers(left, now.use) & far)
+    block_of = parameters.block_of[free]
+
+    def precision(normal: Normal) -> FloatArray:
+        own = fit_with_prior(normal, block_of, np.ones(len(block_of), dtype=bool)) if sets is None else sets
+        return np.diag(1 / own.scale[block_of] ** 2)
+
+    gross = gross_poses([_pose_rows(*one, x, free) for one in zip(now, sigmas, strict=True)], precision)
+    return [_unconfirmed(*one) for one in zip(now, sigmas, gross, strict=True)]
+
+
+def _pose_rows(now: PosesNow, sigma_mm: FloatArray, x: FloatArray, free: BoolArray) -> PoseRows:
+    residual_mm, registration_mm, columns_mm = now.weighed
+    sections = _sections(now, len(sigma_mm))
+    stated = declared_mm(now, len(sigma_mm)) / sigma_mm
+    J = columns_mm / sigma_mm[:, None]
+    return PoseRows(
+        residual_mm / sigma_mm + J @ x,
+        J[:, :, free],
+        registration_mm / sigma_mm[:, None],
+        now.use,
+        tuple(sections),
+        np.array([rms(stated[part]) for part in sections]),
+    )
+
+
+def _unconfirmed(now: PosesNow, sigma_mm: FloatArray, gross: BoolArray) -> BoolArray:
+    left = registered_mm(now, now.use & ~gross, sigma_mm)[0] / sigma_mm
+    return now.poses.aligned.unconfirmed(gross, left, now.use)
 
 
 def registered_mm(now: PosesNow, use: BoolArray, sigma_mm: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:

@@ -19,7 +19,7 @@ from compd.units import UM_PER_MM
 
 def errors_alone(what: str, poses: MeasuredPoses, fitted: tuple[FittedEffect, ...], outlier: BoolArray) -> PoseErrors:
     """Of one recording, registered by itself: as drawn, and with these effects. outlier : (N,) rows left out."""
-    before, after = poses.now(()), poses.now(fitted)
+    before, after = poses.now((), outlier), poses.now(fitted, outlier)
     use = before.use & after.use & ~outlier
     left = [registered_mm(now, use)[1] for now in (before, after)]
     return _errors(what, [(before, use, left[0], left[1])])

@@ -44,13 +44,16 @@ class MeasuredPoses:
         use = aligned.usable.mask & np.isfinite(columns_mm).all(axis=(1, 2))
         return cls(aligned, parameters, columns_mm, use)
 
-    def now(self, fitted: Sequence[FittedEffect]) -> PosesNow:
-        """What is left with these effects, the instrument registered to their prediction, and its derivatives there."""
+    def now(self, fitted: Sequence[FittedEffect], left_out: BoolArray | None = None) -> PosesNow:
+        """What is left with these effects, the instrument registered to their prediction, and its derivatives there.
+
+        left_out : (N,) poses to which it is not registered.
+        """
         aligned, model = self.aligned, self.aligned.model
         assert model is not None
         added = sum_deltas([effect_deltas(one, aligned.rows)[0] for one in fitted])
         prediction = predict(model, aligned.rows, added)
-        aligned = _with_shown_place(aligned_with(aligned, prediction), prediction)
+        aligned = _with_shown_place(aligned_with(aligned, prediction, left_out), prediction, left_out)
         residual_mm = aligned.measured_mm - aligned.predicted_mm(added)
         registration_mm = aligned.registration_columns
         columns_mm = self.columns_mm
@@ -85,7 +88,9 @@ class PosesNow:
         return (T @ residual_mm[:, :, None])[:, :, 0], T @ self.registration_mm, T @ self.columns_mm
 
 
-def _with_shown_place(aligned: AlignedRecording, prediction: Prediction) -> AlignedRecording:
+def _with_shown_place(
+    aligned: AlignedRecording, prediction: Prediction, left_out: BoolArray | None
+) -> AlignedRecording:
     """The recording with the place of its target wherever the tilts of the prediction show it beyond their error.
 
     A machine whose platform only shifts tilts by its errors: a target 30 mm from the tip then moves by 20 um, which
@@ -98,7 +103,7 @@ def _with_shown_place(aligned: AlignedRecording, prediction: Prediction) -> Alig
     if motion >= aligned.criteria.min_target_motion:
         return aligned
     finer = replace(aligned, criteria=replace(aligned.criteria, min_target_motion=motion))
-    return replace(aligned_with(finer, prediction), criteria=aligned.criteria)
+    return replace(aligned_with(finer, prediction, left_out), criteria=aligned.criteria)
 
 
 def links_of_pose(aligned: AlignedRecording) -> FloatArray | None:

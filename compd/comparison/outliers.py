@@ -28,11 +28,17 @@ class OutlierLimits(NamedTuple):
 
     def outliers(self, residual_um: FloatArray, use: BoolArray, visit: IntArray | None) -> BoolArray:
         """(N,) outliers among the rows `use` (N,) of a residual (N, m); see `outlier_rows`."""
-        finite = np.isfinite(residual_um).all(axis=1)
-        times = self.times(residual_um)
-        outlier = use & finite & (times > 1.0)
+        finite, times = np.isfinite(residual_um).all(axis=1), self.times(residual_um)
+        return self.unconfirmed(np.asarray(use & finite & (times > 1.0)), residual_um, use, visit)
+
+    def unconfirmed(
+        self, outlier: BoolArray, residual_um: FloatArray, use: BoolArray, visit: IntArray | None
+    ) -> BoolArray:
+        """(N,) those of the outliers that no other row of their visit confirms."""
+        outlier = outlier.copy()
         if visit is None or self.near_um is None:
-            return np.asarray(outlier)
+            return outlier
+        finite, times = np.isfinite(residual_um).all(axis=1), self.times(residual_um)
         for row in np.flatnonzero(outlier & (visit >= 0) & (times <= self.lone)):
             others = np.flatnonzero(use & finite & (visit == visit[row]))
             distance_um = np.abs(residual_um[others[others != row]] - residual_um[row])

@@ -7,6 +7,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.data_fault import DataFault
 from compd.display_unit import format_error
+from compd.recording.visits import file_numbers
 
 # Why a row does not count of which nothing more is known.
 OUTLIER = "beyond all noise"
@@ -39,7 +40,7 @@ def outlier_faults(
         rows = outlier & np.isin(in_visit, lone)
         size = format_error(float(np.abs(away_um[rows]).max()), unit)
         what = (
-            f"the {rows.sum()} repeats of visit {lone[0]} agree and lie {size} from all else"
+            f"the {rows.sum()} repeats of visit {file_numbers(np.array(lone))[0]} agree and lie {size} from all else"
             if len(lone) == 1
             else f"{len(lone)} visits, of which the repeats agree, lie up to {size} from all else"
         )
@@ -96,8 +97,8 @@ def disagreeing_visits(
         of_visit = rows[begins[v] : begins[v] + counts[v]]
         usual_um = float(np.median(spread_um[repeated].max(axis=1)))
         what = (
-            f"the repeats of visit {visit[of_visit[0]]} differ by {format_error(spread_um[v].max(), unit)}, those of "
-            f"others by {format_error(usual_um, unit)}"
+            f"the repeats of visit {file_numbers(visit)[of_visit[0]]} differ by "
+            f"{format_error(spread_um[v].max(), unit)}, those of others by {format_error(usual_um, unit)}"
         )
         faults.append(DataFault("repeats that differ", tuple(sorted(row[of_visit].tolist())), (), what, "used"))
     return faults

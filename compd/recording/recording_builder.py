@@ -44,6 +44,7 @@ from compd.recording.recording import Recording
 from compd.recording.reference_faults import reference_faults
 from compd.recording.reflectors import check_reflectors, reflector_places_mm
 from compd.recording.sidecar import Sidecar, read_sidecar
+from compd.recording.visits import VisitNumbers, pose_mm
 from compd.tables import FIRST_ROW, ProblemList, Table, rows_text
 from compd.travel_direction import RowDirections
 from compd.units import UM_PER_MM
@@ -83,6 +84,7 @@ class RecordingBuilder:
         balls = sidecar.reference.balls if sidecar and sidecar.reference else None
         self._plate = None if balls is None else read_plate(balls, self._problems)
         self._directions = RowDirections()
+        self._visits = VisitNumbers()
         self._count = RowCount()
         self._last_row = FIRST_ROW - 1
         self._last_time_s = -math.inf
@@ -202,8 +204,22 @@ class RecordingBuilder:
         links = [f"link_{i}" for i in layout.links]
         if self._plate is not None and ball is not None:
             position = self._plate.positions_of_mm(ball)
+        model_mm, model_link_mm = in_mm("model", AXES), in_mm("model", links)
         commanded_mm = np.stack([columns.get(name, np.full(len(kept), np.nan)) for name in COMMANDED_COLUMNS], axis=1)
         distance_mm = columns.get(DISTANCE_COLUMN)
+        commanded_rad = stack(COMMANDED_ATTITUDE_COLUMNS) if layout.commanded else None
+        model_rad = stack(f"model_{axis}_rad" for axis in ATTITUDES)
+        poses_mm = (
+            scale_mm,
+            pose_mm(commanded_mm if layout.commanded else None, commanded_rad),
+            pose_mm(model_mm, model_rad),
+            model_link_mm,
+        )
+        place_mm = next((place for place in poses_mm if place is not None), None)
+        visit = ids("visit")
+        visit = None if visit is None else self._visits.of_block(visit, session, place_mm, places_mm)
+        if visit is not None and self._visits.again and not self._in_blocks:
+            warnings = (*warnings, self._visits_again())
         covariates, row = {name: columns[name] for name in layout.covariates}, table.row[kept]
         same_frame = sidecar.reference is not None and sidecar.reference.frame == "machine"
         counting = ~excluded[kept]
@@ -225,13 +241,13 @@ class RecordingBuilder:
             row=row,
             time_s=columns["time_s"],
             session=session,
-            visit=ids("visit"),
+            visit=visit,
             point=ids("point"),
             scale_mm=scale_mm,
             joint_mm=_to_mm(joint_um),
             frame_mm=_to_mm(frame_um),
             commanded_mm=commanded_mm if layout.commanded else None,
-            commanded_rotation_rad=stack(COMMANDED_ATTITUDE_COLUMNS) if layout.commanded else None,
+            commanded_rotation_rad=commanded_rad,
             approach=approach,
             approach_measured=layout.approach,
             quantities={name: without_wild(name, values, row, faults) for name, values in covariates.items()},
@@ -245,9 +261,9 @@ class RecordingBuilder:
             plate=self._plate,
             pin=ids("pin"),
             labels=table.labels,
-            model_mm=in_mm("model", AXES),
-            model_rotation_rad=stack(f"model_{axis}_rad" for axis in ATTITUDES),
-            model_link_mm=in_mm("model", links),
+            model_mm=model_mm,
+            model_rotation_rad=model_rad,
+            model_link_mm=model_link_mm,
             excluded=excluded[kept],
             left_out={reason: count for reason, count in left_out.items() if count},
             columns=columns,
@@ -255,6 +271,15 @@ class RecordingBuilder:
             begin_s=self._begin_s or 0.0,
             faults=tuple(faults),
             target_P_mm=places_mm,
+        )
+
+    def _visits_again(self) -> Problem:
+        return Problem(
+            where=f"{self._path} column `visit`",
+            what="numbers come back for rows in another session, at another place or after other visits",
+            value=f"{self._visits.again} numbers",
+            allowed="a visit has rows that follow each other in one session at one place; a return is another",
+            next_step="number the visits on from session to session, if all is to be unique",
         )
 
     def _blank_rows(self, table: Table) -> int:

@@ -4,7 +4,7 @@ the model."""
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -143,14 +143,15 @@ def record(
     wanted: Iterable[tuple[FloatArray, FloatArray]] | None = None,
     noise: float = 1.0,
     pose: bool = True,
-    gross_mm: dict[int, float] | None = None,
+    gross_mm: Mapping[int, float | FloatArray] | None = None,
+    gross_scale: Mapping[int, tuple[int, float]] | None = None,
     reflectors: dict[str, list[float]] | None = None,
 ) -> Path:
     """A recording in an instrument's frame, with a target of its own place and turn where it shows attitudes.
 
     noise : times `NOISE_MM` and `NOISE_RAD`.  pose : False for positions of the tip alone.  gross_mm : error of single
-    poses, by their place.  reflectors : places on the platform, each seen at every pose in place of the
-    tip.
+    poses, by their place, along x or in space.  gross_scale : of single poses a scale and its error, mm.
+    reflectors : places on the platform, each seen at every pose in place of the tip.
     """
     frame, body = Rotation.from_rotvec(rng.uniform(-1, 1, 3)), Rotation.from_rotvec(rng.uniform(-1, 1, 3))
     at, place_P = rng.uniform(-500, 500, 3), rng.uniform(-30, 30, 3) if pose else np.zeros(3)
@@ -158,8 +159,12 @@ def record(
     for reading, tip, R in poses(world, targets(world, rng) if wanted is None else wanted):
         for name, on_P in (reflectors or {"": place_P.tolist()}).items():
             seen = frame.apply(tip + R @ np.array(on_P)) + at + noise * NOISE_MM * rng.standard_normal(3)
-            seen = seen + np.array([(gross_mm or {}).get(len(lines), 0.0), 0.0, 0.0])
+            off_mm = (gross_mm or {}).get(len(lines), 0.0)
+            seen = seen + (np.array([off_mm, 0.0, 0.0]) if isinstance(off_mm, float) else off_mm)
             row = [*reading, *seen]
+            if len(lines) in (gross_scale or {}):
+                scale, error_mm = (gross_scale or {})[len(lines)]
+                row[scale] += error_mm
             if pose:
                 off = Rotation.from_rotvec(noise * NOISE_RAD * rng.standard_normal(3))
                 row += (off * frame * Rotation.from_matrix(R) * body).as_quat().tolist()

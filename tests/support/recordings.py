@@ -27,12 +27,15 @@ Edit = Callable[[str], str]
 
 
 def csv_text(rows: int = 20, separator: str = ",") -> str:
-    """`rows` rows of a tripod under HEADER: row r (spreadsheet) has time_s = 10 (r - 2)."""
+    """`rows` rows of a tripod under HEADER, two of each visit: row r (spreadsheet) has time_s = 10 (r - 2)."""
     rng = np.random.default_rng(7)
     lines = [separator.join(HEADER)]
+    scales_mm = np.zeros(3)
     for i in range(rows):
         cells = [str(10 * i), str(1 + i // 10), str(i // 2)]
-        cells += [f"{value:.6f}" for value in rng.uniform(-60, 60, 3)]
+        drawn_mm = rng.uniform(-60, 60, 3)
+        scales_mm = scales_mm if i % 2 else drawn_mm
+        cells += [f"{value:.6f}" for value in scales_mm]
         cells += [f"{value:.2f}" for value in rng.uniform(-9, 9, 18)]
         cells += ["20.104", "1013.25"]
         cells += [f"{value:.6f}" for value in rng.uniform(60, 90, 3)]

@@ -163,19 +163,22 @@ def align_observations(
     )
 
 
-def aligned_with(aligned: AlignedRecording, prediction: Prediction) -> AlignedRecording:
+def aligned_with(
+    aligned: AlignedRecording, prediction: Prediction, left_out: BoolArray | None = None
+) -> AlignedRecording:
     """The recording registered again, to a prediction of its rows with effects in place of that without any.
 
     An instrument's frame and its target's place are then as right as the prediction, and what is fitted along is small.
     Fixed balls and pins, links and what was measured in {M} stay as they are.
+    left_out : (N,) rows that place nothing.
     """
     if aligned.registration is None or aligned.ends is not None or aligned.model is None:
         return aligned
     rows = replace(aligned.rows, tip_M_mm=prediction.tip_mm, rotation_M_P=prediction.rotation_M_P)
-    again = align_observations(
-        aligned.recording, aligned.model, rows, aligned.geometry_hash, aligned.criteria, held=aligned.held
-    )
-    return replace(again, ranges=aligned.ranges)
+    recording = aligned.recording
+    placing = recording if left_out is None else replace(recording, excluded=recording.excluded | left_out)
+    again = align_observations(placing, aligned.model, rows, aligned.geometry_hash, aligned.criteria, held=aligned.held)
+    return replace(again, recording=recording, ranges=aligned.ranges)
 
 
 def _check_held(recording: Recording, model: MachineModel | None, held: frozenset[str]) -> None:

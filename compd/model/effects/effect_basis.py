@@ -23,6 +23,8 @@ from compd.reference_conditions import standard_value
 _ROWS_AT_ONCE = 4000
 # Rows, spread evenly, in which an effect in Python is asked whether quantities change it.
 _ROWS_TO_TRY = 8
+# A larger value, as of exp(300), counts as none: sums of its squares are infinite.
+_LARGEST = 1e100
 
 
 def port_sizes(links: int, joints: int, axes: int) -> dict[Port, int]:
@@ -83,6 +85,7 @@ def evaluate_basis(
             remembered,
             basis[chunk],
         )
+        basis[chunk][np.abs(basis[chunk]) > _LARGEST] = np.nan
     return basis, unpack_memory(program.states, remembered)
 
 

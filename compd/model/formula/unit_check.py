@@ -63,18 +63,29 @@ class Quantity(NamedTuple):
         unit = {base: self.unit.get(base, 0) + sign * other.unit.get(base, 0) for base in {**self.unit, **other.unit}}
         return Quantity(
             {base: power for base, power in unit.items() if power},
-            self.scale * other.scale**sign,
-            self.factor * other.factor**sign,
+            self.scale * _power(other.scale, sign),
+            self.factor * _power(other.factor, sign),
             self.names + other.names,
         )
 
     def to_the(self, power: float) -> Quantity:
         """A power of it."""
         unit = {base: exponent * power for base, exponent in self.unit.items() if exponent * power}
-        return Quantity(unit, self.scale**power, self.factor**power, self.names)
+        return Quantity(unit, _power(self.scale, power), _power(self.factor, power), self.names)
+
+
+def _power(value: float, power: float) -> float:
+    """nan where it is no real number."""
+    try:
+        result = value**power
+    except (ZeroDivisionError, OverflowError):
+        return math.nan
+    return result if isinstance(result, float) else math.nan
 
 
 _NUMBER = Quantity({}, 1.0, 1.0)
+# What numbers alone add up to: its factor is not followed.
+_UNKNOWN_NUMBER = Quantity({}, 1.0, math.nan)
 
 
 @cache
@@ -121,13 +132,15 @@ def unit_remarks(tree: ast.expr, units: Mapping[str, str], gives: str) -> list[s
         wanted = [read_unit(unit) for unit in dict.fromkeys((gives, *REFERENCE_UNITS))]
         fits = [unit for unit in wanted if unit is not None and dict(unit.unit) == dict(quantity.unit)]
         number = abs(quantity.factor)
+        if not (math.isfinite(number) and number and math.isfinite(quantity.scale) and quantity.scale):
+            continue
         others = " ".join(name for name in quantity.names if name not in units)
         if not fits:
             if number in _NEAR_ONE:
                 per = f" per {others}" if others else ""
                 remarks.append(f"{linear} is declared in {units[linear]}; by the formula it is in {gives}{per}")
             continue
-        power = math.log10(number) if number else 0.5
+        power = math.log10(number)
         if abs(power - round(power)) > 1e-9 and number not in _NEAR_ONE:
             continue
         ratios = [number * unit.scale / quantity.scale for unit in fits]
@@ -185,7 +198,7 @@ def _sum(left: Quantity | None, right: Quantity | None) -> Quantity | None:
         return None
     if not right.names or not left.names:
         with_unit = left if left.names else right
-        return with_unit if with_unit.names else Quantity({}, 1.0, math.nan)
+        return with_unit if with_unit.names else _UNKNOWN_NUMBER
     same = dict(left.unit) == dict(right.unit) and left.scale == right.scale and left.factor == right.factor
     return left if same else None
 

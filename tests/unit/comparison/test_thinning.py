@@ -21,7 +21,7 @@ def recording(path: Path, rows_of_visit: int = 1) -> AlignedRecording:
     columns = {"session": 1.0 + rows * 4 // ROWS, "temperature_bed_degC": 20 + rows / 100}
     if rows_of_visit > 1:
         columns["visit"] = 1.0 + rows // rows_of_visit
-    return record_external(path, columns, {"x": np.sin(rows / 50)}, model_mm={"x": rows / 10})
+    return record_external(path, columns, {"x": np.sin(rows / 50)}, model_mm={"x": rows // rows_of_visit / 10.0})
 
 
 def test_a_short_recording_stays_as_it_is(tmp_path: Path) -> None:

@@ -20,6 +20,9 @@ DECLARED_UM = 10.0
 
 def compared(directory: Path, residual_um: Floats, declared_um: float = DECLARED_UM, **columns: Floats) -> Comparison:
     place = np.random.default_rng(8).uniform(-100, 100, len(residual_um))
+    if "visit" in columns:
+        _, first, of_visit = np.unique(columns["visit"], return_index=True, return_inverse=True)
+        place = place[first][of_visit]
     reference = {"quantity": "tool_position", "frame": "machine", "sigma_um": declared_um}
     path = write_external(
         directory,
