@@ -108,6 +108,7 @@ class Server:
 
     @asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
+        self._workers.prepare()  # so that the first who opens a recording waits for no import
         tasks = [asyncio.create_task(self._link.run()), asyncio.create_task(self._broadcast.run())]
         yield
         self._workers.end()

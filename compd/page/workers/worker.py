@@ -68,7 +68,7 @@ class Starter(Protocol):
     starting: threading.Lock
 
     def prepare(self) -> None: ...
-    def make_room(self, wanting: Worker, token: Token | None) -> None: ...
+    def make_room(self, wanting: Worker, token: Token | None) -> list[Started]: ...
     def start(self, arguments: tuple[Any, ...]) -> Started: ...
 
 
@@ -165,12 +165,18 @@ class Worker:
 
     def rest(self) -> bool:
         """End the process unless it works on a question; return whether there is none now."""
+        ended = self.left()
+        for process in ended or ():
+            _wait_for_end(process)
+        return ended is not None
+
+    def left(self) -> list[Started] | None:
+        """As `rest`, without waiting: the process that is ending, if there was one; None where it works."""
         with self._changed:
             if self._current is not None:
-                return False
+                return None
             ended = self._detached()
-        _wait_for_end(ended)
-        return True
+        return [] if ended is None else [ended]
 
     def _answer_all(self) -> None:
         """Loop of the worker's thread: runs while there is a process, until it has been idle for a while."""
@@ -247,20 +253,22 @@ class Worker:
         _wait_for_end(ended)
         nice = VIEWERS_NICE if looks_only(asked.token) else NICE
         arguments = (self._opening, self._arguments, self.kept, self._limits.memory_mb, nice)
-        with self._starter.starting:
-            self._starter.make_room(self, asked.token)
+        with self._starter.starting:  # nobody waits here for the end of another's process
+            leaving = self._starter.make_room(self, asked.token)
             self.token = asked.token
-            if self._running is not None:
-                return self._running.messages, False
-            try:
-                running = self._starter.start(arguments)
-            except (OSError, EOFError) as error:  # the fork server has ended, or cannot fork
-                raise limited.none_left(self.name) from error
-            with self._changed:
-                self._running = running
-                if asked.is_cancelled:
-                    running.process.kill()
-        return running.messages, True
+            running, is_new = self._running, self._running is None
+            if running is None:
+                try:
+                    running = self._starter.start(arguments)
+                except (OSError, EOFError) as error:  # the fork server has ended, or cannot fork
+                    raise limited.none_left(self.name) from error
+                with self._changed:
+                    self._running = running
+                    if asked.is_cancelled:
+                        running.process.kill()
+        for process in leaving:
+            _wait_for_end(process)
+        return running.messages, is_new
 
     def _detached(self) -> Started | None:
         """Detach the process, which is being killed; call with `_changed` locked."""

@@ -135,7 +135,7 @@ class Workers:
 
     def prepare(self) -> None:
         """Start the process that workers are forked from, unless it runs. It imports what they need, which takes
-        seconds; this does not wait for it. Looking at the machine needs no worker."""
+        seconds; this does not wait for it."""
         with suppress(OSError):  # the start of a worker says it
             _STARTER.submit(self._ensure_running).result()
 
@@ -151,13 +151,14 @@ class Workers:
             self._workers.add(worker)
         return worker
 
-    def make_room(self, wanting: Worker, token: Token | None = None) -> None:
-        """End the least recently used idle process of each share of the token that is used up.
+    def make_room(self, wanting: Worker, token: Token | None) -> list[Started]:
+        """Kill the least recently used idle process of each share of the token that is used up; return these.
 
         Raises StateError if all processes of a share are busy.
         """
         with self._lock:
             workers = list(self._workers)
+        leaving: list[Started] = []
         for share in shares_of(token, self._most):
             running = [worker for worker in workers if worker.pid is not None and worker is not wanting]
             holding = sorted((w for w in running if share.holds(w.token)), key=lambda worker: worker.used_s)
@@ -165,9 +166,12 @@ class Workers:
             for worker in holding:
                 if excess <= 0:
                     break
-                excess -= worker.rest()
+                if (ended := worker.left()) is not None:
+                    leaving += ended
+                    excess -= 1
             if excess > 0:
                 raise too_many(wanting.name, share.most, share.whose)
+        return leaving
 
     def start(self, arguments: tuple[Any, ...]) -> Started:
         """Start a process. arguments : of `serve`, after the connection and the directory; call with `starting` held.

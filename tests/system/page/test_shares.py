@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -16,6 +17,7 @@ import pytest
 from tests.support.command import run_in_process
 from tests.support.event_stream import connected, cookie_of, host_of, request
 from tests.support.live_page import page_process, running_machine
+from tests.support.measured import gauges, hidden, record
 from tests.support.other_process import family
 from tests.system.page.test_workers import LATE_S, gaps
 
@@ -34,7 +36,9 @@ def page(tmp_path_factory):
     with running_machine() as (directory, _):
         recordings = directory / "recordings"
         recordings.mkdir()
-        run_in_process("campaign", str(directory / "tripod-cmm.yaml"), "--out", str(recordings / "run.csv"))
+        campaign = ("campaign", str(directory / "tripod-cmm.yaml"), "--hidden", "8")
+        run_in_process(*campaign, "--out", str(recordings / "run.csv"))
+        record(recordings, gauges(20_000, 1), [hidden("link_expansion", 5.0)], name="long")
         text = (recordings / "run.csv").read_bytes()
         (recordings / "large.csv").write_bytes(text * int(1 + RECORDING_BYTES // len(text)))
         tokens = directory / "tokens.yaml"
@@ -104,15 +108,19 @@ def worst(page):
 
 
 def test_live_events_are_in_time_and_an_operator_s_workbench_opens(page):
-    ask(page, "operate", "/workbench/open", {"recording": "run", "model": "first.model.yaml"})  # all is imported
+    def opened(model):
+        began_s = time.monotonic()
+        answer = ask(page, "operate", "/workbench/open", {"recording": "run", "model": f"{model}.model.yaml"})
+        assert answer.status == 200, answer.text
+        return time.monotonic() - began_s
+
+    first_s, quiet_s = opened("first"), opened("second")  # the first waits for what is imported
     with gaps(page.addresses["operate"]) as busy, worst(page):
         threading.Event().wait(2.0)  # the time over which is measured
-        began_s = time.monotonic()
-        answer = ask(page, "operate", "/workbench/open", {"recording": "run", "model": "m0.model.yaml"})
-        opened_s = time.monotonic() - began_s
+        opened_s = opened("m0")
         threading.Event().wait(1.0)
-    print(f"opened within {opened_s:.2f} s; the longest gap between live events is {max(busy):.3f} s")
-    assert answer.status == 200, answer.text
+    print(f"opened within {opened_s:.2f} s, {quiet_s:.2f} s in a quiet time, {first_s:.2f} s at first")
+    print(f"the longest gap between live events is {max(busy):.3f} s")
     assert opened_s < OPENS_WITHIN_S
     assert max(busy) < LATE_S
 
@@ -125,20 +133,19 @@ def until(fulfilled, within_s):
 
 
 def test_a_download_ends_with_its_browser(page):
-    def deleted():
-        links = [link for link in Path(f"/proc/{page.pid}/fd").iterdir() if link.is_symlink()]
-        return [str(link.readlink()) for link in links if "large" in str(link.readlink())]
+    def is_read():
+        files = Path(f"/proc/{page.pid}/fd").iterdir()
+        return any("large" in os.path.realpath(file) for file in files)
 
     connection = sent(page, "view", "GET", "/recordings/large")
-    until(deleted, PATIENCE_S)
+    until(is_read, PATIENCE_S)
     connection.close()
-    until(lambda: not deleted(), ENDED_WITHIN_S)
+    until(lambda: not is_read(), ENDED_WITHIN_S)
 
 
 def test_a_diagnosis_ends_with_its_browser(page):
-    key = json.loads(
-        ask(page, "view", "/workbench/open", {"recording": "run", "model": "d.model.yaml"}).text.splitlines()[-1]
-    )["key"]
+    key = "long/d.model.yaml"
+    assert ask(page, "view", "/workbench/open", {"recording": "long", "model": "d.model.yaml"}).status == 200
     before = family(page.pid)
     assert ask(page, "view", f"/workbench/{key}/diagnosis", {}).status == 200
     until(lambda: family(page.pid) - before, PATIENCE_S)
@@ -146,7 +153,5 @@ def test_a_diagnosis_ends_with_its_browser(page):
     with sent(page, "view", "GET", f"/workbench/{key}/diagnosis?follow"):
         pass
     until(lambda: process not in family(page.pid), ENDED_WITHIN_S)
-    state = json.loads(
-        request(page.origin, "GET", f"/workbench/{key}/diagnosis", page.headers["view"]).text.splitlines()[-1]
-    )
-    assert state["state"] == "cancelled"
+    answer = request(page.origin, "GET", f"/workbench/{key}/diagnosis", page.headers["view"])
+    assert '"cancelled"' in answer.text
