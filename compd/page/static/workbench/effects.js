@@ -1,5 +1,5 @@
 // The effects of the library, the one that explains most first; chosen by mouse, or by j and k.
-import { element, micro } from "../format.js";
+import { amounts, element } from "../format.js";
 
 export class Effects {
   // choose: called with an effect; ranked: called with the server's ranking
@@ -88,6 +88,6 @@ export class Effects {
 
   // The error left by an effect, tried alone.
   left(status, why, rms) {
-    return status === "partial" || status === "explains" ? `alone, leaves ${rms.toFixed(2)} ${micro(this.unit)}` : why;
+    return status === "partial" || status === "explains" ? `alone, leaves ${amounts([rms], this.unit)}` : why;
   }
 }

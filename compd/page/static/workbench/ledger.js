@@ -1,6 +1,6 @@
 // The model: its numbers, its steps as a staircase of the error, and the way back.
 import { CommandLine } from "../command_line.js";
-import { element, ink, micro, prepared } from "../format.js";
+import { amounts, element, ink, micro, prepared } from "../format.js";
 import { Proposal } from "./proposal.js";
 import { stroke } from "./ticks.js";
 
@@ -30,7 +30,7 @@ export class Ledger {
     this.place.replaceChildren(
       element("h2", {}, "Model ", element("small", {}, model)),
       canvas,
-      table(ledger.map((step) => [`${step.kind}${step.undone ? ", undone" : ""}`, words(step.effect), `${step.before.toFixed(2)} → ${step.after.toFixed(2)} ${micro(step.unit)}`])),
+      table(ledger.map((step) => [`${step.kind}${step.undone ? ", undone" : ""}`, words(step.effect), amounts([step.before, step.after], step.unit)])),
       table(numbers.map((entry) => [`${words(entry.effect)} ${entry.parameter}`, value(entry)]), numbers.map(({ plausible }) => !plausible)),
       ...(numbers.length ? [] : [element("p", { class: "note" }, "No effect yet.")]),
       element("div", { class: "row" }, this.button, ...fit, ...removals),
@@ -62,7 +62,7 @@ export class Ledger {
       context.setLineDash([4, 4]);
       stroke(context, "--soft", 8, y(floor), width - 8, y(floor));
       context.setLineDash([]);
-      context.fillText(`noise ${floor.toFixed(2)} ${micro(unit)}`, 10, y(floor) - 3);
+      context.fillText(`noise ${amounts([floor], unit)}`, 10, y(floor) - 3);
     }
     ledger.forEach((step, k) => context.fillText(`${step.kind === "add" ? "+" : step.kind === "remove" ? "−" : step.kind} ${words(step.effect)}`, x(k + 1) + 3, Math.max(11, y(errors[k + 1]) - 4)));
   }

@@ -1,5 +1,5 @@
 // Preview of a step of the model: the table old -> new, before it is written.
-import { element, micro } from "../format.js";
+import { amounts, element, micro } from "../format.js";
 
 const number = (value, digits = 4) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(digits))).replace("-", "−"));
 
@@ -27,7 +27,7 @@ export class Proposal {
       this.place.replaceChildren(
         element("div", { class: "consequence" },
           doubt,
-          element("p", {}, element("b", {}, `${outcome.rms[0].toFixed(2)} → ${outcome.rms[1].toFixed(2)} ${micro(outcome.unit)}`), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${outcome.verdict}`),
+          element("p", {}, element("b", {}, amounts(outcome.rms, outcome.unit)), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${outcome.verdict}`),
           ...(outcome.differ ? [element("p", { class: "note" }, `Both errors are ${outcome.differ}.`)] : []),
           element("div", { class: "numbers", tabindex: 0, role: "region", "aria-label": "Numbers of the model" }, element("table", {}, element("thead", {}, element("tr", {}, ...["number", "was", "will be", "unit"].map((head) => element("th", {}, head)))), element("tbody", {}, ...rows))),
           ...(outcome.gone.length ? [element("p", {}, `Gone: ${outcome.gone.join(", ")}`)] : []),

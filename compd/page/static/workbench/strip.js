@@ -1,6 +1,6 @@
 // The large numbers on top: the fall of the error from the machine without any effect to the model and to the trial,
 // the error on rows left out, and the noise.
-import { element, micro } from "../format.js";
+import { amounts, element, micro } from "../format.js";
 
 // Most quantities listed as followed by the residual.
 const MAX_TRENDS = 3;
@@ -38,9 +38,9 @@ export class Strip {
     const { rms, fall, floor, floor_known, unit, rows, used, numbers } = summary;
     const [start, now] = numbers.length ? fall.rms : [rms, rms];
     const lowest = tried_rms ?? now;
-    const big = (value, text, name = "") => element("div", { class: name }, element("b", {}, value === null || value === undefined ? "–" : `${value.toFixed(2)} ${micro(unit)}`), element("small", {}, text));
+    const big = (value, text, name = "") => element("div", { class: name }, element("b", {}, value === null || value === undefined ? "–" : amounts([value], unit)), element("small", {}, text));
     const path = [start, ...(numbers.length ? [now] : []), ...(tried_rms === null ? [] : [tried_rms])];
-    const text = `${path.map((value) => value?.toFixed(2) ?? "–").join(" → ")} ${micro(unit)}`;
+    const text = amounts(path, unit);
     const states = ["without effects", "with the model", "tried"].filter((_, k) => [true, numbers.length > 0, tried_rms !== null][k]).join(" → ");
     this.numbers.replaceChildren(
       ...(path.length > 1 ? [element("div", { class: "fall" }, element("b", {}, text), element("small", {}, `${states}${numbers.length && fall.differ ? `; ${fall.differ}` : ""}`))] : []),
