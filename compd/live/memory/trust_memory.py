@@ -146,7 +146,7 @@ class TrustMemory:
             self.power_lost[i] = 1.0
 
     def needs_person(self, i: int) -> bool:
-        """Whether a person has to accept channel `i`, or will have to when it is back: the machine has moved meanwhile."""
+        """Whether a person has to accept channel `i`, or will have to when it is back, as the machine has moved."""
         if Doubt(int(self.doubt[i])).until_accepted:
             return True
         n = self.lengths

@@ -131,8 +131,8 @@ class ChannelStatusKeys(Keys):
     )
     needs_person: bool | None = Field(
         default=None,
-        description="true where a person has to accept it: now, or when it is back, because the machine has moved since "
-        "its last reading; absent otherwise",
+        description="true where a person has to accept it: now, or when it is back, because the machine has moved "
+        "since its last reading; absent otherwise",
     )
 
 

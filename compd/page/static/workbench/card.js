@@ -26,11 +26,13 @@ export class Card {
     const { bench } = this;
     this.card = bench.trial = null;
     bench.tried(null);
+    bench.trying = effect;
     return bench.attempt(async () => {
       const card = await bench.get(`effects/${effect}`);
       Object.assign(this, { card, variant: 0, theta: card.numbers.map(() => 0), trials: new Map() });
       this.show(bench.summary.commands.add.replace("EFFECT", () => card.named));
       if (!card.variants.length) return;
+      void bench.doubtOf(effect).catch(() => {}); // whether the rows support it is shown with the trial
       await this.restore();
       // the other choices of its constants, so that they follow the slider, too
       for (let k = 1; k < card.variants.length && this.card === card; k++) await this.trial(k);

@@ -13,6 +13,11 @@ export class Proposal {
     this.place.replaceChildren();
   }
 
+  confirm(bench, step, warning) {
+    if (warning) bench.doubted.add(`${bench.key} ${step.effect}`);
+    return bench.change("step", step);
+  }
+
   // Show the preview of a step; it can be made once the rows left out have told whether they support what is added.
   show(bench, step, verb) {
     this.shown = step;
@@ -27,7 +32,7 @@ export class Proposal {
       this.place.replaceChildren(
         element("div", { class: "consequence" },
           doubt,
-          element("p", {}, element("b", {}, amounts(outcome.rms, outcome.unit)), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${outcome.verdict}`),
+          element("p", {}, element("b", { class: outcome.rms[1] > outcome.rms[0] ? "worse" : "" }, amounts(outcome.rms, outcome.unit)), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${outcome.verdict}`),
           ...(outcome.differ ? [element("p", { class: "note" }, `Both errors are ${outcome.differ}.`)] : []),
           element("div", { class: "numbers", tabindex: 0, role: "region", "aria-label": "Numbers of the model" }, element("table", {}, element("thead", {}, element("tr", {}, ...["number", "was", "will be", "unit"].map((head) => element("th", {}, head)))), element("tbody", {}, ...rows))),
           ...(outcome.gone.length ? [element("p", {}, `Gone: ${outcome.gone.join(", ")}`)] : []),
@@ -39,7 +44,7 @@ export class Proposal {
       const warning = await Promise.resolve(doubted).finally(() => asking.remove());
       if (this.shown !== step) return;
       if (warning) doubt.replaceChildren(element("p", { class: "warning", role: "alert" }, element("b", {}, "Not supported by these rows. "), warning));
-      const confirm = element("button", { type: "button", id: "confirm", onclick: () => bench.attempt(() => bench.change("step", step)) }, warning ? `${verb} all the same` : verb);
+      const confirm = element("button", { type: "button", id: "confirm", onclick: () => bench.attempt(() => this.confirm(bench, step, warning)) }, warning ? `${verb} all the same` : verb);
       last.prepend(confirm);
       if (!warning) confirm.focus({ preventScroll: true });
       this.place.scrollIntoView({ block: "nearest" });
