@@ -196,10 +196,11 @@ def gauges(readings: Event, columns: list[dict[str, Any]], status: Event | None 
 
     `value` : a length in mm since machine zero, or another quantity in its unit; absent where there is none, or no
     machine zero to count from.  `age_s` : of a value.  `fault` : why there is none, or why it must not be used.
-    `warning` : what the newest STATUS says that is to be looked at.
+    `warning` : what the newest STATUS says that is to be looked at.  `needs_person` : as it says.
     """
     said = () if status is None else status["gauges"]
-    warnings = {channel["channel"]: channel["warning"] for channel in said if "warning" in channel}
+    keys = ("warning", "needs_person")
+    told = {channel["channel"]: {key: channel[key] for key in keys if key in channel} for channel in said}
     zero = readings.get("zero", {}).get("readings_mm", {})
     gauges: list[dict[str, Any]] = []
     for column in columns:
@@ -218,9 +219,7 @@ def gauges(readings: Event, columns: list[dict[str, Any]], status: Event | None 
             gauge["fault"] = reading["quality"]
             if "detail" in reading:
                 gauge["detail"] = reading["detail"]
-        if column["channel"] in warnings:
-            gauge["warning"] = warnings[column["channel"]]
-        gauges.append(gauge)
+        gauges.append(gauge | told.get(column["channel"], {}))
     return gauges
 
 

@@ -29,6 +29,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from compd.clock import Clock, MonotonicClock
 from compd.live.service import WRONG_TOKEN_REST_S
 from compd.page.limited_protocol import LimitedProtocol
+from compd.page.shares import ASKER
 
 # Most waiting addresses. Beyond it all addresses wait, since they belong to one attacker.
 _MAX_ADDRESSES = 256
@@ -156,6 +157,7 @@ class Guard:
             refusal = self._foreign(request) or await self._of_token(request) or self._without_token(request)
             if refusal is not None:
                 refusal.headers["Connection"] = "close"  # further messages are ignored
+            ASKER.set(scope.get("token"))
             await (refusal or self._app)(scope, receive, _with_headers(send))
         except ClientDisconnect:
             return  # it left while sending: an answer has no receiver

@@ -7,15 +7,14 @@ import re
 import shlex
 import signal
 import sys
-import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 from compd.live.record import CYCLES_SUFFIX, MODEL_MARK
+from compd.page.downloads import zipped
 from compd.recording import ARROW
 from compd.table_file import SUFFIXES
 
@@ -24,7 +23,6 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 # Further files of a recording, downloaded with its table besides `CYCLES_SUFFIX` and copies of models.
 SIDECAR = ".yaml"
 _END_WITHIN_S = 10.0
-_PIECE_BYTES = 1 << 16
 
 
 @dataclass
@@ -107,12 +105,9 @@ class Recordings:
                 await self._watching
 
     def archive(self, name: str) -> Iterator[bytes] | None:
-        """A part with its sidecar and the files of a replay, as pieces of a zip file; None for an unknown part.
-
-        It is made in a temporary file: a recording may be larger than the memory.
-        """
+        """A part with its sidecar and the files of a replay, as pieces of a zip file; None for an unknown part."""
         paths = self._files_of(name)
-        return _zipped(paths) if paths else None
+        return zipped(paths) if paths else None
 
     def _files_of(self, name: str) -> Sequence[Path]:
         if not NAME.fullmatch(name) or name not in recording_tables(self.directory):
@@ -132,16 +127,6 @@ def recording_tables(directory: Path) -> dict[str, Path]:
     """Name -> table of every recording in the directory; CSV takes precedence over Parquet of the same name."""
     paths = [path for suffix in reversed(SUFFIXES) for path in directory.glob(f"*{suffix}") if is_own(path)]
     return {path.stem: path for path in paths}
-
-
-def _zipped(paths: Sequence[Path]) -> Iterator[bytes]:
-    with TemporaryFile() as file:
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-            for path in paths:
-                archive.write(path, path.name)
-        file.seek(0)
-        while piece := file.read(_PIECE_BYTES):
-            yield piece
 
 
 def is_own(path: Path) -> bool:

@@ -24,6 +24,7 @@ from compd.errors import DaemonError
 from compd.page.broadcast import Broadcast
 from compd.page.browsers import ARMED_S, Browsers
 from compd.page.daemon_link import DaemonLink
+from compd.page.downloads import Downloads
 from compd.page.guard import Token
 from compd.page.history import History
 from compd.page.joining.routes import JoinRoutes
@@ -71,7 +72,10 @@ class Server:
         self._browsers = Browsers(clock or MonotonicClock())
         self._broadcast = Broadcast(link, self._browsers, recordings)
         self._workers = Workers()
-        self._workbench = WorkbenchRoutes(recordings, models, machine, STATIC / "workbench.html", self._workers)
+        self._downloads = Downloads()
+        self._workbench = WorkbenchRoutes(
+            recordings, models, machine, STATIC / "workbench.html", self._workers, self._downloads
+        )
         self._join = JoinRoutes(recordings, machine, STATIC / "join.html", self._workers)
 
     def app(self) -> Starlette:
@@ -104,6 +108,7 @@ class Server:
 
     @asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
+        self._workers.prepare()  # so that the first who opens a recording waits for no import
         tasks = [asyncio.create_task(self._link.run()), asyncio.create_task(self._broadcast.run())]
         yield
         self._workers.end()
@@ -217,7 +222,7 @@ class Server:
         if pieces is None:
             return refused("there is no such recording", 404)
         headers = {"Content-Disposition": f'attachment; filename="{name}.zip"'}
-        return StreamingResponse(pieces, media_type="application/zip", headers=headers)
+        return self._downloads.answer(pieces, "application/zip", headers)
 
 
 def _unix_s(request: Request) -> float:

@@ -17,17 +17,27 @@ DIGITS = 2
 MAX_DIGITS = 4
 # Between these a number is written without a power of ten.
 SMALLEST, LARGEST = 1e-4, 1e7
+# Least digits of a length in mm.
+_MM_DIGITS = 3
+UM_PER_MM = 1e3
 
 
 def number_text(value: float, unit: str = "", digits: int = DIGITS) -> str:
-    """A number with so many digits that count: "0.12 um", "113 um"; "not known" for nan."""
+    """A number with so many digits that count: "0.12 um", "113 um"; "not known" for nan.
+
+    A length in um of a millimetre or more is written in mm, with three digits at least: "154 mm".
+    """
     if math.isnan(value):
         return "not known"
+    if unit == "um" and _is_in_mm(value):
+        return number_text(value / UM_PER_MM, "mm", max(digits, _MM_DIGITS))
     return f"{_digits(value, digits)}{_behind(unit)}"
 
 
 def fall_text(values: Sequence[float], unit: str) -> str:
     """Numbers one after the other, with digits enough to tell neighbours apart: "105 -> 55 um"."""
+    if unit == "um" and any(map(_is_in_mm, values)):
+        return " -> ".join(number_text(value, unit) for value in values)
     for digits in range(DIGITS, MAX_DIGITS + 1):
         texts = [number_text(value, digits=digits) for value in values]
         if all(before != after for before, after in pairwise(texts)):
@@ -74,6 +84,10 @@ def chance_text(p_value: float) -> str:
 def join_words(words: Sequence[str], word: str = "and") -> str:
     """Words as a sentence has them: "a, b and c"."""
     return f" {word} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
+
+
+def _is_in_mm(um: float) -> bool:
+    return math.isfinite(um) and abs(um) >= UM_PER_MM
 
 
 def _behind(unit: str) -> str:

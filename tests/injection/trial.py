@@ -25,7 +25,7 @@ SETTLED_WITHIN_S = 8.0
 # For so long a gauge that must be accepted is watched after its cause has gone.
 WATCHED_AFTER_S = 1.5
 # A reason is for people, and goes out with every setpoint.
-MAX_REASON = 300  # bytes
+MAX_REASON = 1100  # bytes
 # A busy computer makes polls late: so many setpoints may be disturbed where nothing must be.
 DISTURBED_SHARE = 0.2
 

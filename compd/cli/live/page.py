@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -72,6 +73,8 @@ def page(
     own = make_token()
     alone = listen is None and behind is None
     if alone:
+        if tokens is not None:
+            raise typer.BadParameter(_without_listen(address, tokens))
         known = [Token("this computer", "view" if read_only else "operate", hashed(own))]
     else:
         known = [
@@ -102,6 +105,15 @@ def page(
     offered = None if models is None else models.absolute()
     host = listen or "127.0.0.1"
     run_page(unix_socket, recordings.absolute(), host, port, known, started, offered, _origin(behind), machine)
+
+
+def _without_listen(address: str, tokens: Path) -> str:
+    words = ["compd", "page", *([] if address == DEFAULT_SOCKET else [address])]
+    line = shlex.join([*words, "--listen", "127.0.0.1", "--tokens", str(tokens)])
+    return (
+        f"--tokens {tokens} has no effect without --listen or --behind; type: {line} "
+        "(with this computer's address for browsers on others); without --tokens this computer's own token opens it"
+    )
 
 
 def _print_address(address: str) -> None:

@@ -77,6 +77,7 @@ class ReadingTrust:
         self._i = memory.index[channel]
         self._tolerance_mm = float(memory.tolerance_mm[self._i])
         self._settings = settings
+        memory.returns[self._i] = settings.returns_by_itself
         self._before = MotionBefore(self._tolerance_mm, settings.limits)
         self._candidate: GaugeSample | None = None  # the last answer before any reading is believed
         self._back_s = math.nan  # time at which an absent gauge answered again

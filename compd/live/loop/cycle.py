@@ -41,7 +41,7 @@ from compd.live.loop.skew import skew_between, skew_reason
 from compd.live.loop.stale_policy import UsableComparators
 from compd.live.loop.tip_bound import refused_bound, tip_bound, with_place
 from compd.live.loop.tip_uncertainty import TipUncertainty, has_grown, noise_now, tip_uncertainty
-from compd.live.machine import MachineWires, MachineZero, Models, shortened
+from compd.live.machine import MachineWires, MachineZero, Models
 from compd.live.memory import Snapshot
 from compd.model import MachineModel
 from compd.model.external import ExternalModel, OwnKinematicsError
@@ -120,7 +120,7 @@ def step(state: CycleState, inputs: CycleInputs, settings: CycleSettings) -> tup
         valid_until_s,
         age_s,
         outcome.state,
-        shortened(outcome.reason),
+        outcome.reason,
         mode,
         outcome.values,
         models.applied.hash,

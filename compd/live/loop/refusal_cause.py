@@ -11,6 +11,8 @@ from compd.live.loop.commands import Target
 from compd.live.loop.models import compensate
 from compd.live.machine import MachineWires
 from compd.model import MachineModel, carry_over
+from compd.text import number_text
+from compd.units import UM_PER_MM
 
 # A joint runs out and a frame grows by some hundredths of a millimetre: a change beyond this, mm, is no measurement.
 _IMPLAUSIBLE_MM = 1.0
@@ -31,7 +33,8 @@ def refusal_cause(
         worst = int(np.argmax(np.abs(change_mm)))
         wire = wires.comparators.wires[worst]
         if abs(change_mm[worst]) > _IMPLAUSIBLE_MM:
-            return f"{wire.meaning} ({wire.channel}) is {change_mm[worst]:.4g} mm from machine zero"
+            away = number_text(UM_PER_MM * float(change_mm[worst]), "um", 3)
+            return f"{wire.meaning} ({wire.channel}) is {away} from machine zero"
         return ""
     for fitted in machine.live_effects:
         alone = replace(machine, effects=(fitted,))

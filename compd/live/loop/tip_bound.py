@@ -29,6 +29,7 @@ from compd.live.loop.stale_policy import ComparatorSet, UsableComparators
 from compd.live.loop.tip_uncertainty import TipUncertainty
 from compd.live.machine import MachineWires, tip_bound_um
 from compd.live.memory import Snapshot
+from compd.text import number_text
 from compd.units import UM_PER_MM
 
 # Of the causes of a correction, joints and frame come first.
@@ -153,8 +154,10 @@ def refused_bound(
         return ""
     if bound is None or math.isnan(bound.um):
         return f"the bound of the tip's error is not known (`limits.tip_error_um`): {_unknown(bound, needed, settings)}"
+    digits = 3 if number_text(bound.um, "um", 3) != number_text(limit_um, "um", 3) else 6
+    may, allowed = (number_text(um, "um", digits) for um in (bound.um, limit_um))
     return (
-        f"the tip may be {bound.um:.4g} um from here, allowed {limit_um:g} um (`limits.tip_error_um`): most by "
+        f"the tip may be {may} from here, allowed {allowed} (`limits.tip_error_um`): most by "
         f"{_largest_part(bound, snapshot, usable, settings)}"
     )
 
@@ -189,9 +192,10 @@ def _largest_part(bound: TipBound, snapshot: Snapshot, usable: UsableComparators
     noise_um = float(bound.u.by_noise_um[-1])
     largest_um = float(parts_um.max(initial=0.0))  # of a machine without lengths there is none
     if bound.absent_um >= max(noise_um, largest_um):
-        return f"what is not corrected, {bound.absent_um:.4g} um"
+        return f"what is not corrected, {number_text(bound.absent_um, 'um', 3)}"
     if noise_um >= largest_um:
-        return f"the scatter of the gauges and the errors of fitted numbers, {noise_um:.4g} um; see `noise_um`"
+        noise = number_text(noise_um, "um", 3)
+        return f"the scatter of the gauges and the errors of fitted numbers, {noise}; see `noise_um`"
     k = int(np.argmax(parts_um))
     wire = settings.wires.length_wires[k]
     links, age_s = len(settings.wires.scale.wires), snapshot.time_s - snapshot.readings[wire.slot].time_s

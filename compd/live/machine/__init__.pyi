@@ -9,7 +9,6 @@ from .model_loader import ModelText as ModelText
 from .model_loader import try_model as try_model
 from .model_loader import warn_of_datum as warn_of_datum
 from .reasons import Lost as Lost
-from .reasons import shortened as shortened
 from .reasons import waiting_text as waiting_text
 from .wired_readings import RESTED as RESTED
 from .wired_readings import tip_bound_um as tip_bound_um

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from compd.gauge import Quality
 
-# A reason goes to every client, in every setpoint; READINGS and STATUS name each gauge.
-MAX_REASON_BYTES = 300
+# Longest text of the gauges that cannot be used, bytes: with details, and with names alone. Beyond it they are counted.
+# A reason goes to every client, in every setpoint; READINGS and STATUS have each gauge.
+MAX_DETAILED_BYTES, MAX_NAMED_BYTES = 250, 500
 # The words by which SETPOINT, STATUS, page and command line say that time alone changes nothing.
 WAITS_FOR_PERSON = "waits for a person"
-_AND_MORE = " ... (STATUS names all)"
 
 
 class GaugeFault(NamedTuple):
@@ -57,7 +57,10 @@ def lost(faults: Iterable[GaugeFault]) -> Lost:
         groups.setdefault((fault.channel.partition(".")[0], fault.quality, detail), []).append(fault)
     # a gauge that waits for a person comes first, that it is not cut off
     ordered = sorted(groups.values(), key=lambda group: group[0].quality is not Quality.DISTRUSTED)
-    text = ", ".join(map(_group_text, ordered))
+    detailed, (named, counted) = ", ".join(map(_group_text, ordered)), _coarser(ordered)
+    text = named if len(named.encode()) <= MAX_NAMED_BYTES else counted
+    if len(detailed.encode()) <= MAX_DETAILED_BYTES:
+        text = detailed
     return Lost(text, any(group[0].quality is Quality.DISTRUSTED for group in ordered))
 
 
@@ -70,13 +73,34 @@ def waiting_text(channels: Iterable[str]) -> str:
     return f"{WAITS_FOR_PERSON}: look at {', '.join(gauges)}, then `compd accept {accept}`"
 
 
-def shortened(reason: str) -> str:
-    """The reason with at most MAX_REASON_BYTES of UTF-8."""
-    encoded = reason.encode()
-    if len(encoded) <= MAX_REASON_BYTES:
-        return reason
-    kept = encoded[: MAX_REASON_BYTES - len(_AND_MORE)].decode(errors="ignore")
-    return kept.rstrip(" ,;") + _AND_MORE
+def _coarser(groups: Sequence[Sequence[GaugeFault]]) -> tuple[str, str]:
+    """Groups without details: each gauge by name, "joint 1 to 9, frame t1: stale", and the numbers of gauges."""
+    by_quality: dict[Quality, list[str]] = {}
+    for group in groups:
+        by_quality.setdefault(group[0].quality, []).extend(fault.meaning for fault in group)
+    named, counted = [], []
+    for quality, meanings in by_quality.items():
+        by_word: dict[str, list[str]] = {}
+        for meaning in meanings:
+            by_word.setdefault(meaning.rpartition(" ")[0], []).append(meaning)
+        named.append(f"{', '.join(map(_runs, by_word.values()))}: {quality}")
+        counted.append(f"{len(meanings)} gauge{'s' * (len(meanings) != 1)}: {quality}")
+    return "; ".join(named), "; ".join(counted)
+
+
+def _runs(meanings: Sequence[str]) -> str:
+    """ "joint 1 to 3, 7, 9" of meanings with one word; those of other words follow as they are."""
+    word = meanings[0].rpartition(" ")[0]
+    numbers = [meaning.removeprefix(word).strip() for meaning in meanings]
+    if not word or not all(number.isdecimal() for number in numbers):
+        return ", ".join(meanings)
+    runs: list[list[int]] = []
+    for number in sorted(map(int, numbers)):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return f"{word} " + ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]} to {run[-1]}" for run in runs)
 
 
 def _group_text(group: list[GaugeFault]) -> str:

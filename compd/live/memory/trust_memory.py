@@ -67,6 +67,7 @@ class TrustMemory:
     witness : (lengths, lengths), row i: the values of all lengths at the last believed reading of length i, mm.
     lost_s : monotonic time at which the channel was lost, s.
     power_lost : 1 where the gauge itself may have been without power since its last reading.
+    returns : 1 where the gauge shows the same value again when it is back, whatever has happened meanwhile.
     doubt : a `Doubt`. amount : what it says of it.
     repeats : how many polls in a row have given the very same value. changes : how many polls have given another one.
     first_change_s, last_change_s : when the first and the last of these were, s.
@@ -108,7 +109,7 @@ class TrustMemory:
         self.accepted, self.obeyed, self.voted, self.handled = (shared_counters(max(n, 1)) for _ in range(4))
         self.suspected = shared_counters(max(n, 1))
         self.evidence, self.warnings = SharedMessage(), SharedMessage()
-        self.power_lost = shared_floats(max(n, 1))
+        self.power_lost, self.returns = (shared_floats(max(n, 1)) for _ in range(2))
         self._recent = shared_floats(max(n, 1) * RECENT * 2).reshape(max(n, 1), RECENT, 2)  # time, s, and value, mm
         self._recent[:] = math.nan
         self._believed = shared_counters(max(n, 1))
@@ -143,6 +144,16 @@ class TrustMemory:
             self.doubt[i] = Doubt.LOST
         if power:
             self.power_lost[i] = 1.0
+
+    def needs_person(self, i: int) -> bool:
+        """Whether a person has to accept channel `i`, or will have to when it is back, as the machine has moved."""
+        if Doubt(int(self.doubt[i])).until_accepted:
+            return True
+        n = self.lengths
+        if self.doubt[i] != Doubt.LOST or i >= n or self.returns[i]:
+            return False
+        moved = np.abs(self.value[:n] - self.witness[i]) > self.tolerance_mm[:n]
+        return bool((moved & (self.doubt[:n] == Doubt.NONE)).any())
 
     def end_order(self, i: int) -> None:
         """An order to believe channel `i` is over: followed, or about what the gauge showed before it was away."""

@@ -126,5 +126,7 @@ class StatusReport:
                 entry["scatter_um"] = round(reading.motion.scatter_mm * UM_PER_MM, 4)
             if channel in warnings:
                 entry["warning"] = warnings[channel]
+            if channel in self.trust.index and self.trust.needs_person(self.trust.index[channel]):
+                entry["needs_person"] = True
             gauges.append(entry)
         return gauges

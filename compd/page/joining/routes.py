@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Mapping
 from pathlib import Path
+from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, Response
@@ -16,8 +17,10 @@ from compd.page.joining.exports import MAX_BYTES, Exports
 from compd.page.joining.named_files import gauges_and_plans
 from compd.page.recordings import Recordings
 from compd.page.requests import LOOKS_ONLY, answer, keys_of, may_change, refused
+from compd.page.shares import ASKER, looks_only
 from compd.page.workers.answering import CLIENT_GONE, BrowserGone, while_asked
 from compd.page.workers.limits import WorkerLimits
+from compd.page.workers.worker import Worker
 from compd.page.workers.worker_group import WorkerGroup
 from compd.page.workers.workers import Workers
 
@@ -64,7 +67,10 @@ class JoinRoutes:
         self._page = page
         arguments = (self._directory, self._exports.directory, machine)
         self._workers = workers or Workers()
-        self._joiners = WorkerGroup(self._workers, WORKERS, "join", _JOINER, arguments, LIMITS)
+        # by whether their browsers only look: whoever writes does not wait for those
+        self._joiners = {
+            looks: WorkerGroup(self._workers, WORKERS, "join", _JOINER, arguments, LIMITS) for looks in (False, True)
+        }
         self._writing = asyncio.Lock()  # each name is used once
 
     def routes(self) -> list[Route]:
@@ -111,19 +117,22 @@ class JoinRoutes:
         except ClientDisconnect:
             return refused("the browser has gone before the file was whole", 400)
 
+    def _free(self, keys: Mapping[str, Any]) -> Worker:
+        return self._joiners[looks_only(ASKER.get())].free(str(keys.get("export")))
+
     async def _table(self, request: Request) -> Response:
         keys = await keys_of(request)
-        asked = self._joiners.free(str(keys.get("export"))).ask(f"{_JOINER}.table", keys, seconds=ANSWER_S)
+        asked = self._free(keys).ask(f"{_JOINER}.table", keys, seconds=ANSWER_S)
         return await _answered(while_asked(request, asked))
 
     async def _log(self, request: Request) -> Response:
         keys = await keys_of(request)
-        asked = self._joiners.free(str(keys.get("export"))).ask(f"{_JOINER}.log", keys, seconds=ANSWER_S)
+        asked = self._free(keys).ask(f"{_JOINER}.log", keys, seconds=ANSWER_S)
         return await _answered(while_asked(request, asked))
 
     async def _try(self, request: Request) -> Response:
         keys = await keys_of(request)
-        asked = self._joiners.free(str(keys.get("export"))).ask(f"{_JOINER}.trial", keys, seconds=ANSWER_S)
+        asked = self._free(keys).ask(f"{_JOINER}.trial", keys, seconds=ANSWER_S)
         return await _answered(while_asked(request, asked))
 
     async def _write(self, request: Request) -> Response:
@@ -132,7 +141,7 @@ class JoinRoutes:
             return refused(LOOKS_ONLY, 403)
         keys = await keys_of(request)
         async with self._writing:
-            joiner = self._joiners.free(str(keys.get("export")))
+            joiner = self._free(keys)
             return await _answered(joiner.ask(f"{_JOINER}.write", keys, seconds=ANSWER_S))
 
 

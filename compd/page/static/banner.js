@@ -8,7 +8,7 @@ import { appearance, stateName } from "./states.js";
 const at = (id) => document.getElementById(id);
 let shown = "";
 
-// State of the daemon and of this page's own connection, in words.
+// State of the daemon, the worst of the last seconds, and of this page's own connection, in words.
 export function describe(page, behind_s) {
   const live = page.live;
   if (!live || behind_s > SILENT_S) {
@@ -19,8 +19,9 @@ export function describe(page, behind_s) {
   if (!live.connected || !live.setpoint) {
     return { state: "gone", tone: "gone", sign: "⚡", name: "NO DAEMON", reason: live.reason || "it has told nothing yet" };
   }
-  const [tone, sign] = appearance(live.setpoint.state);
-  return { state: live.setpoint.state, tone, sign, name: stateName(live.setpoint.state), reason: live.setpoint.reason };
+  const { state, reason, count } = page.latch.worst;
+  const [tone, sign] = appearance(state);
+  return { state, tone, sign, name: `${stateName(state)}${count > 1 ? ` ×${count}` : ""}`, reason };
 }
 
 function write(id, text) {

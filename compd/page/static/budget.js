@@ -1,7 +1,7 @@
 // Displacement of the tip: one bar for each axis, stacked by cause, with the bound of the tip's error as a whisker where
 // it is no longer than the bar, and the shadow model's sum as an outline.
 import { keptScale, outline, stack, whisker } from "./bar.js";
-import { causeColour, element, isKnown, signed } from "./format.js";
+import { causeColour, element, isKnown, lengthText, signedLength } from "./format.js";
 
 export class Budget {
   constructor(place) {
@@ -33,9 +33,9 @@ export class Budget {
     const u_tip_um = setpoint.u_tip_um;
     const bounded = isKnown(u_tip_um) && u_tip_um <= this.scale_um;
     this.drawLegend(causes, bounded, setpoint);
-    this.scale.textContent = vectors.length ? `bars end at ±${this.scale_um} µm` : "";
+    this.scale.textContent = vectors.length ? `bars end at ±${lengthText(this.scale_um)}` : "";
     this.rows.forEach(({ bar, number, shadow }, axis) => {
-      shadow.textContent = vectors.length && shadow_budget ? `shadow ${signed(shadow_budget[axis])} µm` : "";
+      shadow.textContent = vectors.length && shadow_budget ? `shadow ${signedLength(shadow_budget[axis])}` : "";
       if (!vectors.length) {
         bar.replaceChildren();
         number.textContent = "–";
@@ -46,7 +46,7 @@ export class Budget {
       stack(bar, parts, this.scale_um);
       if (bounded) whisker(bar, sum, u_tip_um, this.scale_um);
       if (shadow_budget) outline(bar, shadow_budget[axis], this.scale_um);
-      number.textContent = `${signed(sum)} µm`;
+      number.textContent = signedLength(sum);
     });
   }
 

@@ -5,11 +5,32 @@ export function signed(value, digits = 1) {
   return (value < 0 && Number(text) !== 0 ? "−" : "+") + text;
 }
 
+// A length with three digits and its unit: in µm below a millimetre, in mm from there on; never in powers of ten.
+export function lengthText(um) {
+  if (!Number.isFinite(um)) return "–";
+  const in_mm = Math.abs(Number(um.toPrecision(3))) >= 1000;
+  const value = Number((in_mm ? um / 1000 : um).toPrecision(3));
+  return `${value < 0 ? "−" : ""}${Math.abs(value)} ${in_mm ? "mm" : "µm"}`;
+}
+
+// A length with its sign: one decimal in µm below a millimetre, three digits in mm from there on.
+export function signedLength(um) {
+  if (!(Math.abs(um) >= 999.95)) return `${signed(um)} µm`;
+  return `${um < 0 ? "" : "+"}${lengthText(um)}`;
+}
+
+// Amounts of one quantity, one after the other, each with two decimals: "1.01 → 1.15 µm"; a length as `lengthText` has
+// it where one of them is a millimetre or more.
+export function amounts(values, unit) {
+  if (unit === "um" && values.some((value) => Math.abs(value) >= 999.5)) return values.map(lengthText).join(" → ");
+  return `${values.map((value) => value?.toFixed(2) ?? "–").join(" → ")} ${micro(unit)}`;
+}
+
 // The tip in {M}, and the bound of its error; blanks as wide as a figure keep y and z where they are, as far as a
 // metre.
 export function tipText(tip_M_mm, u_tip_um) {
   const axes = ["x", "y", "z"].map((axis, k) => `${axis} ${signed(tip_M_mm[k], 4)}`.padStart(k ? 11 : 0, "\u2007"));
-  return `${axes.join("  ")} mm${isKnown(u_tip_um) ? `, within ${u_tip_um.toFixed(u_tip_um < 100 ? 1 : 0)} µm` : ""}`;
+  return `${axes.join("  ")} mm${isKnown(u_tip_um) ? `, within ${lengthText(u_tip_um)}` : ""}`;
 }
 
 // Whether the bound of the tip's error is known: it is null if unknown, and absent in an invalid setpoint.

@@ -1,6 +1,6 @@
 // One strip for each link: the correction of the last minute with its limits, its value, and its contributions.
 import { keptScale, outline, stack } from "./bar.js";
-import { element, ink, signed } from "./format.js";
+import { element, ink, lengthText, signed } from "./format.js";
 
 const SPAN_S = 60;
 // Interval (ms) of drawing the charts: a line moves by at most a pixel in a tenth of a second.
@@ -136,7 +136,7 @@ export class Links {
     const shadow_um = setpoint.shadow?.correction_mm?.map((value) => value * 1000);
     const ends = setpoint.correction_mm.map((_, k) => Math.max(causes.reduce((sum, links) => sum + Math.abs(links[k] * 1000), 0), Math.abs(shadow_um?.[k] ?? 0)));
     this.scale_um = keptScale(this.scale_um, Math.max(...ends));
-    this.scale.textContent = `Colours: causes, as at the tip. Bars end at ±${this.scale_um} µm; red lines: the limits, ±${this.limit_um.toFixed(0)} µm.`;
+    this.scale.textContent = `Colours: causes, as at the tip. Bars end at ±${lengthText(this.scale_um)}; red lines: the limits, ±${lengthText(this.limit_um)}.`;
     this.rows.forEach(({ number, sources, bar }, k) => {
       number.textContent = signed(setpoint.correction_mm[k] * 1000);
       sources.textContent = `${this.noun} ${k + 1}${shadow_um ? `\nshadow ${signed(shadow_um[k])}` : ""}`;

@@ -1,5 +1,5 @@
 // The machine in three dimensions on a plain canvas, with the errors drawn many times larger than they are.
-import { ink, prepared, signed } from "./format.js";
+import { ink, prepared, signedLength } from "./format.js";
 import { actuatorParts, hingeParts } from "./mechanism.js";
 import { Turn } from "./orbit_control.js";
 
@@ -114,14 +114,14 @@ export class Machine {
       const ends = [this.scene[from][i], this.scene[to][k]];
       if (this.rod === name) line(ends, ink("--ink"), 6);
       line(ends, um === null || um === undefined ? "#8c959f55" : diverging(um / this.largest_um), 2);
-      this.parts.push({ ends: ends.map(place), text: `frame ${name}: ${signed(um)} µm since machine zero` });
+      this.parts.push({ ends: ends.map(place), text: `frame ${name}: ${signedLength(um)} since machine zero` });
     }
     fill(supports, "#8c959f22");
     fill(platform, "#009e7355");
     line([...platform, platform[0]], "#009e73", 2);
     platform.forEach((point) => line([point, tip], "#009e73", 1));
     const corrected = (actuator) => diverging(this.corrections_um[actuator] / this.largest_um);
-    const said = (actuator) => `${mechanism.actuators[actuator].kind === "extends" ? "link" : "actuator"} ${actuator + 1}: correction ${signed(this.corrections_um[actuator])} µm`;
+    const said = (actuator) => `${mechanism.actuators[actuator].kind === "extends" ? "link" : "actuator"} ${actuator + 1}: correction ${signedLength(this.corrections_um[actuator])}`;
     for (const { actuator, points, dash } of actuators) {
       if (dash) {
         line(points, faint, 1, dash);

@@ -29,11 +29,12 @@ export function remedyOf(page, { tone, name, state }) {
   const wired = page.machine?.wiring ?? [];
   const bad = (page.live.gauges ?? []).map((gauge, k) => ({ ...gauge, wire: wired[k] })).filter(({ fault, wire }) => fault && wire);
   const distrusted = gaugesOf(bad.filter(({ fault }) => fault === "distrusted"));
+  const waiting = gaugesOf(bad.filter(({ fault, needs_person }) => needs_person || fault === "distrusted"));
   if (state === "no_zero") return { text: OF_STATES.no_zero, order: "zero", subject: "" };
   // another gauge that is lost has to be mended first
   const lost = bad.filter(({ fault }) => fault !== "distrusted");
   if (lost.length) {
-    return { text: `Gauge ${listed(gaugesOf(lost))}: ${FAULTS[lost[0].fault] ?? "look at it"}. ${distrusted.length ? "Then accept what is distrusted." : BY_ITSELF}` };
+    return { text: `Gauge ${listed(gaugesOf(lost))}: ${FAULTS[lost[0].fault] ?? "look at it"}. ${waiting.length ? `Then a person looks at ${listed(waiting)}, references it, and accepts it: the machine does not go on by itself.` : BY_ITSELF}` };
   }
   if (distrusted.length) return { text: `Look at ${listed(distrusted)}, reference it, then accept it.`, order: "accept", subject: distrusted.length === 1 ? distrusted[0] : "all" };
   return { text: OF_STATES[state] ?? (tone === "bad" ? "Read the daemon's log, then start the daemon again." : "") };

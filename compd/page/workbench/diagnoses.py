@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from compd.errors import Problem, StateError
+from compd.page.shares import ASKER, shares_of
 from compd.page.workbench.diagnosis_job import DiagnosisJob
 from compd.page.workers.workers import Workers
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from compd.configuration import Machine
 
 # Most diagnoses at once. Each takes a processor and the memory of a process, on the daemon's computer.
-MAX_RUNNING = 2
+MAX_RUNNING = 8
 
 
 class Diagnoses:
@@ -33,16 +34,18 @@ class Diagnoses:
         """Begin one; arguments as for `DiagnosisJob`. Raises StateError if the limit is reached."""
         with self._lock:
             self._running = [job for job in self._running if not job.has_ended]
-            if len(self._running) >= MAX_RUNNING:
-                raise StateError(
-                    Problem(
-                        where="diagnosis",
-                        what=f"{len(self._running)} run already on this server, of other recordings or models",
-                        value=", ".join(job.path.stem for job in self._running),
-                        allowed=f"{MAX_RUNNING} at once",
-                        next_step="wait for one of them to end, or cancel it where it was begun",
+            for share in shares_of(ASKER.get(), MAX_RUNNING):
+                held = [job.path.stem for job in self._running if share.holds(job.token)]
+                if len(held) >= share.most:
+                    raise StateError(
+                        Problem(
+                            where="diagnosis",
+                            what=f"{len(held)} run already on this server, of other recordings or models",
+                            value=", ".join(held),
+                            allowed=f"{share.most} at once {share.whose}".rstrip(),
+                            next_step="wait for one of them to end, or cancel it where it was begun",
+                        )
                     )
-                )
             job = DiagnosisJob(path, model_path, machine, revision=revision, effects=effects, workers=self._workers)
             self._running.append(job)
             return job

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import secrets
 import threading
 from collections.abc import Sequence
 from concurrent.futures import Future
+from contextvars import copy_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from compd.clock import Clock, MonotonicClock
 from compd.diagnosis import ONLY_WHERE_NEEDED, STAGES
+from compd.page.shares import ASKER
 from compd.page.workers.limits import WorkerLimits
 from compd.page.workers.workers import Workers
 from compd.text import typeset
@@ -39,6 +40,7 @@ class DiagnosisJob:
     revision : of the model and the rows that it is of.
     state : how far it is. Its pictures are drawn after it is "done".
     steps : text and time (s from the start) of each step that has begun.
+    token : of the browser that has begun it.
     printed, result, evidence : what the command prints, what it prints with ``--json``, and the same for a browser;
         empty before the end.
     """
@@ -58,7 +60,8 @@ class DiagnosisJob:
         self._clock = clock or MonotonicClock()
         self._start_s = self._clock.monotonic()
         self.id = secrets.token_hex(8)
-        self.path, self.revision = path, revision
+        self.path, self.revision, self.token = path, revision, ASKER.get()
+        self._context = copy_context()  # of the request: answers come in the worker's thread
         self.state: State = "running"
         self.steps: list[tuple[str, float]] = []
         self.printed = ""
@@ -79,8 +82,8 @@ class DiagnosisJob:
 
     @property
     def page(self) -> bytes:
-        """The page of ``compd diagnose --html``; empty before it is drawn."""
-        return gzip.decompress(self._page) if self._page else b""
+        """The page of ``compd diagnose --html``, compressed by gzip; empty before it is drawn."""
+        return self._page
 
     def cancel(self) -> None:
         """Cancel it, or the drawing of its pictures; no effect after its end."""
@@ -126,7 +129,8 @@ class DiagnosisJob:
         outcome = json.loads(answer.result())
         self.printed, self.result, self.evidence = outcome["printed"], outcome["result"], outcome["evidence"]
         self.state = "done"
-        self._worker.submit(f"{_STATE}.page", seconds=PAGE_S).answer.add_done_callback(self._note_page)
+        asked = self._context.run(self._worker.submit, f"{_STATE}.page", seconds=PAGE_S)
+        asked.answer.add_done_callback(self._note_page)
 
     def _note_page(self, answer: Future[bytes]) -> None:
         if not answer.cancelled() and answer.exception() is None:

@@ -10,6 +10,7 @@ from starlette.responses import Response
 
 from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
 from compd.page.workbench.open_workbench import OpenWorkbench
+from compd.page.workers.answering import while_asked
 
 # Largest body (bytes): the numbers of some 100,000 rows.
 MAX_ROWS_BYTES = 1_000_000
@@ -46,7 +47,7 @@ async def _trial(request: Request, workbench: OpenWorkbench) -> Response:
 
 async def _doubt(request: Request, workbench: OpenWorkbench) -> Response:
     """Whether the rows support an effect. The first request of a state takes a diagnosis, the others none."""
-    return plain(await workbench.doubt_of(request.path_params["effect"]))
+    return plain(await while_asked(request, workbench.doubt_of(request.path_params["effect"])))
 
 
 async def _step(request: Request, workbench: OpenWorkbench) -> Response:

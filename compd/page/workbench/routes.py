@@ -15,14 +15,16 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
 from compd.errors import CompdError, Problem, StateError
+from compd.page.downloads import Downloads, in_pieces
 from compd.page.recordings import NAME, Recordings, is_own, recording_tables
 from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
+from compd.page.shares import ASKER, looks_only, shares_of
 from compd.page.workbench.diagnoses import Diagnoses
 from compd.page.workbench.effect_libraries import OWN_NAME, EffectLibraries
 from compd.page.workbench.handlers import HANDLERS, Handler, plain
 from compd.page.workbench.open_workbench import OpenWorkbench
 from compd.page.workbench.plan_handlers import PLAN_HANDLERS
-from compd.page.workers.answering import CLIENT_GONE, BrowserGone
+from compd.page.workers.answering import CLIENT_GONE, BrowserGone, while_asked
 from compd.page.workers.limits import too_many
 from compd.page.workers.workers import Workers
 
@@ -77,9 +79,19 @@ _PAGE_POLICY = (
 )
 
 
+# Time (s) for which a browser that follows a running diagnosis waits for its progress.
+FOLLOWED_S = 0.4
+
+
 async def _diagnosis(request: Request, workbench: OpenWorkbench) -> Response:
-    """Progress of the newest diagnosis; with its findings, unless the browser already shows them."""
-    return JSONResponse(workbench.diagnosis_summary(request.query_params.get("shown", "")))
+    """Progress of the newest diagnosis; with its findings, unless the browser already shows them.
+
+    `follow`: a running one is answered a moment later, so that a browser follows it without a timer of its own.
+    """
+    with workbench.follower():
+        if "follow" in request.query_params and workbench.is_diagnosing:
+            await while_asked(request, asyncio.sleep(FOLLOWED_S, b""))
+        return JSONResponse(workbench.diagnosis_summary(request.query_params.get("shown", "")))
 
 
 async def _diagnose(request: Request, workbench: OpenWorkbench) -> Response:
@@ -90,21 +102,13 @@ async def _diagnose(request: Request, workbench: OpenWorkbench) -> Response:
             workbench.diagnosis.cancel()
     else:
         await workbench.diagnose()
-    return JSONResponse(workbench.diagnosis_summary())
-
-
-async def _page(request: Request, workbench: OpenWorkbench) -> Response:
-    job = workbench.diagnosis
-    page = b"" if job is None else await asyncio.to_thread(lambda: job.page)
-    if not page:
-        return refused("there is no page of a diagnosis yet", 404)
-    return Response(page, media_type="text/html", headers={"Content-Security-Policy": _PAGE_POLICY})
+    with workbench.follower():
+        return JSONResponse(workbench.diagnosis_summary())
 
 
 DIAGNOSIS_HANDLERS = (
     Handler("/diagnosis", _diagnosis),
     Handler("/diagnosis", _diagnose, "POST"),
-    Handler("/diagnosis/page", _page),
 )
 
 
@@ -127,33 +131,45 @@ class WorkbenchRoutes:
         machine: Path | None,
         page: Path,
         workers: Workers | None = None,
+        downloads: Downloads | None = None,
     ) -> None:
         """models : directory of model files, None for that of the recordings. machine : the page's configuration.
-        page : the HTML file. workers : of the page's server."""
+        page : the HTML file. workers, downloads : of the page's server."""
         self._workers = workers or Workers()
+        self._downloads = downloads or Downloads()
         self._recordings = recordings
         self._models = models or recordings.directory
         self._machine = machine
         self._page = page
-        self._open: dict[str, OpenWorkbench] = {}
+        # by whether its browsers only look, and key: nobody who only looks can keep an operator's workbench busy
+        self._open: dict[tuple[bool, str], OpenWorkbench] = {}
         self._diagnoses = Diagnoses(self._workers)
         self._libraries = EffectLibraries(self._models, OWN_NAME)
 
     def routes(self) -> list[Route]:
         """All of them; /workbench is the page itself."""
+        page = Handler("/diagnosis/page", self._diagnosis_page)
         return [
             Route("/workbench", self._index),
             Route("/workbench/libraries", self._list_libraries),
             Route("/workbench/open", self._open_one, methods=["POST"]),
             *(
                 Route(f"{_BASE}{handler.path}", self._of_open(handler), methods=[handler.method])
-                for handler in (*HANDLERS, *DIAGNOSIS_HANDLERS, *FORMULA_HANDLERS, *PLAN_HANDLERS)
+                for handler in (*HANDLERS, *DIAGNOSIS_HANDLERS, *FORMULA_HANDLERS, *PLAN_HANDLERS, page)
             ),
         ]
 
     async def _index(self, request: Request) -> Response:
         self._workers.prepare()
         return FileResponse(self._page)
+
+    async def _diagnosis_page(self, request: Request, workbench: OpenWorkbench) -> Response:
+        """The page as its worker has compressed it."""
+        page = b"" if workbench.diagnosis is None else workbench.diagnosis.page
+        if not page:
+            return refused("there is no page of a diagnosis yet", 404)
+        headers = {"Content-Security-Policy": _PAGE_POLICY, "Content-Encoding": "gzip"}
+        return self._downloads.answer(in_pieces(page), "text/html", headers)
 
     async def _list_libraries(self, request: Request) -> Response:
         return JSONResponse({"libraries": self._libraries.names()})
@@ -189,34 +205,42 @@ class WorkbenchRoutes:
 
         Raises CompdError with every problem of the recording, its machine, the model and the libraries.
         """
-        workbench, closed = self._open.get(key), None
+        place = (looks_only(ASKER.get()), key)
+        workbench, closed = self._open.get(place), None
         if workbench is None:
             closed = self._close_oldest()
             workbench = OpenWorkbench(self._workers, self._diagnoses, path, model_path, self._machine)
-            self._open[key] = workbench  # before any await, so that the next request finds it
+            self._open[place] = workbench  # before any await, so that the next request finds it
         try:
             if closed is not None:
                 await asyncio.to_thread(closed.rest)
             return plain(await workbench.ask("open_again", key, libraries))
         finally:
             if workbench.worker.kept is None:  # it could not be opened
-                self._open.pop(key, None)
+                self._open.pop(place, None)
                 await asyncio.to_thread(workbench.rest)
 
     def _close_oldest(self) -> OpenWorkbench | None:
-        """Close the least recently used workbench if the limit is reached. Raises StateError if all are busy."""
-        if len(self._open) < MAX_OPEN:
-            return None
-        idle = [key for key, workbench in self._open.items() if not workbench.is_busy]
-        if not idle:
-            raise too_many("the workbench", MAX_OPEN)
-        return self._open.pop(min(idle, key=lambda key: self._open[key].worker.used_s))
+        """Close the least recently used workbench of the first share of the token that is used up.
+
+        Raises StateError if all of them are busy.
+        """
+        for share in shares_of(ASKER.get(), MAX_OPEN):
+            held = [place for place, workbench in self._open.items() if share.holds(workbench.token)]
+            if len(held) < share.most:
+                continue
+            idle = [place for place in held if not self._open[place].is_busy]
+            if not idle:
+                raise too_many("the workbench", share.most, share.whose)
+            return self._open.pop(min(idle, key=lambda place: self._open[place].worker.used_s))
+        return None
 
     def _of_open(self, handler: Handler) -> Callable[[Request], Awaitable[Response]]:
         """The handler with the workbench of the address."""
 
         async def handled(request: Request) -> Response:
-            workbench = self._open.get("{recording}/{model}".format(**request.path_params))
+            key = "{recording}/{model}".format(**request.path_params)
+            workbench = self._open.get((looks_only(ASKER.get()), key))
             if workbench is None:
                 return refused(_NOT_OPEN, 404)
             try:

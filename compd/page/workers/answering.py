@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable
 
 from starlette.requests import Request
+from starlette.types import Receive
 
 # nginx's status for a client that closed the connection; it reaches no reader.
 CLIENT_GONE = 499
@@ -18,7 +19,7 @@ class BrowserGone(Exception):
 async def while_asked(request: Request, answer: Awaitable[bytes]) -> bytes:
     """The answer; the request's body must have been read. Raises BrowserGone if the browser leaves before."""
     answering = asyncio.ensure_future(answer)
-    going = asyncio.ensure_future(_gone(request))
+    going = asyncio.ensure_future(gone(request.receive))
     try:
         await asyncio.wait({answering, going}, return_when=asyncio.FIRST_COMPLETED)
         if not answering.done():
@@ -29,6 +30,7 @@ async def while_asked(request: Request, answer: Awaitable[bytes]) -> bytes:
             task.cancel()
 
 
-async def _gone(request: Request) -> None:
-    while (await request.receive())["type"] != "http.disconnect":
+async def gone(receive: Receive) -> None:
+    """Wait until the client has left; the request's body must have been read."""
+    while (await receive())["type"] != "http.disconnect":
         pass

@@ -45,11 +45,11 @@ def cancelled(where: str) -> StateError:
     return StateError(Problem(where=where, what="it was cancelled"))
 
 
-def too_many(where: str, most: int) -> StateError:
-    """The problem of a reached limit: all that may run, or be open, is busy."""
+def too_many(where: str, most: int, whose: str = "") -> StateError:
+    """The problem of a reached limit: all that may run, or be open, is busy. whose : see `Share`."""
     what = "the page computes as much as it may already"
     step = "wait until something has ended, or cancel it where it was begun"
-    return StateError(Problem(where=where, what=what, allowed=f"{most} at once", next_step=step))
+    return StateError(Problem(where=where, what=what, allowed=f"{most} at once {whose}".rstrip(), next_step=step))
 
 
 def none_left(where: str) -> StateError:

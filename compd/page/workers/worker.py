@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shutil
 import threading
 import time
 from collections import deque
@@ -12,11 +13,16 @@ from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
-from typing import Any, Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from compd.errors import CompdError
+from compd.page.shares import ASKER, looks_only
 from compd.page.workers import limits as limited
 from compd.page.workers.limits import WorkerLimits
+
+if TYPE_CHECKING:
+    from compd.page.guard import Token
 
 
 @dataclass(eq=False)
@@ -28,6 +34,7 @@ class Asked:
     seconds : that the answer may take. progress : called with each step that is told, by the worker's thread.
     answer : bytes that are ready to be sent, or the exception.
     is_cancelled : whether the question was abandoned.
+    token : of the request that asks; its share of the processes has this one. None outside a request.
     """
 
     question: str
@@ -36,12 +43,23 @@ class Asked:
     progress: Callable[[str], None] | None = None
     answer: Future[bytes] = field(default_factory=Future)
     is_cancelled: bool = False
+    token: Token | None = field(default_factory=ASKER.get)
 
 
 # A process closes its connection just before its end.
 _ENDS_WITHIN_S = 5.0
+# Priorities, see nice(2): the page and the daemon go first, and then whoever operates.
+NICE, VIEWERS_NICE = 10, 19
 # Exit code of a process after an unexpected exception.
 _FAULT = 1
+
+
+class Started(NamedTuple):
+    """A process, the connection to it, and its directory of temporary files, which goes with it."""
+
+    process: ForkServerProcess
+    messages: Connection
+    temporary: Path
 
 
 class Starter(Protocol):
@@ -50,8 +68,8 @@ class Starter(Protocol):
     starting: threading.Lock
 
     def prepare(self) -> None: ...
-    def make_room(self, wanting: Worker) -> None: ...
-    def start(self, arguments: tuple[Any, ...]) -> tuple[ForkServerProcess, Connection]: ...
+    def make_room(self, wanting: Worker, token: Token | None) -> list[Started]: ...
+    def start(self, arguments: tuple[Any, ...]) -> Started: ...
 
 
 class Worker:
@@ -64,6 +82,7 @@ class Worker:
     name : of what it works on, for people.
     kept : plain data that the state told last, from which another goes on in its place; None before the first answer.
     used_s : when it was used last, on a monotonic clock.
+    token : whose question it has answered last, or works on.
     """
 
     def __init__(
@@ -75,18 +94,18 @@ class Worker:
         self.name = name
         self.kept: Any = None
         self.used_s = time.monotonic()
+        self.token: Token | None = None
         self._changed = threading.Condition()
         self._waiting: deque[Asked] = deque()
         self._current: Asked | None = None
         self._thread: threading.Thread | None = None
-        self._process: ForkServerProcess | None = None
-        self._messages: Connection | None = None
+        self._running: Started | None = None
 
     @property
     def pid(self) -> int | None:
         """Id of its process; None without a process."""
-        process = self._process
-        return None if process is None else process.pid
+        running = self._running
+        return None if running is None else running.process.pid
 
     @property
     def questions(self) -> int:
@@ -133,8 +152,8 @@ class Worker:
         asked.answer.cancel()
         with self._changed:
             asked.is_cancelled = True
-            if self._current is asked and self._process is not None:
-                self._process.kill()
+            if self._current is asked and self._running is not None:
+                self._running.process.kill()
 
     def end(self) -> None:
         """Cancel every question, and end the process."""
@@ -146,12 +165,18 @@ class Worker:
 
     def rest(self) -> bool:
         """End the process unless it works on a question; return whether there is none now."""
+        ended = self.left()
+        for process in ended or ():
+            _wait_for_end(process)
+        return ended is not None
+
+    def left(self) -> list[Started] | None:
+        """As `rest`, without waiting: the process that is ending, if there was one; None where it works."""
         with self._changed:
             if self._current is not None:
-                return False
-            process = self._detached()
-        _wait_for_end(process)
-        return True
+                return None
+            ended = self._detached()
+        return [] if ended is None else [ended]
 
     def _answer_all(self) -> None:
         """Loop of the worker's thread: runs while there is a process, until it has been idle for a while."""
@@ -171,13 +196,13 @@ class Worker:
         with self._changed:
             self._current = None
             self.used_s = time.monotonic()
-            self._changed.wait_for(lambda: self._waiting or self._process is None, timeout=self._limits.idle_s)
+            self._changed.wait_for(lambda: self._waiting or self._running is None, timeout=self._limits.idle_s)
             if self._waiting:
                 self._current = self._waiting.popleft()
                 return self._current
-            process = self._detached()
+            ended = self._detached()
             self._thread = None
-        _wait_for_end(process)
+        _wait_for_end(ended)
         return None
 
     def _answer(self, asked: Asked) -> bytes:
@@ -202,10 +227,10 @@ class Worker:
     def _without_a_word(self, asked: Asked) -> CompdError:
         """Reason of the process's end. Raises RuntimeError for a fault of compd, which is in the log."""
         with self._changed:
-            process = self._process
-        if process is not None:
-            process.join(_ENDS_WITHIN_S)
-            if process.exitcode == _FAULT:
+            running = self._running
+        if running is not None:
+            running.process.join(_ENDS_WITHIN_S)
+            if running.process.exitcode == _FAULT:
                 self._ended(limited.cancelled(self.name))
                 raise RuntimeError(f"{asked.question} failed; its process wrote why")
         return limited.killed(self.name, self._limits.memory_mb)
@@ -213,46 +238,53 @@ class Worker:
     def _ended(self, error: CompdError) -> CompdError:
         """End the process and return `error`."""
         with self._changed:
-            process = self._detached()
-        _wait_for_end(process)
+            ended = self._detached()
+        _wait_for_end(ended)
         return error
 
     def _started(self, asked: Asked) -> tuple[Connection, bool]:
         """The connection to the process, and whether it is new. Raises StateError if none can be started."""
+        ended = None
         with self._changed:
-            if self._process is not None and not self._process.is_alive():
-                self._detached()
-            if self._messages is not None:
-                return self._messages, False
-        arguments = (self._opening, self._arguments, self.kept, self._limits.memory_mb)
-        with self._starter.starting:
-            self._starter.make_room(self)
-            try:
-                process, messages = self._starter.start(arguments)
-            except (OSError, EOFError) as error:  # the fork server has ended, or cannot fork
-                raise limited.none_left(self.name) from error
-            with self._changed:
-                self._process, self._messages = process, messages
-                if asked.is_cancelled:
-                    process.kill()
-        return messages, True
+            if self._running is not None and not self._running.process.is_alive():
+                ended = self._detached()
+            if self._running is not None and self.token == asked.token:
+                return self._running.messages, False
+        _wait_for_end(ended)
+        nice = VIEWERS_NICE if looks_only(asked.token) else NICE
+        arguments = (self._opening, self._arguments, self.kept, self._limits.memory_mb, nice)
+        with self._starter.starting:  # nobody waits here for the end of another's process
+            leaving = self._starter.make_room(self, asked.token)
+            self.token = asked.token
+            running, is_new = self._running, self._running is None
+            if running is None:
+                try:
+                    running = self._starter.start(arguments)
+                except (OSError, EOFError) as error:  # the fork server has ended, or cannot fork
+                    raise limited.none_left(self.name) from error
+                with self._changed:
+                    self._running = running
+                    if asked.is_cancelled:
+                        running.process.kill()
+        for process in leaving:
+            _wait_for_end(process)
+        return running.messages, is_new
 
-    def _detached(self) -> ForkServerProcess | None:
+    def _detached(self) -> Started | None:
         """Detach the process, which is being killed; call with `_changed` locked."""
-        process, messages = self._process, self._messages
-        self._process = self._messages = None
-        if process is not None:
-            process.kill()
-        if messages is not None:
-            messages.close()
+        running, self._running = self._running, None
+        if running is not None:
+            running.process.kill()
+            running.messages.close()
         self._changed.notify_all()
-        return process
+        return running
 
 
-def _wait_for_end(process: ForkServerProcess | None) -> None:
-    """Wait until its memory is free; without any lock, since that may take long."""
-    if process is not None:
-        process.join(_ENDS_WITHIN_S)
+def _wait_for_end(ended: Started | None) -> None:
+    """Wait until its memory and its files are gone; without any lock, since that may take long."""
+    if ended is not None:
+        ended.process.join(_ENDS_WITHIN_S)
+        shutil.rmtree(ended.temporary, ignore_errors=True)
 
 
 def _reply(messages: Connection, asked: Asked, allowed_s: float) -> tuple[str, Any, Any]:

@@ -13,41 +13,55 @@ import json
 import multiprocessing
 import os
 import pkgutil
+import shutil
 import signal
+import tempfile
 import threading
+import weakref
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import ForkServerProcess
 from pathlib import Path
-from typing import Any
-from weakref import WeakSet
+from typing import TYPE_CHECKING, Any
 
 from compd.errors import CompdError
 from compd.live.system import limit_memory
+from compd.page.shares import shares_of
 from compd.page.shown_texts import shown
 from compd.page.workers.limits import WorkerLimits, too_many
-from compd.page.workers.worker import Worker
+from compd.page.workers.worker import Started, Worker
 from compd.text import nan_to_null
 
-_NICE = 10
+if TYPE_CHECKING:
+    from compd.page.guard import Token
+
 # OOM score adjustment (at most 1000): the system ends a worker first if memory is short.
 _KILLED_FIRST = "700"
 # Exceptions that stand for an answer: a problem for a person, a missing key, a missing file.
 ERRORS = (CompdError, KeyError, IndexError, FileNotFoundError)
 
 
-def serve(messages: Connection, opening: str, arguments: Sequence[Any], kept: Any, memory_mb: float) -> None:
+def serve(
+    messages: Connection,
+    temporary: str,
+    opening: str,
+    arguments: Sequence[Any],
+    kept: Any,
+    memory_mb: float,
+    nice: int,
+) -> None:
     """Answer questions until the other end is closed.
 
+    temporary : directory of its temporary files, which the server removes after its end.
     opening : "package.module:Class" of the state. arguments : of the class, before `kept`. kept : `kept` of the state
-    in whose place this one comes, None for none. memory_mb : see `WorkerLimits`.
+    in whose place this one comes, None for none. memory_mb : see `WorkerLimits`. nice : priority of the process.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all its processes
     threading.Thread(target=end_with_the_parent, daemon=True).start()
-    _step_back()
+    _step_back(nice)
+    tempfile.tempdir = temporary
     limit_memory(memory_mb)
     state: Any = None
     while True:
@@ -81,15 +95,15 @@ def end_with_the_parent() -> None:
         os._exit(1)
 
 
-def _step_back() -> None:
+def _step_back(nice: int) -> None:
     """Give the daemon and the page precedence for processor and memory."""
-    os.setpriority(os.PRIO_PROCESS, 0, max(_NICE, os.getpriority(os.PRIO_PROCESS, 0)))
+    os.setpriority(os.PRIO_PROCESS, 0, max(nice, os.getpriority(os.PRIO_PROCESS, 0)))
     os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     Path("/proc/self/oom_score_adj").write_text(_KILLED_FIRST, encoding="ascii")
 
 
 # Most processes with their states in memory, on the daemon's computer.
-MAX_PROCESSES = 8
+MAX_PROCESSES = 16
 # Imports of the workers that the server's own process does without, in this order.
 PRELOADED = [
     "compd.page.workers.single_thread",
@@ -114,13 +128,14 @@ class Workers:
         """most : limit of processes at once."""
         self._context = multiprocessing.get_context("forkserver")
         self._most = most
-        self._workers: WeakSet[Worker] = WeakSet()
+        self._workers: weakref.WeakSet[Worker] = weakref.WeakSet()
+        self._temporary: str | None = None
         self._lock = threading.Lock()
         self.starting = threading.Lock()
 
     def prepare(self) -> None:
         """Start the process that workers are forked from, unless it runs. It imports what they need, which takes
-        seconds; this does not wait for it. Looking at the machine needs no worker."""
+        seconds; this does not wait for it."""
         with suppress(OSError):  # the start of a worker says it
             _STARTER.submit(self._ensure_running).result()
 
@@ -136,34 +151,48 @@ class Workers:
             self._workers.add(worker)
         return worker
 
-    def make_room(self, wanting: Worker) -> None:
-        """End the least recently used idle process if the limit is reached. Raises StateError if all are busy."""
+    def make_room(self, wanting: Worker, token: Token | None) -> list[Started]:
+        """Kill the least recently used idle process of each share of the token that is used up; return these.
+
+        Raises StateError if all processes of a share are busy.
+        """
         with self._lock:
             workers = list(self._workers)
-        running = [worker for worker in workers if worker.pid is not None and worker is not wanting]
-        excess = len(running) + 1 - self._most
-        for worker in sorted(running, key=lambda worker: worker.used_s):
-            if excess <= 0:
-                return
-            excess -= worker.rest()
-        if excess > 0:
-            raise too_many(wanting.name, self._most)
+        leaving: list[Started] = []
+        for share in shares_of(token, self._most):
+            running = [worker for worker in workers if worker.pid is not None and worker is not wanting]
+            holding = sorted((w for w in running if share.holds(w.token)), key=lambda worker: worker.used_s)
+            excess = len(holding) + 1 - share.most
+            for worker in holding:
+                if excess <= 0:
+                    break
+                if (ended := worker.left()) is not None:
+                    leaving += ended
+                    excess -= 1
+            if excess > 0:
+                raise too_many(wanting.name, share.most, share.whose)
+        return leaving
 
-    def start(self, arguments: tuple[Any, ...]) -> tuple[ForkServerProcess, Connection]:
-        """A new process and the connection to it. arguments : of `serve`, after the connection.
+    def start(self, arguments: tuple[Any, ...]) -> Started:
+        """Start a process. arguments : of `serve`, after the connection and the directory; call with `starting` held.
 
         Raises OSError or EOFError where the system lets none be started.
         """
+        if self._temporary is None:
+            self._temporary = tempfile.mkdtemp(prefix="compd-page-")
+            weakref.finalize(self, shutil.rmtree, self._temporary, ignore_errors=True)
+        temporary = tempfile.mkdtemp(dir=self._temporary)
         ours, theirs = self._context.Pipe()
         try:
-            process = self._context.Process(target=serve, args=(theirs, *arguments), daemon=True)
+            process = self._context.Process(target=serve, args=(theirs, temporary, *arguments), daemon=True)
             process.start()
         except BaseException:
             ours.close()
+            shutil.rmtree(temporary)
             raise
         finally:
             theirs.close()
-        return process, ours
+        return Started(process, ours, Path(temporary))
 
     def end(self) -> None:
         """End every process."""

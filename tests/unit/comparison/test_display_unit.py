@@ -25,7 +25,7 @@ UM = re.compile(r"(?<![\w.{])um(?![\w}])")
 
 @pytest.mark.parametrize(
     ("value", "figures", "text"),
-    [(0.1234, 2, "0.12 um"), (99.7, 2, "100 um"), (1234.4, 3, "1234 um"), (7.0, 3, "7.00 um"), (-250.0, 2, "-250 um")],
+    [(0.1234, 2, "0.12 um"), (99.7, 2, "100 um"), (1234.4, 3, "1.23 mm"), (7.0, 3, "7.00 um"), (-250.0, 2, "-250 um")],
 )
 def test_large_numbers_have_no_powers_of_ten(value: float, figures: int, text: str) -> None:
     assert format_error(value, figures=figures) == text

@@ -9,11 +9,12 @@ import pytest
 
 from compd.gauge import Quality
 from compd.live.loop.commands import Target
-from compd.live.machine.reasons import MAX_REASON_BYTES
+from compd.live.machine.reasons import MAX_NAMED_BYTES, GaugeFault, lost
 from compd.setpoint_states import State
 from tests.support.live_machine import HOLD_S, PERIOD_S, STEP_MM, machine
 from tests.support.live_models import thermal, warm, with_noise
 
+STALE = (Quality.STALE, "")
 FRAME = ("cabinet.t1", "cabinet.t2", "cabinet.t3")
 
 
@@ -186,8 +187,27 @@ def test_a_reason_names_gauges_in_groups_and_is_never_long():
     for k, channel in enumerate(lengths):
         tripod.faults[channel] = list(Quality)[1 + k % (len(Quality) - 1)]
     reason = tripod.step().reason
-    assert len(reason.encode()) <= MAX_REASON_BYTES
-    assert "STATUS names all" in reason
+    assert len(reason.encode()) <= 2 * MAX_NAMED_BYTES
+    assert "..." not in reason
+    assert "joint" in reason
+
+
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [
+        (4, "joint 1 (g1.position): timeout (no reply after 1 s)"),
+        (12, "joint 1, 3, 5, 7, 9, 11: timeout; joint 2, 4, 6, 8, 10, 12: stale"),
+        (200, "100 gauges: timeout; 100 gauges: stale"),
+    ],
+)
+def test_the_more_gauges_the_fewer_words_for_each_and_no_reason_is_cut(count, text):
+    faults = [
+        GaugeFault(f"joint {k}", f"g{k}.position", *((Quality.TIMEOUT, f"no reply after {k} s") if k % 2 else STALE))
+        for k in range(1, count + 1)
+    ]
+    reason = str(lost(faults))
+    assert reason.startswith(text)
+    assert len(reason.encode()) <= MAX_NAMED_BYTES
 
 
 def test_a_cycle_that_cannot_be_computed_names_the_gauge():

@@ -77,7 +77,7 @@ def test_what_dominates_is_named_with_its_age(name):
     setpoints = told(configured(name), FAULTS["loses one reply of a scale"])
     reasons = [each.reason for each in setpoints if each.state is State.REFUSED and 1.6 < each.time_s < 1.95]
     assert reasons
-    assert all("allowed 3000 um (`limits.tip_error_um`)" in reason for reason in reasons)
+    assert all("allowed 3.00 mm (`limits.tip_error_um`)" in reason for reason in reasons)
     assert all("most by scale 1 (scale_1.position), 0." in reason for reason in reasons[:5])
     assert "valid with newer readings" in reasons[0]
     setpoints = told(configured(name), FAULTS["is killed"])

@@ -129,6 +129,11 @@ class ChannelStatusKeys(Keys):
     warning: str | None = Field(
         default=None, description="what is to be looked at, of a length that is believed all the same"
     )
+    needs_person: bool | None = Field(
+        default=None,
+        description="true where a person has to accept it: now, or when it is back, because the machine has moved "
+        "since its last reading; absent otherwise",
+    )
 
 
 class StatusKeys(VersionKeys):

@@ -6,7 +6,7 @@ import { fetchArrays } from "./arrays.js";
 export class Bench extends Session {
   constructor(status) {
     super(status);
-    Object.assign(this, { panels: [], key: "", summary: null, rows: null, trial: null, tried_rms: null, doubts: new Map() });
+    Object.assign(this, { panels: [], key: "", summary: null, rows: null, trial: null, tried_rms: null, doubts: new Map(), warnings: new Map(), doubted: new Set() });
   }
 
   // JSON of the open recording. Throws the server's reason.
@@ -32,11 +32,28 @@ export class Bench extends Session {
   doubtOf(effect) {
     const { doubts } = this;
     if (!doubts.has(effect)) {
-      const asked = this.get(`effects/${effect}/doubt`).then(({ warning }) => warning);
+      const { summary, key } = this;
+      const asked = this.get(`effects/${effect}/doubt`).then(({ warning }) => {
+        if (this.summary === summary && this.key === key) this.warned(effect, warning);
+        return warning;
+      });
       asked.catch(() => doubts.delete(effect));
       doubts.set(effect, asked);
     }
     return doubts.get(effect);
+  }
+
+  // An effect has a warning, "" for none; until then it is unknown whether the rows support it.
+  warned(effect, warning) {
+    this.warnings.set(effect, warning);
+    for (const panel of this.panels) panel.warned?.(effect, warning);
+  }
+
+  // Whether the effect being tried, or one of the model that was added all the same, is without the support of the rows.
+  get isDoubted() {
+    const { summary, tried_rms, trying, warnings, doubted } = this;
+    const kept = summary.numbers.some(({ effect }) => doubted.has(`${this.key} ${effect}`));
+    return kept || (tried_rms !== null && warnings.get(trying) !== "");
   }
 
   // A change of the model or of the rows; the server refuses it after another browser's change.
@@ -55,7 +72,7 @@ export class Bench extends Session {
 
   // Another state of the open recording: every panel starts again.
   async show(summary) {
-    Object.assign(this, { summary: null, trial: null, tried_rms: null, doubts: new Map() });
+    Object.assign(this, { summary: null, trial: null, tried_rms: null, doubts: new Map(), warnings: new Map() });
     this.rows = await this.arrays("rows");
     this.summary = summary;
     document.getElementById("opened").hidden = false;

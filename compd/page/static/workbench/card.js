@@ -1,6 +1,6 @@
 // One effect: its description, a slider for each number, its fit, similar effects, and the step that adds it.
 import { CommandLine } from "../command_line.js";
-import { element, micro } from "../format.js";
+import { amounts, element } from "../format.js";
 import { ConstantSlider } from "./constant_slider.js";
 import { NumberSlider } from "./number_slider.js";
 import { Proposal } from "./proposal.js";
@@ -26,11 +26,13 @@ export class Card {
     const { bench } = this;
     this.card = bench.trial = null;
     bench.tried(null);
+    bench.trying = effect;
     return bench.attempt(async () => {
       const card = await bench.get(`effects/${effect}`);
       Object.assign(this, { card, variant: 0, theta: card.numbers.map(() => 0), trials: new Map() });
       this.show(bench.summary.commands.add.replace("EFFECT", () => card.named));
       if (!card.variants.length) return;
+      void bench.doubtOf(effect).catch(() => {}); // whether the rows support it is shown with the trial
       await this.restore();
       // the other choices of its constants, so that they follow the slider, too
       for (let k = 1; k < card.variants.length && this.card === card; k++) await this.trial(k);
@@ -62,7 +64,7 @@ export class Card {
     if (this.card !== card || this.variant !== variant) return; // another was chosen meanwhile
     bench.trial = trial;
     const best = card.variants[variant].left_out_rms;
-    this.left_out.textContent = `Error on rows left out, with its fit: ${best?.toFixed(2) ?? "–"} ${micro(bench.summary.unit)}.`;
+    this.left_out.textContent = `Error on rows left out, with its fit: ${amounts([best], bench.summary.unit)}.`;
     this.signature.show(bench.rows, trial, card);
     if (this.theta.some((value) => value !== 0)) bench.tried(this.theta);
   }

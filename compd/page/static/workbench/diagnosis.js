@@ -4,14 +4,14 @@ import { copyButton } from "../copy.js";
 import { element } from "../format.js";
 import { evidence, summaryLines } from "./evidence.js";
 
-// Intervals of requests while one runs, and otherwise, since another browser may begin one.
-const LOOK_EVERY_MS = 400;
+// Interval of requests while none runs, since another browser may begin one. A running one is followed without a pause,
+// which a browser would make long for a tab that is hidden; a diagnosis that nobody follows ends.
 const LOOK_AT_REST_MS = 3000;
 
 export class Diagnosis {
   // act: named(result) marks the findings, null for none; the others are those of `evidence`.
   constructor(place, act) {
-    Object.assign(this, { act, bench: null, key: "", shown: "", turn: 0, running: false });
+    Object.assign(this, { act, bench: null, key: "", shown: "", turn: 0, running: false, follows: false });
     this.button = element("button", { type: "button", id: "diagnose", onclick: () => this.startOrCancel() }, "Diagnose (d)");
     this.command = new CommandLine();
     this.stages = element("ol", { class: "stages", "aria-label": "Stages of the diagnosis" });
@@ -53,20 +53,24 @@ export class Diagnosis {
   async look() {
     const turn = ++this.turn;
     clearTimeout(this.looking);
+    let failed = false;
     try {
-      const job = await this.bench.get(`diagnosis?shown=${this.shown}`);
+      const job = await this.bench.get(`diagnosis?shown=${this.shown}${this.follows ? "&follow" : ""}`);
       if (turn !== this.turn) return;
       this.show(job);
     } catch {
       // the page's server is away, or has restarted: other parts report it
       if (turn !== this.turn) return;
+      failed = true;
     }
-    this.looking = setTimeout(() => this.look(), this.running ? LOOK_EVERY_MS : LOOK_AT_REST_MS);
+    if (this.follows && !failed) this.look();
+    else this.looking = setTimeout(() => this.look(), LOOK_AT_REST_MS);
   }
 
   show(job) {
     const { id, state, seconds, behind } = job;
     this.running = state === "running";
+    this.follows = this.running || job.page === null;
     this.button.textContent = this.running ? `Cancel, ${seconds.toFixed(0)} s` : "Diagnose (d)";
     if (state === "none") return;
     if (this.running) this.clear();

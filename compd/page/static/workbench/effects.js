@@ -1,5 +1,5 @@
 // The effects of the library, the one that explains most first; chosen by mouse, or by j and k.
-import { element, micro } from "../format.js";
+import { amounts, element } from "../format.js";
 
 export class Effects {
   // choose: called with an effect; ranked: called with the server's ranking
@@ -13,16 +13,33 @@ export class Effects {
     Object.assign(this, { effects: [], draft: null, chosen: "", noise: "" });
     this.draw();
     this.note.textContent = "computing each effect …";
-    this.unit = bench.summary.unit;
+    Object.assign(this, { unit: bench.summary.unit, warnings: bench.warnings });
     const ranking = await bench.get("effects");
     Object.assign(this, { effects: ranking.effects, noise: ranking.noise });
     this.ranked(ranking);
     this.draw();
-    for (const { effect, warning } of this.effects) if (warning !== null) bench.doubts.set(effect, warning);
+    for (const { effect, warning } of this.effects) {
+      if (warning === null) continue;
+      bench.doubts.set(effect, warning);
+      bench.warned(effect, warning);
+    }
     // the diagnosis that says whether the rows support an effect begins while a person still looks
-    if (this.effects.length) void bench.doubtOf(this.effects[0].effect);
+    void this.askDoubts(bench);
     // what was chosen stays chosen while it is still offered
     if (last && this.effects.some(({ effect }) => effect === last)) await this.pick(last);
+  }
+
+  // In turn: the first takes a diagnosis, the others are answered from it.
+  async askDoubts(bench) {
+    const { effects } = this;
+    for (const { effect, explained } of effects) {
+      if (this.effects !== effects) return;
+      if (explained !== null) await bench.doubtOf(effect).catch(() => {});
+    }
+  }
+
+  warned() {
+    this.draw();
   }
 
   // Mark the findings of a diagnosis; null for none.
@@ -75,7 +92,7 @@ export class Effects {
 
   row({ effect, status, why, explained, left_out_rms, own, remark = this.remarks[effect] }) {
     const percent = explained === null || this.noise ? null : Math.round(100 * Math.max(0, Math.min(1, explained)));
-    const bar = element("i");
+    const bar = element("i", { class: this.warnings?.get(effect) === "" ? "" : "doubted" }); // green where the rows support it
     bar.style.width = `${percent ?? 0}%`;
     return element(
       "button",
@@ -88,6 +105,6 @@ export class Effects {
 
   // The error left by an effect, tried alone.
   left(status, why, rms) {
-    return status === "partial" || status === "explains" ? `alone, leaves ${rms.toFixed(2)} ${micro(this.unit)}` : why;
+    return status === "partial" || status === "explains" ? `alone, leaves ${amounts([rms], this.unit)}` : why;
   }
 }

@@ -1,5 +1,5 @@
 // The values of the row whose mark is below the pointer.
-import { element, micro } from "../format.js";
+import { amounts, element } from "../format.js";
 import { placeUnit } from "./space_view.js";
 
 const NEAR_PX = 8;
@@ -46,7 +46,7 @@ function rowText({ rows, residual }, row) {
   const m = rows.labels.length;
   const [unit, per_mm] = placeUnit(rows.unit);
   const place = [...rows.place_mm.subarray(3 * row, 3 * row + 3)].map((value, k) => (Number.isFinite(value) ? `${"xyz"[k]} ${(value * per_mm).toFixed(2)}` : "")).filter(Boolean);
-  const errors = (array) => rows.labels.map((name, k) => `${name} ${array[m * row + k].toFixed(2)} ${micro(rows.units[k])}`).join(", ");
+  const errors = (array) => rows.labels.map((name, k) => `${name} ${amounts([array[m * row + k]], rows.units[k])}`).join(", ");
   const quantities = Object.entries(rows.quantity_titles).map(([name, title]) => `${title}: ${Number(rows[name][row].toPrecision(5))}`);
   return [
     `row ${rows.row[row]}, ${rows.time_title}: ${Number(rows.time_s[row].toPrecision(6))}`,

@@ -1,9 +1,11 @@
 // The model: its numbers, its steps as a staircase of the error, and the way back.
 import { CommandLine } from "../command_line.js";
-import { element, ink, micro, prepared } from "../format.js";
+import { amounts, element, ink, micro, prepared } from "../format.js";
 import { Proposal } from "./proposal.js";
 import { stroke } from "./ticks.js";
 
+// Two errors of the staircase that look the same (share of its height).
+const SAME = 0.005;
 const words = (effect) => effect.replaceAll("_", " ");
 
 export class Ledger {
@@ -30,7 +32,7 @@ export class Ledger {
     this.place.replaceChildren(
       element("h2", {}, "Model ", element("small", {}, model)),
       canvas,
-      table(ledger.map((step) => [`${step.kind}${step.undone ? ", undone" : ""}`, words(step.effect), `${step.before.toFixed(2)} → ${step.after.toFixed(2)} ${micro(step.unit)}`])),
+      table(ledger.map((step) => [`${step.kind}${step.undone ? ", undone" : ""}`, words(step.effect), amounts([step.before, step.after], step.unit)]), ledger.map(({ before, after }) => after > before)),
       table(numbers.map((entry) => [`${words(entry.effect)} ${entry.parameter}`, value(entry)]), numbers.map(({ plausible }) => !plausible)),
       ...(numbers.length ? [] : [element("p", { class: "note" }, "No effect yet.")]),
       element("div", { class: "row" }, this.button, ...fit, ...removals),
@@ -45,26 +47,30 @@ export class Ledger {
   draw(canvas, ledger, floor, unit) {
     const { context, width, height } = prepared(canvas);
     if (!ledger.length) return;
-    const errors = [ledger[0].before, ...ledger.map(({ after }) => after)];
-    const top = Math.max(...errors) * 1.1;
-    const [x, y] = [(k) => 8 + (k * (width - 16)) / errors.length, (value) => height - 16 - (value / top) * (height - 30)];
-    context.beginPath();
-    errors.forEach((error, k) => {
-      context.lineTo(x(k), y(error));
-      context.lineTo(x(k + 1), y(error));
-    });
-    context.strokeStyle = ink("--line");
+    const top = Math.max(...ledger.flatMap(({ before, after }) => [before, after])) * 1.1;
+    const [x, y] = [(k) => 8 + (k * (width - 16)) / (ledger.length + 1), (value) => height - 16 - (value / top) * (height - 30)];
     context.lineWidth = 2;
-    context.stroke();
+    // each step from its own error before: of another recording, or of other rows, that is not the last one's after
+    stroke(context, "--line", x(0), y(ledger[0].before), x(1), y(ledger[0].before));
+    ledger.forEach(({ before, after }, k) => {
+      const colour = after > before ? "--bad" : "--line";
+      stroke(context, colour, x(k + 1), y(before), x(k + 1), y(after));
+      stroke(context, colour, x(k + 1), y(after), x(k + 2), y(after));
+      const last = k ? ledger[k - 1].after : before;
+      if (Math.abs(last - before) < SAME * top) return;
+      context.setLineDash([2, 3]);
+      stroke(context, "--soft", x(k + 1), y(last), x(k + 1), y(before));
+      context.setLineDash([]);
+    });
     context.font = "11px system-ui";
     context.fillStyle = ink("--soft");
     if (floor !== null) {
       context.setLineDash([4, 4]);
       stroke(context, "--soft", 8, y(floor), width - 8, y(floor));
       context.setLineDash([]);
-      context.fillText(`noise ${floor.toFixed(2)} ${micro(unit)}`, 10, y(floor) - 3);
+      context.fillText(`noise ${amounts([floor], unit)}`, 10, y(floor) - 3);
     }
-    ledger.forEach((step, k) => context.fillText(`${step.kind === "add" ? "+" : step.kind === "remove" ? "−" : step.kind} ${words(step.effect)}`, x(k + 1) + 3, Math.max(11, y(errors[k + 1]) - 4)));
+    ledger.forEach((step, k) => context.fillText(`${step.kind === "add" ? "+" : step.kind === "remove" ? "−" : step.kind} ${words(step.effect)}`, x(k + 1) + 3, Math.max(11, y(step.after) - 4)));
   }
 }
 

@@ -2,7 +2,7 @@
 import { Age } from "../age.js";
 import { describe } from "../banner.js";
 import { scaleFor } from "../bar.js";
-import { causeColour, element } from "../format.js";
+import { amounts, causeColour, element, lengthText } from "../format.js";
 import { listen } from "../live_events.js";
 import { firstStep } from "../order_names.js";
 import { Orders } from "../orders.js";
@@ -92,7 +92,7 @@ export class LiveModel {
     const key = JSON.stringify([rows, seconds]);
     if (key === this.drawn) return;
     this.drawn = key;
-    this.bars.replaceChildren(...rows.map((row) => errorBar(scale_um, ...row)), element("p", { class: "note" }, `Bars end at ${scale_um} µm. ${seconds < 1 ? "The live numbers have just begun." : `The live numbers are of ${seconds.toFixed(0)} s.`}`), element("p", { class: "note" }, MEANING));
+    this.bars.replaceChildren(...rows.map((row) => errorBar(scale_um, ...row)), element("p", { class: "note" }, `Bars end at ${lengthText(scale_um)}. ${seconds < 1 ? "The live numbers have just begun." : `The live numbers are of ${seconds.toFixed(0)} s.`}`), element("p", { class: "note" }, MEANING));
   }
 }
 
@@ -104,7 +104,7 @@ function errorBar(scale_um, label, values_um, unknown, colour, axes_um) {
     piece.style.background = colour;
     return piece;
   });
-  const number = values_um ? `${values_um.map((value) => value.toFixed(2)).join(" → ")} µm` : unknown;
-  const axes = axes_um ? `${["x", "y", "z"].map((axis, k) => `${axis} ${axes_um[k].toFixed(2)}`).join(", ")}; together ${Math.hypot(...axes_um).toFixed(2)} µm` : "";
+  const number = values_um ? amounts(values_um, "um") : unknown;
+  const axes = axes_um ? `${["x", "y", "z"].map((axis, k) => `${axis} ${axes_um[k].toFixed(2)}`).join(", ")}; together ${amounts([Math.hypot(...axes_um)], "um")}` : "";
   return element("div", { class: "error-bar" }, element("div", { class: "head" }, element("span", {}, label), element("b", {}, number)), element("div", { class: "bar", "aria-hidden": "true" }, ...pieces), element("small", {}, axes));
 }

@@ -53,6 +53,16 @@ new ResizeObserver(() => {
   document.documentElement.style.setProperty("--above", above || "0px");
 }).observe(header);
 
+// each recording has a model file of its own, unless the person has named another one
+const ownModel = (recording) => `${recording.slice(0, 64)}.model.yaml`;
+let suggested = "";
+const suggestModel = () => {
+  const model = at("model");
+  if (model.value.trim() && model.value !== suggested) return;
+  model.value = suggested = at("recording").value ? ownModel(at("recording").value) : "";
+};
+at("recording").addEventListener("change", suggestModel);
+
 const open = () => bench.attempt(() => bench.open(at("recording").value, at("model").value.trim(), [...document.querySelectorAll("#libraries input:checked")].map(({ value }) => value)));
 at("open").addEventListener("click", open);
 bench.attempt(async () => {
@@ -64,9 +74,9 @@ bench.attempt(async () => {
   // the recording requested by another page
   const asked = new URLSearchParams(location.search);
   if (asked.has("model")) at("model").value = asked.get("model");
-  if (!asked.has("recording")) return;
-  at("recording").value = asked.get("recording");
-  await open();
+  if (asked.has("recording")) at("recording").value = asked.get("recording");
+  suggestModel();
+  if (asked.has("recording")) await open();
 });
 // pictures have the colours of the theme in which they are drawn
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => [picture, ledger].forEach((shown) => shown.redraw()));

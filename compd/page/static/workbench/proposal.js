@@ -1,5 +1,5 @@
 // Preview of a step of the model: the table old -> new, before it is written.
-import { element, micro } from "../format.js";
+import { amounts, element, micro } from "../format.js";
 
 const number = (value, digits = 4) => (value === null || value === undefined ? "–" : String(Number(value.toPrecision(digits))).replace("-", "−"));
 
@@ -11,6 +11,11 @@ export class Proposal {
   clear() {
     this.shown = null;
     this.place.replaceChildren();
+  }
+
+  confirm(bench, step, warning) {
+    if (warning) bench.doubted.add(`${bench.key} ${step.effect}`);
+    return bench.change("step", step);
   }
 
   // Show the preview of a step; it can be made once the rows left out have told whether they support what is added.
@@ -27,7 +32,7 @@ export class Proposal {
       this.place.replaceChildren(
         element("div", { class: "consequence" },
           doubt,
-          element("p", {}, element("b", {}, `${outcome.rms[0].toFixed(2)} → ${outcome.rms[1].toFixed(2)} ${micro(outcome.unit)}`), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${outcome.verdict}`),
+          element("p", {}, element("b", { class: outcome.rms[1] > outcome.rms[0] ? "worse" : "" }, amounts(outcome.rms, outcome.unit)), `, floor ratio ${outcome.floor_ratio.map((value) => value?.toFixed(2) ?? "–").join(" → ")}. ${outcome.verdict}`),
           ...(outcome.differ ? [element("p", { class: "note" }, `Both errors are ${outcome.differ}.`)] : []),
           element("div", { class: "numbers", tabindex: 0, role: "region", "aria-label": "Numbers of the model" }, element("table", {}, element("thead", {}, element("tr", {}, ...["number", "was", "will be", "unit"].map((head) => element("th", {}, head)))), element("tbody", {}, ...rows))),
           ...(outcome.gone.length ? [element("p", {}, `Gone: ${outcome.gone.join(", ")}`)] : []),
@@ -39,7 +44,7 @@ export class Proposal {
       const warning = await Promise.resolve(doubted).finally(() => asking.remove());
       if (this.shown !== step) return;
       if (warning) doubt.replaceChildren(element("p", { class: "warning", role: "alert" }, element("b", {}, "Not supported by these rows. "), warning));
-      const confirm = element("button", { type: "button", id: "confirm", onclick: () => bench.attempt(() => bench.change("step", step)) }, warning ? `${verb} all the same` : verb);
+      const confirm = element("button", { type: "button", id: "confirm", onclick: () => bench.attempt(() => this.confirm(bench, step, warning)) }, warning ? `${verb} all the same` : verb);
       last.prepend(confirm);
       if (!warning) confirm.focus({ preventScroll: true });
       this.place.scrollIntoView({ block: "nearest" });

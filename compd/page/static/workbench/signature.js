@@ -1,5 +1,5 @@
 // Signature of an effect alone: arrows with every number at the end of its plausible range.
-import { element, ink, micro, prepared } from "../format.js";
+import { amounts, element, ink, prepared } from "../format.js";
 import { SpaceView, mapped } from "./space_view.js";
 
 // Around the map, without numbers.
@@ -26,7 +26,7 @@ export class Signature {
     view.layout(rows, largest, width, height);
     context.fillStyle = ink("--soft");
     view.paint(context, rows, moved, view.marks(rows), used);
-    const text = `its signature from the front, numbers at the end of their plausible ranges: up to ${largest.toFixed(1)} ${micro(rows.unit)}`;
+    const text = `its signature from the front, numbers at the end of their plausible ranges: up to ${amounts([largest], rows.unit)}`;
     this.canvas.setAttribute("aria-label", text);
     this.note.textContent = text;
   }

@@ -1,5 +1,5 @@
 // Rows at their measured places with residuals as arrows: in three dimensions, or as a map.
-import { micro } from "../format.js";
+import { amounts, micro } from "../format.js";
 import { drawBox, drawMachine } from "./box.js";
 import { Pixels } from "./pixels.js";
 import { axisBelow, axisLeft, scaleBar } from "./ticks.js";
@@ -30,7 +30,7 @@ export class SpaceView {
     const radius = Math.hypot(...seen.map((axis) => high[axis] - low[axis])) / 2 || 1;
     this.times = (LONGEST * radius) / (largest || 1);
     Object.assign(this, { project, width, height });
-    this.note = `arrows ${Math.round(this.times * 1000)} times longer than the residual; the longest is ${largest.toFixed(2)} ${micro(rows.unit)}. ${this.hint}`;
+    this.note = `arrows ${Math.round(this.times * 1000)} times longer than the residual; the longest is ${amounts([largest], rows.unit)}. ${this.hint}`;
   }
 
   // (2 n) x and y of every row.

@@ -1,6 +1,6 @@
 // The large numbers on top: the fall of the error from the machine without any effect to the model and to the trial,
 // the error on rows left out, and the noise.
-import { element, micro } from "../format.js";
+import { amounts, element, micro } from "../format.js";
 
 // Most quantities listed as followed by the residual.
 const MAX_TRENDS = 3;
@@ -32,18 +32,22 @@ export class Strip {
     this.try();
   }
 
+  warned() {
+    this.try();
+  }
+
   try() {
     const { summary, tried_rms } = this.bench;
     if (!summary) return;
     const { rms, fall, floor, floor_known, unit, rows, used, numbers } = summary;
     const [start, now] = numbers.length ? fall.rms : [rms, rms];
     const lowest = tried_rms ?? now;
-    const big = (value, text, name = "") => element("div", { class: name }, element("b", {}, value === null || value === undefined ? "–" : `${value.toFixed(2)} ${micro(unit)}`), element("small", {}, text));
+    const big = (value, text, name = "") => element("div", { class: name }, element("b", {}, value === null || value === undefined ? "–" : amounts([value], unit)), element("small", {}, text));
     const path = [start, ...(numbers.length ? [now] : []), ...(tried_rms === null ? [] : [tried_rms])];
-    const text = `${path.map((value) => value?.toFixed(2) ?? "–").join(" → ")} ${micro(unit)}`;
+    const text = amounts(path, unit);
     const states = ["without effects", "with the model", "tried"].filter((_, k) => [true, numbers.length > 0, tried_rms !== null][k]).join(" → ");
     this.numbers.replaceChildren(
-      ...(path.length > 1 ? [element("div", { class: "fall" }, element("b", {}, text), element("small", {}, `${states}${numbers.length && fall.differ ? `; ${fall.differ}` : ""}`))] : []),
+      ...(path.length > 1 ? [element("div", { class: `fall${path.at(-1) > path[0] ? " worse" : ""}${this.bench.isDoubted ? " doubted" : ""}` }, element("b", {}, text), element("small", {}, `${states}${numbers.length && fall.differ ? `; ${fall.differ}` : ""}${this.bench.isDoubted ? "; not shown to be supported by these rows" : ""}${path.at(-1) > path[0] ? "; it makes the error larger" : ""}`))] : []),
       big(rms, `error now, ${used} of ${rows} rows`, "now"),
       big(this.left_out_rms, "on rows left out", "held"),
       big(tried_rms, tried_rms === null ? "nothing is tried" : "tried, not kept", "tried"),
@@ -55,6 +59,8 @@ export class Strip {
       return made;
     };
     this.bar.setAttribute("aria-label", `The error as a bar: ${start.toFixed(2)} ${micro(unit)} without effects, ${rms.toFixed(2)} now${tried_rms === null ? "" : `, ${tried_rms.toFixed(2)} with the trial`}, noise ${floor?.toFixed(2) ?? "not known"}`);
+    this.bar.classList.toggle("worse", lowest > start);
+    this.bar.classList.toggle("doubted", this.bench.isDoubted);
     this.bar.replaceChildren(part("left", lowest), part("noise", floor ?? 0));
   }
 }

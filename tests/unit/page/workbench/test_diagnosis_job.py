@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 import signal
 import subprocess
@@ -37,7 +38,7 @@ def test_its_steps_its_result_and_its_page(path):
     assert outcome["result"]["verdict"] == outcome["evidence"]["verdict"] == "identified"
     assert "link_expansion" in outcome["printed"]
     assert answer["page"] is True
-    page = job.page.decode()
+    page = gzip.decompress(job.page).decode()
     assert page.startswith("<!doctype html>")
     assert "link_expansion" in page
     assert job.has_ended

@@ -45,7 +45,7 @@ def ask(worker, question, *given, seconds=PATIENCE_S):
 
 
 def process_of(worker):
-    return worker._process
+    return worker._running.process
 
 
 def has_ended(process):
@@ -150,8 +150,8 @@ def test_it_ends_when_it_is_idle_and_goes_on_later(workers):
     before = json.loads(ask(worker, "count", 1))
     after = json.loads(ask(worker, "count", 1))
     assert after["count"] == 2
-    if (process := process_of(worker)) is not None:
-        assert has_ended(process)
+    if worker.pid is not None:
+        assert has_ended(process_of(worker))
     assert before["pid"] != os.getpid()
 
 
