@@ -7,7 +7,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.data_fault import DataFault
 from compd.display_unit import format_error
-from compd.recording.visits import file_numbers
+from compd.recording import file_numbers
 
 # Why a row does not count of which nothing more is known.
 OUTLIER = "beyond all noise"

@@ -10,8 +10,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.columns import ID_COLUMNS, approach_columns
 from compd.errors import Problem, RecordingError
-from compd.recording import Recording
-from compd.recording.visits import file_numbers
+from compd.recording import Recording, file_numbers
 
 # Largest motion (mm) of the scales of a machine at rest, unless their own noise imitates more.
 STILL_MM = 0.001
