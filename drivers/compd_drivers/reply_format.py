@@ -30,11 +30,12 @@ Sources: StreamDevice (format converters, enumerations, checksums), C printf.
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 from collections.abc import Callable, Collection, Iterator, Mapping
 from random import Random
-from typing import Literal, cast
+from typing import Literal, Self, cast
 
 from compd.lines import CHECKSUMS, ChecksumField, ChecksumKind
 from compd.text import unescape
@@ -50,6 +51,17 @@ _CONVERTER = re.compile(
     r"(?:(?P<kind>[fdexcs])|\[(?P<set>\^?\]?[^\]]*)\]|\{(?P<words>[^}]*)\}))",
 )
 _BYTE = struct.Struct("B").pack
+
+
+class MultipliedNumber(float):
+    """A number that a unit beside it has multiplied. raw : the number as it was sent, with its sign."""
+
+    def __new__(cls, value: float, raw: float) -> Self:
+        number = super().__new__(cls, value)
+        number.raw = raw
+        return number
+
+    raw: float
 
 
 class ReplyFormat:
@@ -127,10 +139,13 @@ class ReplyFormat:
             value = number.value(text, self._sign_is_elsewhere(number.channel))
             if value is None:
                 return None
+            raw = value
             for index, words in enumerate(self._words):
                 if words.channel == number.channel:
-                    value *= words.factors[match[f"w{index}"].decode("latin-1")]
-            values.append(value)
+                    factor = words.factors[match[f"w{index}"].decode("latin-1")]
+                    value *= factor
+                    raw *= math.copysign(1.0, factor)
+            values.append(value if raw == value else MultipliedNumber(value, raw))
         return tuple(values)
 
     def samples(self, count: int) -> Iterator[bytes]:

@@ -62,7 +62,7 @@ from compd.text import unescape
 from compd_drivers.ascii_description import Description, ErrorReply, PollForm, SerialAsciiOptions
 from compd_drivers.exchange import MenuSilence, ask, nothing_behind, receive, receive_line
 from compd_drivers.measured import RANGE_OPTION, doubts
-from compd_drivers.reply_format import ReplyFormat
+from compd_drivers.reply_format import MultipliedNumber, ReplyFormat
 
 
 class SerialAscii(Gauge[ByteLine]):
@@ -267,7 +267,8 @@ class SerialAscii(Gauge[ByteLine]):
         channel = self._measured[k]
         if isinstance(value, bytes):
             return bad(time_s, Quality(self._instead[k][value]), value.decode("ascii", "backslashreplace").strip())
-        return channel.reading(value / 10**channel.decimals, time_s, value, self._full_scale[k])
+        raw = value.raw if isinstance(value, MultipliedNumber) else value
+        return channel.reading(value / 10**channel.decimals, time_s, raw, self._full_scale[k])
 
 
 def _shown(reply: bytes, error: ErrorReply) -> str:

@@ -15,7 +15,7 @@ from compd.live import daemon as daemon_module
 from tests.benchmarks.bench_latency import AllAtOnce
 from tests.benchmarks.bench_loop import configuration
 from tests.benchmarks.figures import median_and_p99, quiet, show
-from tests.benchmarks.limits import first_good, run_limited
+from tests.benchmarks.limits import first_good, printed_lines, run_limited
 from tests.support.running_daemon import supervised
 
 RATE_HZ = 200
@@ -61,8 +61,7 @@ def measure(socket_path: str, *flood: str) -> list[float]:
         assert flooder.stdout is not None
         flooder.stdout.readline()
     watcher = subprocess.Popen([sys.executable, "-c", WATCHER, socket_path], stdout=subprocess.PIPE, text=True)
-    assert watcher.stdout is not None
-    delays_s = [float(watcher.stdout.readline().split()[0]) for _ in range(SETPOINTS)]
+    delays_s = [float(line.split()[0]) for line in printed_lines(watcher, SETPOINTS)]
     for process in filter(None, (watcher, flooder)):
         process.kill()
         process.communicate()

@@ -23,7 +23,7 @@ from tests.benchmarks.bench_cycle import EFFECTS
 from tests.benchmarks.bench_latency import CLIENT, AllAtOnce
 from tests.benchmarks.bench_loop import PRIORITY, configuration
 from tests.benchmarks.figures import median_and_p99, quiet, show
-from tests.benchmarks.limits import first_good, run_limited
+from tests.benchmarks.limits import first_good, printed_lines, run_limited
 from tests.support.live_models import file_with
 from tests.support.running_daemon import supervised
 
@@ -57,8 +57,7 @@ def daemon_run(seconds: int) -> Run:
             process = subprocess.Popen(
                 [sys.executable, "-c", CLIENT, f"{directory}/s"], stdout=subprocess.PIPE, text=True
             )
-            assert process.stdout is not None
-            lines = [process.stdout.readline() for _ in range(READINGS_PER_S * seconds)]
+            lines = printed_lines(process, READINGS_PER_S * seconds)
             missed = daemon.loop_process.timing.missed - missed
             process.terminate()
             process.communicate()

@@ -19,7 +19,7 @@ from compd.live import daemon as daemon_module
 from compd.live.memory import Latest
 from tests.benchmarks.bench_loop import configuration
 from tests.benchmarks.figures import median_and_p99, quiet, show
-from tests.benchmarks.limits import first_good, run_limited
+from tests.benchmarks.limits import first_good, printed_lines, run_limited
 from tests.support.live_machine import RAW_AT_ZERO_MM
 from tests.support.running_daemon import supervised
 
@@ -76,8 +76,7 @@ def measure(rate_hz: float) -> list[tuple[float, ...]]:
     with tempfile.TemporaryDirectory(prefix="bench-") as directory, supervised(configuration(Path(directory), rate_hz)):
         first_good(f"{directory}/s")
         client = subprocess.Popen([sys.executable, "-c", CLIENT, f"{directory}/s"], stdout=subprocess.PIPE, text=True)
-        assert client.stdout is not None
-        found = [tuple(map(float, client.stdout.readline().split())) for _ in range(READINGS)]
+        found = [tuple(map(float, line.split())) for line in printed_lines(client, READINGS)]
         client.terminate()
         client.communicate()
     return found

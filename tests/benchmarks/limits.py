@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -62,3 +63,12 @@ def first_good(socket: Path | str, within_s: float = BEGINS_WITHIN_S) -> Message
             if setpoint["state"] == "ok":
                 return setpoint
     raise SystemExit("The benchmark cannot begin. The daemon closed the connection before its first good setpoint")
+
+
+def printed_lines(client: subprocess.Popen[str], count: int) -> list[str]:
+    """The first `count` lines that a client prints. SystemExit where it ends before: the daemon drops a slow client."""
+    assert client.stdout is not None
+    lines = [line for line in (client.stdout.readline() for _ in range(count)) if line]
+    if len(lines) < count:
+        raise SystemExit(f"The client ended after {len(lines)} of {count} setpoints. Run again on an idle computer")
+    return lines

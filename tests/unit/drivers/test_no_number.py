@@ -128,6 +128,8 @@ def test_other_numbers_are_readings(kind: str, words: list[int]) -> None:
         ("%f", b"-9999.0", {}),
         ("%d", b"-9999", {"decimals": 3}),
         ("%{+=1|-=-1}%f", b"-9999.0", {}),
+        ("%f%{mm=1|um=0.001}", b"-9999.0um", {}),
+        ("%{+=1|-=-1}%4x%{mm=1|um=0.001}", b"+FFFFum", {}),
         ("%+4x", b"7FFF", {"scale": 0.001}),
         ("%+4x", b"8000", {"scale": 0.001}),
         ("%8x", b"FFFFFFFF", {"scale": 1e-6}),

@@ -14,7 +14,7 @@ import pytest
 from tests.benchmarks import limits
 from tests.benchmarks.bench_loop import configuration
 from tests.benchmarks.cost_table import ROOT
-from tests.benchmarks.limits import first_good, limit
+from tests.benchmarks.limits import first_good, limit, printed_lines
 
 # Together they take 15 s of processor time; each of the others takes more, or compiles kernels.
 SHORT = ("exports", "flood", "gateway", "kilohertz", "kinematics", "latency")
@@ -57,6 +57,12 @@ def test_a_daemon_without_good_setpoints_ends_the_benchmark_with_its_reason(monk
     monkeypatch.setattr(limits, "connect", connect)
     with pytest.raises(SystemExit, match=r"cannot begin.*no_zero: bring the machine to its zero position"):
         first_good("/no/socket", within_s=0.05)
+
+
+def test_a_client_that_ends_before_its_time_ends_the_benchmark_with_a_sentence():
+    client = subprocess.Popen([sys.executable, "-c", "print(1)"], stdout=subprocess.PIPE, text=True)
+    with client, pytest.raises(SystemExit, match="after 1 of 3 setpoints"):
+        printed_lines(client, 3)
 
 
 def test_a_limit_leaves_the_limit_around_it():
