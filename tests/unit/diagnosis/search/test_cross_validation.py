@@ -51,8 +51,8 @@ def test_places_without_points_are_divided_into_sectors(tmp_path: Path) -> None:
 
 
 def test_visits_without_points_lie_in_one_sector(tmp_path: Path) -> None:
-    columns = measured_places()
     visit = np.arange(120) // 2
+    columns = {name: values[visit] for name, values in measured_places().items()}
     by_sector = splits(tmp_path, {**columns, "visit": visit.astype(float)})[1]
     assert (by_sector[::2] == by_sector[1::2]).all()
 
@@ -79,8 +79,8 @@ def test_folds_by_a_column_leave_out_each_of_its_values(tmp_path: Path) -> None:
 
 
 def test_folds_by_a_quantity_are_classes_that_keep_visits_whole(tmp_path: Path) -> None:
-    columns = measured_places()
     visit = np.arange(120) // 3
+    columns = {name: values[visit] for name, values in measured_places().items()}
     room = np.cumsum(np.random.default_rng(6).normal(0, 0.1, 120))
     room[30:33] = np.nan
     columns |= {"visit": visit.astype(float), "temperature_room_degC": room}
