@@ -96,7 +96,7 @@ def correct(user: NaiveUser) -> None:
     user.press("Adopt it …")
     user.press("Adopt the shadow's model")
     user.see("Done: adopt the shadow's model.")
-    user.see("Applied: machine.model.yaml (link expansion")
+    user.see("Applied: monday.model.yaml (link expansion")
 
 
 def accept(user: NaiveUser) -> None:

@@ -75,6 +75,12 @@ def test_what_the_rows_support_is_green_and_large_and_on_another_recording_red(t
     assert other.evaluate(size) < large
     assert other.evaluate("getComputedStyle(document.querySelector('.fall b')).color") == "rgb(179, 71, 0)"
     assert other.locator(".falling.worse").count() == 1
+    other.locator("#fit-all").click()
+    until(other, "document.getElementById('confirm')")
+    other.locator("#confirm").click()
+    until(other, "document.querySelector('.fall.doubted') && !document.querySelector('.fall.worse')")
+    assert "outside its plausible range" in other.locator(".fall").inner_text()
+    assert other.evaluate(size) < large
 
 
 def test_what_is_tried_without_support_is_not_large(tabs):

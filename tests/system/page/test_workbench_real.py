@@ -66,7 +66,7 @@ def test_effects_of_a_real_machine_are_found_and_added_by_mouse(
     path = tmp_path / "recordings" / f"{recording}.csv"
     for effect in named:
         by_command = add_effect(by_command, f"{source}:{effect}", path)
-    by_mouse = read_stored(tmp_path / "machine.model.yaml")
+    by_mouse = read_stored(tmp_path / f"{recording}.model.yaml")
     assert by_mouse.state == by_command.state()
     assert [(s.kind, s.effect, s.rms_before_um, s.rms_after_um) for s in by_mouse.steps] == [
         (s.kind, s.effect, s.rms_before_um, s.rms_after_um) for s in by_command.steps

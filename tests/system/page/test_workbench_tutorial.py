@@ -70,7 +70,7 @@ def test_a_hidden_effect_is_found_added_and_adopted_by_mouse_with_the_ledger_of_
             *("effect", "add", effect, "--recording", recordings / "survey.csv"),
             *("--machine", machine, "--model", run.directory / "by-command.model.yaml"),
         )
-        by_mouse = read_stored(run.directory / "machine.model.yaml")
+        by_mouse = read_stored(run.directory / "survey.model.yaml")
         by_command = read_stored(run.directory / "by-command.model.yaml")
         assert by_mouse.state == by_command.state
         ledgers = [

@@ -49,11 +49,12 @@ export class Bench extends Session {
     for (const panel of this.panels) panel.warned?.(effect, warning);
   }
 
-  // Whether the effect being tried, or one of the model that was added all the same, is without the support of the rows.
-  get isDoubted() {
+  // Why the fall of the error is no success: of the effect being tried, or of one in the model; "" where it is one.
+  get doubt() {
     const { summary, tried_rms, trying, warnings, doubted } = this;
+    if (summary.numbers.some(({ plausible }) => !plausible)) return "a number of the model is outside its plausible range";
     const kept = summary.numbers.some(({ effect }) => doubted.has(`${this.key} ${effect}`));
-    return kept || (tried_rms !== null && warnings.get(trying) !== "");
+    return kept || (tried_rms !== null && warnings.get(trying) !== "") ? "not shown to be supported by these rows" : "";
   }
 
   // A change of the model or of the rows; the server refuses it after another browser's change.

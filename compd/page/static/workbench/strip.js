@@ -47,7 +47,7 @@ export class Strip {
     const text = amounts(path, unit);
     const states = ["without effects", "with the model", "tried"].filter((_, k) => [true, numbers.length > 0, tried_rms !== null][k]).join(" → ");
     this.numbers.replaceChildren(
-      ...(path.length > 1 ? [element("div", { class: `fall${path.at(-1) > path[0] ? " worse" : ""}${this.bench.isDoubted ? " doubted" : ""}` }, element("b", {}, text), element("small", {}, `${states}${numbers.length && fall.differ ? `; ${fall.differ}` : ""}${this.bench.isDoubted ? "; not shown to be supported by these rows" : ""}${path.at(-1) > path[0] ? "; it makes the error larger" : ""}`))] : []),
+      ...(path.length > 1 ? [element("div", { class: `fall${path.at(-1) > path[0] ? " worse" : ""}${this.bench.doubt ? " doubted" : ""}` }, element("b", {}, text), element("small", {}, `${states}${numbers.length && fall.differ ? `; ${fall.differ}` : ""}${this.bench.doubt ? `; ${this.bench.doubt}` : ""}${path.at(-1) > path[0] ? "; it makes the error larger" : ""}`))] : []),
       big(rms, `error now, ${used} of ${rows} rows`, "now"),
       big(this.left_out_rms, "on rows left out", "held"),
       big(tried_rms, tried_rms === null ? "nothing is tried" : "tried, not kept", "tried"),
@@ -60,7 +60,7 @@ export class Strip {
     };
     this.bar.setAttribute("aria-label", `The error as a bar: ${start.toFixed(2)} ${micro(unit)} without effects, ${rms.toFixed(2)} now${tried_rms === null ? "" : `, ${tried_rms.toFixed(2)} with the trial`}, noise ${floor?.toFixed(2) ?? "not known"}`);
     this.bar.classList.toggle("worse", lowest > start);
-    this.bar.classList.toggle("doubted", this.bench.isDoubted);
+    this.bar.classList.toggle("doubted", Boolean(this.bench.doubt));
     this.bar.replaceChildren(part("left", lowest), part("noise", floor ?? 0));
   }
 }
