@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -113,7 +114,7 @@ class AlignedRecording:
 
     def on_machine(self, effect: Effect) -> Effect:
         """The effect with its plausible ranges on this recording's machine; see `compd.parameter_ranges`."""
-        return on_machine(effect, self.rows, self.ranges)
+        return _in_unit(on_machine(effect, self.rows, self.ranges), self.unit)
 
     @property
     def unit(self) -> str:
@@ -424,6 +425,17 @@ class AlignedRecording:
             return "the model's prediction is empty"
         reasons = predict(self.model, self.rows, {}).reason[rows]
         return "no pose: " + "; ".join(Reason(int(code)).meaning for code in np.unique(reasons[reasons > 0]))
+
+
+def _in_unit(effect: Effect, unit: str) -> Effect:
+    """An effect whose numbers are in um, in the unit of the reference, one of which counts as a um."""
+    if unit == "um" or effect.gives or "reference" not in effect.ports:
+        return effect
+    numbers = tuple(
+        replace(one, unit=re.sub(r"^um(?=$|/)", unit, one.unit)) if re.match(r"um(?!/m\b)", one.unit) else one
+        for one in effect.parameters
+    )
+    return effect if numbers == effect.parameters else replace(effect, parameters=numbers)
 
 
 def effect_deltas(fitted: Sequence[FittedEffect], rows: Observations) -> tuple[dict[str, Deltas], Deltas]:

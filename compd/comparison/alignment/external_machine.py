@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -80,7 +81,7 @@ def external_observations(
     recorded = {
         name for name, values in readings.items() if links and np.isfinite(values[:, measured]).any(axis=0).all()
     }
-    return observe_external(
+    observed = observe_external(
         _external_tip(recording),
         scale_mm=scale_mm,
         movement=Movement(np.nan_to_num(direction), velocity, np.zeros((recording.rows, 0))),
@@ -89,6 +90,7 @@ def external_observations(
         session_start=starts,
         recorded=frozenset(recorded | ({"time", "order"} if recording.has_time else set())),
     )
+    return replace(observed, unit=recording.unit)
 
 
 def _of_links(quantities: Mapping[str, FloatArray], name: str, rows: int, links: int) -> FloatArray:

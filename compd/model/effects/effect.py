@@ -260,6 +260,9 @@ class Effect:
         none. A diagnosis that names the first tries the second.
     remarks : tuple of str
         What a person should look at in its declaration, such as a unit that does not fit its column.
+    gives : str
+        Unit of what it adds to a place that an instrument shows: an angle's, such as ``"arcsec"``, or a length's;
+        ``""`` where nobody knows. It is converted to the unit of the recording's reference.
     declared : str or dict
         What a model file names it by: the mapping that it was declared with as a formula, or
         ``"/absolute/file.py:NAME"``; ``""`` for its id.
@@ -301,6 +304,7 @@ class Effect:
     remarks: tuple[str, ...] = ()
     counts_from: Datum = "machine zero"
     intercept: str = ""
+    gives: str = ""
     declared: str | Mapping[str, Any] = ""
 
     @property

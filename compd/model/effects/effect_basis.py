@@ -18,6 +18,7 @@ from compd.model.effects.observations import MachineConstants, Observations
 from compd.model.kernels import basis_of_rows
 from compd.model.structures import MACHINE, MAX_LINKS, ROW
 from compd.reference_conditions import standard_value
+from compd.units import UNIT_KINDS
 
 # Rows whose structures exist at the same time: of 4000, they take 8 MB.
 _ROWS_AT_ONCE = 4000
@@ -86,7 +87,16 @@ def evaluate_basis(
             basis[chunk],
         )
         basis[chunk][np.abs(basis[chunk]) > _LARGEST] = np.nan
-    return basis, unpack_memory(program.states, remembered)
+    ratio = _in_unit_of_rows(effect, rows)
+    return basis if ratio == 1.0 else basis * ratio, unpack_memory(program.states, remembered)
+
+
+def _in_unit_of_rows(effect: Effect, rows: Observations) -> float:
+    """The factor from the angle that a formula gives to that of the rows' reference; 1 where one of them is none."""
+    angles = {**UNIT_KINDS[2], "um/m": 1e-6}
+    if effect.gives not in angles or rows.unit not in angles:
+        return 1.0
+    return angles[effect.gives] / angles[rows.unit]
 
 
 def counted_from(effect: Effect, rows: Observations) -> Effect:

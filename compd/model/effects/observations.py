@@ -127,6 +127,7 @@ class Observations:
         without times, when and in which order they were taken.
     quantities_at_zero : the quantities when machine zero was taken, by name, from which effects count; None where they
         are not known: effects then count from the standard conditions.
+    unit : of the reference, one of which counts as a um; "" where nothing says it.
     """
 
     constants: MachineConstants
@@ -148,6 +149,7 @@ class Observations:
     recorded: frozenset[str] = frozenset()
     lacking: frozenset[str] = frozenset()
     quantities_at_zero: Mapping[str, float] | None = None
+    unit: str = ""
 
     def __post_init__(self) -> None:
         refused = [name for name in self.quantities if name.startswith(ANSWER_PREFIXES)]
@@ -170,7 +172,7 @@ class Observations:
         chosen: dict[str, Any] = {
             column.name: getattr(self, column.name)[index]
             for column in fields(self)
-            if column.name not in ("constants", "quantities", "recorded", "lacking", "quantities_at_zero")
+            if column.name not in ("constants", "quantities", "recorded", "lacking", "quantities_at_zero", "unit")
         }
         quantities = {name: values[index] for name, values in self.quantities.items()}
         return replace(self, **chosen, quantities=quantities)

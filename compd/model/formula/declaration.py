@@ -27,7 +27,7 @@ from compd.model.formula.formula import Formula
 from compd.model.formula.functions import NUMBERS
 from compd.model.formula.keys import FormulaDeclaration, FormulaParameter, read_declaration
 from compd.model.formula.parser import MAX_EXPONENT, parse_together
-from compd.model.formula.unit_check import unit_remarks
+from compd.model.formula.unit_check import unit_of_value, unit_remarks
 
 # Rounding of the numbers in a formula, 2 * 3.141593 for instance, in turns.
 ROUNDING = 1e-6
@@ -132,7 +132,16 @@ def _with_formulas(declaration: FormulaDeclaration, where: str) -> Effect:
         remembers=any(formula.lags for formula in parsed),
         unknown_states=lagged_states(sum(formula.lags for formula in parsed)),
         remarks=_unit_remarks(declaration, parsed),
+        gives=_gives(declaration, parsed),
     )
+
+
+def _gives(declaration: FormulaDeclaration, formulas: tuple[Formula, ...]) -> str:
+    """Unit of what is added to a place that an instrument shows; "" at other ports, and for turns."""
+    if declaration.port != "reference" or not set(declaration.formulas) | {declaration.axis or "x"} <= {"", *"xyz"}:
+        return ""
+    units = {name: parameter.unit for name, parameter in declaration.parameters.items()}
+    return unit_of_value([formula.tree for formula in formulas], units, declaration.gives)
 
 
 def _unit_remarks(declaration: FormulaDeclaration, formulas: tuple[Formula, ...]) -> tuple[str, ...]:

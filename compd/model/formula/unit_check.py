@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -42,6 +42,9 @@ _PLAIN: Mapping[str, tuple[dict[str, float], float]] = {
     "Hz": ({"s": -1}, 1.0),
 }
 _TOKEN = re.compile(r"([A-Za-z%\u00b5][A-Za-z_%\u00b5]*|1)(?:(?:\^|\*\*)?(-?\d))?")
+_ANGLES = UNIT_KINDS[_BASES.index("rad")]
+# Difference of two factors of one unit, of numbers as people write them.
+_SAME_UNIT = 1e-4
 # Factors that halve or double: play on either side, a diameter.
 _NEAR_ONE = (0.5, 1.0, 2.0)
 
@@ -112,6 +115,35 @@ def _single(name: str) -> Quantity | None:
             # an angle is a number: a radian times a millimetre is a millimetre
             return Quantity({} if base == "rad" else {base: 1}, kind[name], 1.0)
     return None
+
+
+def unit_of_value(trees: Sequence[ast.expr], units: Mapping[str, str], gives: str) -> str:
+    """Unit of what formulas give: an angle's, `gives` for a length, "" where nobody knows or the summands differ.
+
+    units : of each parameter, as a person wrote it.  gives : unit of a length.
+    """
+    found = {
+        _unit_of_term(term, units, gives)
+        for tree in trees
+        for term in _terms(tree)
+        if {node.id for node in ast.walk(term) if isinstance(node, ast.Name)} & set(units)
+    }
+    return found.pop() if len(found) == 1 else ""
+
+
+def _unit_of_term(term: ast.expr, units: Mapping[str, str], gives: str) -> str:
+    quantity = _quantity(term, units)
+    if quantity is None or not quantity.scale > 0:
+        return ""
+    if dict(quantity.unit) == {"mm": 1}:
+        return gives
+    own = [units[name] for name in quantity.names if name in units]
+    if quantity.unit or not any(re.search(rf"\b({'|'.join(_ANGLES)})\b", unit) for unit in own):
+        return ""
+    # a factor may turn one unit into another, as 3600 does with degrees
+    number = 1.0 if math.isnan(quantity.factor) or abs(quantity.factor) in _NEAR_ONE else abs(quantity.factor)
+    scales = {name: quantity.scale / number / size for name, size in _ANGLES.items()}
+    return next((name for name, ratio in scales.items() if abs(ratio - 1) < _SAME_UNIT), "")
 
 
 def unit_remarks(tree: ast.expr, units: Mapping[str, str], gives: str) -> list[str]:
