@@ -7,7 +7,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.data_fault import DataFault
 from compd.display_unit import format_error
-from compd.recording import file_numbers
+from compd.recording import Recording
 
 # Why a row does not count of which nothing more is known.
 OUTLIER = "beyond all noise"
@@ -39,8 +39,9 @@ def outlier_faults(
     if lone:
         rows = outlier & np.isin(in_visit, lone)
         size = format_error(float(np.abs(away_um[rows]).max()), unit)
+        number = Recording.visit_in_file(np.array(lone))[0]
         what = (
-            f"the {rows.sum()} repeats of visit {file_numbers(np.array(lone))[0]} agree and lie {size} from all else"
+            f"the {rows.sum()} repeats of visit {number} agree and lie {size} from all else"
             if len(lone) == 1
             else f"{len(lone)} visits, of which the repeats agree, lie up to {size} from all else"
         )
@@ -97,7 +98,7 @@ def disagreeing_visits(
         of_visit = rows[begins[v] : begins[v] + counts[v]]
         usual_um = float(np.median(spread_um[repeated].max(axis=1)))
         what = (
-            f"the repeats of visit {file_numbers(visit)[of_visit[0]]} differ by "
+            f"the repeats of visit {Recording.visit_in_file(visit)[of_visit[0]]} differ by "
             f"{format_error(spread_um[v].max(), unit)}, those of others by {format_error(usual_um, unit)}"
         )
         faults.append(DataFault("repeats that differ", tuple(sorted(row[of_visit].tolist())), (), what, "used"))

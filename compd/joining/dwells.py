@@ -10,7 +10,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.columns import ID_COLUMNS, approach_columns
 from compd.errors import Problem, RecordingError
-from compd.recording import Recording, file_numbers
+from compd.recording import Recording
 
 # Largest motion (mm) of the scales of a machine at rest, unless their own noise imitates more.
 STILL_MM = 0.001
@@ -128,7 +128,7 @@ def _no_dwell(recording: Recording) -> Problem:
 def _stretches_of_points(recording: Recording) -> list[tuple[IntArray, str]]:
     """Successive rows with the same point, visit and session, and the point's id as text."""
     assert recording.point is not None
-    visit = None if recording.visit is None else file_numbers(recording.visit)
+    visit = None if recording.visit is None else recording.visit_in_file(recording.visit)
     ids = [recording.point] + [ids for ids in (visit, recording.session) if ids is not None]
     keys = np.column_stack(ids)
     changes = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1

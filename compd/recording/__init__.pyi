@@ -27,5 +27,4 @@ from .sidecar import Sidecar as Sidecar
 from .sidecar import read_sidecar as read_sidecar
 from .sidecar import sidecar_contents as sidecar_contents
 from .sidecar import sidecar_text as sidecar_text
-from .visits import file_numbers as file_numbers
 from .writer import write_recording as write_recording

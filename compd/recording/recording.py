@@ -24,6 +24,7 @@ from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
 from compd.recording.reference import Reference
 from compd.recording.sidecar import Sidecar
+from compd.recording.visits import file_numbers
 from compd.tables import id_texts
 from compd.units import UM_PER_MM
 
@@ -234,6 +235,11 @@ class Recording:
         """The fixed ball or pin of this number as the file names it: "pin 2", "ball post"."""
         kind = "pin" if self.pin is not None else "ball"
         return f"{kind} {self.labels[kind][number] if kind in self.labels else number}"
+
+    @staticmethod
+    def visit_in_file(visit: IntArray) -> IntArray:
+        """Numbers of visits as the file has them, where they may come back; -1 for none."""
+        return file_numbers(visit)
 
     def point_name(self, number: int) -> str:
         """The id of this point as the file has it."""

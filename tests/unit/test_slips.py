@@ -166,7 +166,16 @@ def test_a_port_that_cannot_be_looked_at_is_none(tmp_path: Path, monkeypatch: py
 
 def test_parts_of_a_register_may_share_it(tmp_path: Path) -> None:
     def change(data):
-        low = {"name": "a", "function": 4, "address": 40, "type": "uint16", "mask": 0xFF, "unit": "1"}
+        low = {
+            "name": "a",
+            "function": 4,
+            "address": 40,
+            "type": "uint16",
+            "mask": 0xFF,
+            "unit": "1",
+            "lowest": 0,
+            "highest": 255,
+        }
         high = {**low, "name": "b", "mask": 0xFF00, "shift": 8}
         data["gauges"]["frame_u"]["channels"] += [low, high]
 

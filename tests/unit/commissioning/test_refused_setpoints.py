@@ -78,7 +78,7 @@ def test_a_frame_that_drifts_by_more_than_the_limit_refuses_everywhere(bare: boo
         path = bare_machine("6-rus", tmp_path, wiring=drift, limits=limits)
     else:
         path = scales_only("6-rus", tmp_path, 40, tip_error_um=100)
-    assert certain_refusal(load(path)).startswith("Every setpoint will be refused: the tip may be 111.")
+    assert certain_refusal(load(path)).startswith("Every setpoint will be refused: the tip may be 112 um from here")
 
 
 def test_gauges_that_scatter_by_more_than_the_limit_refuse_at_machine_zero(tmp_path: Path) -> None:
