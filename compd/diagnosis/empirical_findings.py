@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.columns import ROW_ORDER
 from compd.diagnosis.candidates.changes import ChangeCandidate
 from compd.diagnosis.candidates.proxies import ProxyCandidate
 from compd.diagnosis.findings import EmpiricalFinding, NonlinearConstant
@@ -34,20 +33,7 @@ def describe_remainder(problem: DiagnosisProblem, explanation: Explanation) -> t
         findings.insert(0, remainder.finding(chosen, remainder.p_values([chosen])[0], remainder.loss_with(chosen)))
     first = [finding.covariate for finding in findings]
     findings += [finding for finding in remainder.alone() if finding.covariate not in first]
-    if not problem.aligned.recording.has_time:
-        findings = [_in_order(finding) for finding in findings]
     return tuple(sorted(findings, key=lambda finding: finding.heldout_rms_um))
-
-
-def _in_order(finding: EmpiricalFinding) -> EmpiricalFinding:
-    """The finding of a recording without times: what follows time follows the order of the rows."""
-
-    def named(covariate: str) -> str:
-        return ROW_ORDER if covariate == "time_s" else covariate
-
-    constants = tuple(replace(constant, covariate=named(constant.covariate)) for constant in finding.constants)
-    beside = tuple(named(covariate) for covariate in finding.beside)
-    return replace(finding, covariate=named(finding.covariate), beside=beside, constants=constants)
 
 
 class _Remainder:

@@ -159,11 +159,6 @@ class AlignedRecording:
         return ATTITUDE_UNIT if label in ATTITUDE_LABELS else self.unit
 
     @property
-    def in_order(self) -> bool:
-        """Whether the rows say what was before and what after: by their times, or as those of a model of one's own."""
-        return self.recording.has_time or self.model is None
-
-    @property
     def registered(self) -> bool:
         """Whether the parameters of the instrument's frame, or the places of fixed ends, are always fitted along."""
         reference = self.recording.reference

@@ -25,12 +25,15 @@ class ChangeCandidate(Candidate):
 
 
 def moments_s(aligned: AlignedRecording, criteria: CandidateCriteria = CandidateCriteria()) -> list[float]:
-    """Moments at which something may have changed, s: where sessions but the first start, and quantiles of the rows."""
+    """Moments at which something may have changed, s: where sessions but the first start, and quantiles of the rows.
+
+    None without the times of rows: the order of rows may be that of places.
+    """
+    if not aligned.recording.has_time:
+        return []
     time_s = aligned.rows.time_s
     starts = time_s[aligned.rows.session_start][1:]
     starts = starts[:: max(1, -(-len(starts) // criteria.max_session_starts))]
-    if not aligned.in_order:
-        return []
     quantiles = np.quantile(time_s, np.linspace(0, 1, criteria.moments + 2)[1:-1])
     return sorted({*starts.tolist(), *quantiles.tolist()})
 

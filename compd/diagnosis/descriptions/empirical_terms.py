@@ -202,7 +202,7 @@ class EmpiricalTerm:
 def empirical_terms(
     aligned: AlignedRecording, residual_um: FloatArray, criteria: DescriptionCriteria = DescriptionCriteria()
 ) -> Iterator[EmpiricalTerm]:
-    """Every term that can be tried on a recording; without times none but a step, which needs only the rows' order.
+    """Every term that can be tried on a recording; without times none in time.
 
     residual_um : (N, m) what is to be described; periods are looked for in it. nan where a row does not count.
     """
@@ -215,10 +215,8 @@ def empirical_terms(
     for covariate in search_covariates(aligned, rows, criteria, mirrored, reasons):
         yield from _terms_of(covariate, ports, grid_of, timed=timed, known=aligned.model is not None)
     time = SearchCovariate("time_s", "other", aligned.rows.time_s[rows])
-    grids = {"step": step_times_s(time.values, criteria)} if aligned.in_order else {}
-    if timed:
-        grids |= {"linear": (), "periodic": grid_of("periodic", time)}
-    for form, grid in grids.items():
+    for form in ("step", "linear", "periodic") if timed else ():
+        grid = grid_of(form, time)
         for port in ports:
             if _repeats_along(port, form) and (grid or form not in CONSTANTS):
                 yield _term(port, time, form, grid)
@@ -262,6 +260,8 @@ class _Grids(NamedTuple):
 
     def __call__(self, form: str, covariate: SearchCovariate) -> tuple[float, ...]:
         """Of a form of a covariate; empty for one without a constant."""
+        if form == "step":
+            return step_times_s(covariate.values, self.criteria)
         if form == "knee":
             return knees(covariate, self.criteria)
         if form == "periodic":

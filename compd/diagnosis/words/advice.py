@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from compd.columns import ROW_ORDER
 from compd.diagnosis.verdict import Diagnosis
 from compd.diagnosis.words.error_fall import ErrorFall
 from compd.diagnosis.words.phrases import (
@@ -113,7 +112,7 @@ def _what_to_measure(diagnosis: Diagnosis) -> list[str]:
     if likely:
         return [f"{effect.effect} {effect.why.partition('; ')[0]}: record it" for effect in likely]
     finding = best_description(diagnosis)
-    if finding is not None and finding.covariate in ("time_s", ROW_ORDER):
+    if finding is not None and finding.covariate == "time_s":
         return ["measure again on another day, in another order: time itself drives nothing"]
     if is_best_a_change(diagnosis):
         return ["diagnose the rows before and after it apart"]

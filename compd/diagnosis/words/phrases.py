@@ -217,10 +217,10 @@ def question_text(asked: ImplausibleEffect, share: str, tolerance_mm: float) -> 
 
 
 def moment_text(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
-    """When something changed: "6000 s on (row 410)", or a date; "row 410 on" in a recording without time."""
+    """When something changed: "6000 s on (row 410)", or a date."""
     recording = diagnosis.after.aligned.recording
     row = recording.row[min(int(np.searchsorted(recording.time_s, finding.time_s)), recording.rows - 1)]
-    return f"{clock_text(finding.time_s)} on (row {row})" if recording.has_time else f"row {row} on"
+    return f"{clock_text(finding.time_s)} on (row {row})"
 
 
 def _how_it_changed(finding: EmpiricalFinding, diagnosis: Diagnosis) -> str:
