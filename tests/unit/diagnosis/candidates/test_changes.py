@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.comparison import AlignedRecording
+from compd.comparison import AlignedRecording, open_recording
 from compd.diagnosis.candidate_criteria import CandidateCriteria
 from compd.diagnosis.candidates.candidates import library_pool
 from compd.diagnosis.candidates.changes import change_candidates, moments_s
@@ -148,3 +148,15 @@ def test_backlash_of_a_known_machine_that_grows_after_a_crash(tmp_path: Path) ->
     change = diagnosis.depends_on[0]
     assert (change.form, change.effect, change.time_s) == ("change", "backlash", crash_s)
     assert list(change.parameters[0].values()) == pytest.approx([1.2, 1.0, 1.4], abs=0.2)
+
+
+def test_without_the_times_of_rows_nothing_has_happened(tmp_path: Path) -> None:
+    """The order of rows may be that of places."""
+    stage(tmp_path / "run.csv", 2.0, 8.0)
+    text = (tmp_path / "run.csv").read_text(encoding="utf-8")
+    without = "\n".join(line.partition(",")[2] for line in text.splitlines())
+    (tmp_path / "run.csv").write_text(f"{without}\n", encoding="utf-8")
+    aligned = open_recording(tmp_path / "run.csv")
+    assert not moments_s(aligned)
+    diagnosis = diagnose(aligned, (), None, [PLAY, GAIN])
+    assert not any(finding.is_change for finding in diagnosis.depends_on)
