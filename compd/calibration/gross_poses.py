@@ -121,7 +121,7 @@ def _distances(
         D[:, :, :P] = one.J * weight[:, None]
         D[:, :, first : first + one.R.shape[2]] = one.R * weight[:, None]
         z = one.z * weight
-        flat = D[own].reshape(-1, ends[-1])
+        flat = D[own].reshape(int(own.sum()) * len(weight), ends[-1])
         A += flat.T @ flat
         b += flat.T @ z[own].ravel()
         columns.append(D)

@@ -108,3 +108,13 @@ def test_of_20_machines_of_each_kind_the_gross_poses_of_19_are_named(kind: str, 
         gross, found = gross_and_found(tmp_path, kind, (30, 40, 60)[draw % 3], draw)
         right += found == gross
     assert right >= 0.95 * DRAWS
+
+
+def test_a_machine_as_drawn_in_its_own_frame_has_gross_poses_too() -> None:
+    """Nothing is fitted, neither numbers nor a registration."""
+    rng = np.random.default_rng(8)
+    problem = linear_problem(rng, {6: 60.0}, 1.0)
+    problem = problem._replace(z=rng.standard_normal((40, 3)), J=np.zeros((40, 3, 0)), R=np.zeros((40, 3, 0)))
+    problem.z[6, 1] += 60.0
+    (gross,) = gross_poses([problem], lambda _: np.zeros((0, 0)))
+    assert np.flatnonzero(gross).tolist() == [6]
