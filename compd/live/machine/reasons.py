@@ -57,20 +57,26 @@ def lost(faults: Iterable[GaugeFault]) -> Lost:
         groups.setdefault((fault.channel.partition(".")[0], fault.quality, detail), []).append(fault)
     # a gauge that waits for a person comes first, that it is not cut off
     ordered = sorted(groups.values(), key=lambda group: group[0].quality is not Quality.DISTRUSTED)
+    waiting = [group for group in ordered if group[0].quality is Quality.DISTRUSTED]
     detailed, (named, counted) = ", ".join(map(_group_text, ordered)), _coarser(ordered)
-    text = named if len(named.encode()) <= MAX_NAMED_BYTES else counted
     if len(detailed.encode()) <= MAX_DETAILED_BYTES:
-        text = detailed
-    return Lost(text, any(group[0].quality is Quality.DISTRUSTED for group in ordered))
+        return Lost(detailed, bool(waiting))
+    advice = f"; {_look_at([group[0].channel for group in waiting])}" if waiting else ""
+    texts = (f"{named}{advice}", f"{counted}{advice}")
+    few = (text for text in texts if len(text.encode()) <= MAX_NAMED_BYTES)
+    return Lost(next(few, f"{counted}{'; then `compd accept all`' * bool(waiting)}"), bool(waiting))
 
 
 def waiting_text(channels: Iterable[str]) -> str:
     """What a person is waited for, where these channels are not believed; "" where all are."""
+    channels = list(channels)
+    return f"{WAITS_FOR_PERSON}: {_look_at(channels)}" if channels else ""
+
+
+def _look_at(channels: Sequence[str]) -> str:
     gauges = list(dict.fromkeys(channel.partition(".")[0] for channel in channels))
-    if not gauges:
-        return ""
     accept = gauges[0] if len(gauges) == 1 else "all"
-    return f"{WAITS_FOR_PERSON}: look at {', '.join(gauges)}, then `compd accept {accept}`"
+    return f"look at {', '.join(gauges)}, then `compd accept {accept}`"
 
 
 def _coarser(groups: Sequence[Sequence[GaugeFault]]) -> tuple[str, str]:

@@ -240,3 +240,20 @@ def test_after_an_invalid_setpoint_the_tip_is_right_at_once(tripod):
     setpoint = tripod.step()
     assert setpoint.state is State.SLEWING
     assert setpoint.values.tip_M_mm == pytest.approx(right, abs=1e-6)
+
+
+@pytest.mark.parametrize("count", [2, 6, 40])
+def test_a_reason_of_any_length_says_how_a_person_accepts(count: int) -> None:
+    why = "differs from what the others say by 31 mm: inspect it and its cable, then `compd accept"
+    gauges = [f"scale_{k}" for k in range(1, count + 1)]
+    faults = [
+        GaugeFault(f"scale {k}", f"{gauge}.position", Quality.DISTRUSTED, f"{why} {gauge}`")
+        for k, gauge in enumerate(gauges, 1)
+    ]
+        GaugeFault(f"scale {k}", f"{gauge}.position", Quality.DISTRUSTED, f"{why} {gauge}`")
+        for k, gauge in enumerate(gauges, 1)
+    ]
+    text = str(lost(faults))
+    assert text.startswith("waits for a person: ")
+    assert "compd accept all" in text or all(f"compd accept {gauge}" in text for gauge in gauges)
+    assert len(text.encode()) <= MAX_NAMED_BYTES + len("waits for a person: ")
