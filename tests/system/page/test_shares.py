@@ -24,7 +24,8 @@ from tests.system.page.test_workers import LATE_S, gaps
 pytestmark = [pytest.mark.timeout(300), pytest.mark.long, pytest.mark.sample]
 
 PATIENCE_S = 60.0
-OPENS_WITHIN_S = 2.0
+# On a computer that opens it within 0.35 s in a quiet time, as an idle one does; on a slower one as many times more.
+OPENS_WITHIN_S, QUIET_S = 2.0, 0.35
 RECORDING_BYTES = 29e6
 DOWNLOADS, WORKBENCHES = 34, 9
 # After the end of a connection: the server's turn, and a process that is killed.
@@ -121,7 +122,7 @@ def test_live_events_are_in_time_and_an_operator_s_workbench_opens(page):
         threading.Event().wait(1.0)
     print(f"opened within {opened_s:.2f} s, {quiet_s:.2f} s in a quiet time, {first_s:.2f} s at first")
     print(f"the longest gap between live events is {max(busy):.3f} s")
-    assert opened_s < OPENS_WITHIN_S
+    assert opened_s < OPENS_WITHIN_S * max(1.0, quiet_s / QUIET_S)
     assert max(busy) < LATE_S
 
 

@@ -250,9 +250,6 @@ def test_a_reason_of_any_length_says_how_a_person_accepts(count: int) -> None:
         GaugeFault(f"scale {k}", f"{gauge}.position", Quality.DISTRUSTED, f"{why} {gauge}`")
         for k, gauge in enumerate(gauges, 1)
     ]
-        GaugeFault(f"scale {k}", f"{gauge}.position", Quality.DISTRUSTED, f"{why} {gauge}`")
-        for k, gauge in enumerate(gauges, 1)
-    ]
     text = str(lost(faults))
     assert text.startswith("waits for a person: ")
     assert "compd accept all" in text or all(f"compd accept {gauge}" in text for gauge in gauges)
