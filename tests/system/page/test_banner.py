@@ -11,35 +11,31 @@ def imported(tab, module, body, given=None):
     return tab.evaluate(f"async (given) => {{ const from = await import('/static/{module}'); {body} }}", given)
 
 
-@pytest.mark.parametrize(
-    ("um", "text"),
-    [
-        (153_700.0, "154 mm"),
-        (2782.0, "2.78 mm"),
-        (999.6, "1 mm"),
-        (999.4, "999 µm"),
-        (-1234.0, "\N{MINUS SIGN}1.23 mm"),
-        (0.166, "0.166 µm"),
-        (0.0, "0 µm"),
-        (12_345_678.0, "12300 mm"),
-        (None, "\N{EN DASH}"),
-    ],
-)
-def test_a_length_is_in_um_below_a_millimetre_and_in_mm_above(tab, um, text):
-    assert imported(tab, "format.js", "return from.lengthText(given ?? NaN)", um) == text
+def test_a_length_is_in_um_below_a_millimetre_and_in_mm_above(tab):
+    texts = {
+        153_700.0: "154 mm",
+        2782.0: "2.78 mm",
+        999.6: "1 mm",
+        999.4: "999 µm",
+        -1234.0: "\N{MINUS SIGN}1.23 mm",
+        0.166: "0.166 µm",
+        0.0: "0 µm",
+        12_345_678.0: "12300 mm",
+        None: "\N{EN DASH}",
+    }
+    shown = imported(tab, "format.js", "return given.map((um) => from.lengthText(um ?? NaN))", [*texts])
+    assert dict(zip(texts, shown, strict=True)) == texts
 
 
-@pytest.mark.parametrize(
-    ("values", "unit", "text"),
-    [
-        ([1.01, 1.15], "um", "1.01 → 1.15 µm"),
-        ([153_700.0, 12.0], "um", "154 mm → 12 µm"),
-        ([None], "um", "\N{EN DASH} µm"),
-        ([2000.0], "arcsec", "2000.00 arcsec"),
-    ],
-)
-def test_amounts_have_one_unit_unless_one_is_a_millimetre(tab, values, unit, text):
-    assert imported(tab, "format.js", "return from.amounts(...given)", [values, unit]) == text
+def test_amounts_have_one_unit_unless_one_is_a_millimetre(tab):
+    texts = {
+        "1.01 → 1.15 µm": [[1.01, 1.15], "um"],
+        "154 mm → 12 µm": [[153_700.0, 12.0], "um"],
+        "\N{EN DASH} µm": [[None], "um"],
+        "2000.00 arcsec": [[2000.0], "arcsec"],
+    }
+    body = "return given.map((amounts) => from.amounts(...amounts))"
+    assert imported(tab, "format.js", body, [*texts.values()]) == [*texts]
 
 
 @pytest.mark.parametrize(
