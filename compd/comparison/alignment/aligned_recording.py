@@ -29,7 +29,7 @@ from compd.comparison.alignment.registration import (
 from compd.comparison.alignment.target_place import HELD, PlacedTarget, target_change, target_M_mm
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.lone_visits import lone_distance
-from compd.comparison.outliers import outlier_limits, outlier_rows
+from compd.comparison.outliers import outlier_limits
 from compd.display_unit import ATTITUDE_LABELS, ATTITUDE_UNIT, MM_PER_RAD, in_place_unit
 from compd.errors import CompdError
 from compd.model import (
@@ -317,10 +317,6 @@ class AlignedRecording:
         """
         use = use & ~np.isin(self.recording.row, list(self.recording.sidecar.trusted))
         return lone_distance(distance, use, self.recording.visit, self.conditions, self.criteria)
-
-    def outliers(self, residual_um: FloatArray, use: BoolArray) -> BoolArray:
-        """(N,) rows of `use` (N,) with a residual (N, m) that no noise explains; see `outlier_rows`."""
-        return outlier_rows(residual_um, use, self.recording.visit, self.criteria, self.conditions)
 
     def unconfirmed(self, outlier: BoolArray, residual_um: FloatArray, use: BoolArray) -> BoolArray:
         """(N,) those of the outliers that no repeat among the rows `use` (N,) confirms."""
