@@ -43,7 +43,7 @@ from typing import Self
 from compd.client_connection import ClientConnection, Message, open_connection
 from compd.client_orders import ClientOrders
 from compd.client_setpoints import ReadSetpoints
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 
 __all__ = ["DEFAULT_ADDRESS", "Client", "Message", "connect"]
 
@@ -116,13 +116,11 @@ class Client(ClientOrders):
         _, greeting = connection.read()
         if greeting["class"] == "AUTH":
             if token is None:
-                raise DaemonError(
-                    Problem(
-                        where=connection.address,
-                        what="the daemon wants a token before anything else",
-                        next_step="give the one in its file `sockets.tcp.token_file`: connect(..., token=...), "
-                        "`compd watch --token-file`",
-                    )
+                raise DaemonError.of(
+                    connection.address,
+                    "the daemon wants a token before anything else",
+                    next_step="give the one in its file `sockets.tcp.token_file`: connect(..., token=...), "
+                    "`compd watch --token-file`",
                 )
             greeting = self._ask({"class": "AUTH", "token": token.strip()}, "VERSION")
         self.version = greeting
@@ -188,13 +186,11 @@ class Client(ClientOrders):
                 return newest
             left_s = end_s - time.monotonic()
             if left_s <= 0 or not self._connection.has_line(left_s):
-                raise DaemonError(
-                    Problem(
-                        where=self._connection.address,
-                        what="no setpoint that may still be used has come in time",
-                        value=f"{timeout_s:g} s",
-                        next_step="look at `compd status`; where the daemon is well, call `latest` more often",
-                    )
+                raise DaemonError.of(
+                    self._connection.address,
+                    "no setpoint that may still be used has come in time",
+                    value=f"{timeout_s:g} s",
+                    next_step="look at `compd status`; where the daemon is well, call `latest` more often",
                 )
 
     def readings(self, rate_hz: float | None = None) -> Iterator[tuple[bytes, Message]]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import orjson
 
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 
 _IS_IT_RUNNING = "is `compd run` running? its configuration says where it listens, under `sockets:`"
 
@@ -29,14 +29,12 @@ def open_connection(address: str, timeout_s: float) -> ClientConnection:
     try:
         connected = _unix_socket(address, timeout_s) if "/" in address else _tcp_socket(address, timeout_s)
     except ValueError as error:
-        raise DaemonError(
-            Problem(
-                where="address", what="not an address", value=address, allowed="host:port, or the path of a Unix socket"
-            )
+        raise DaemonError.of(
+            "address", "not an address", value=address, allowed="host:port, or the path of a Unix socket"
         ) from error
     except OSError as error:
-        raise DaemonError(
-            Problem(where=address, what=f"no daemon answers: {error.strerror or error}", next_step=_IS_IT_RUNNING)
+        raise DaemonError.of(
+            address, f"no daemon answers: {error.strerror or error}", next_step=_IS_IT_RUNNING
         ) from error
     return ClientConnection(connected, address)
 
@@ -83,16 +81,14 @@ class ClientConnection:
             message: Message = orjson.loads(line)
             error_code = message["code"] if message["class"] == "ERROR" else None
         except (ValueError, TypeError, KeyError) as error:
-            raise DaemonError(
-                Problem(
-                    where=self.address,
-                    what="what answers here is not compd",
-                    value=repr(line[:40]),
-                    next_step="give the address under `sockets:` in the daemon's configuration",
-                )
+            raise DaemonError.of(
+                self.address,
+                "what answers here is not compd",
+                value=repr(line[:40]),
+                next_step="give the address under `sockets:` in the daemon's configuration",
             ) from error
         if error_code is not None:
-            raise DaemonError(Problem(where=self.address, what=message["text"], value=error_code))
+            raise DaemonError.of(self.address, message["text"], value=error_code)
         return line, message
 
     def has_line(self, wait_s: float) -> bool:
@@ -128,7 +124,7 @@ class ClientConnection:
         self._lines += lines
 
     def _lost(self, why: str) -> DaemonError:
-        return DaemonError(Problem(where=self.address, what=f"the daemon is gone: {why}", next_step=_IS_IT_RUNNING))
+        return DaemonError.of(self.address, f"the daemon is gone: {why}", next_step=_IS_IT_RUNNING)
 
 
 def _tcp_socket(address: str, timeout_s: float) -> socket.socket:

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 
 from compd.client_connection import Message
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 from compd.files import open_regular
 
 
@@ -170,10 +170,6 @@ def _opened(file: Path) -> int:
     try:
         return open_regular(file)
     except OSError as error:
-        raise DaemonError(
-            Problem(
-                where=str(file),
-                what=f"cannot be read: {error.strerror or error}",
-                next_step="name a model file that you may read",
-            )
+        raise DaemonError.of(
+            str(file), f"cannot be read: {error.strerror or error}", next_step="name a model file that you may read"
         ) from error

@@ -44,8 +44,8 @@ def determined(aligned: AlignedRecording, result: FitResult) -> tuple[FitResult,
     parts = [slice(a, b) for a, b in pairwise(ends.tolist())]
     problems = [
         Problem(
-            where=f"effect {effect.effect.id}",
-            what=f"{_named(result, unknown & ~still | still & still[part].all(), part)} cannot be determined",
+            f"effect {effect.effect.id}",
+            f"{_named(result, unknown & ~still | still & still[part].all(), part)} cannot be determined",
             value=_why(aligned, result, columns, still, part),
             allowed="rows that determine each number beside all others",
             next_step=f"leave one of them out; what tells them apart: {effect.effect.separated_by or 'other rows'}",
@@ -57,8 +57,8 @@ def determined(aligned: AlignedRecording, result: FitResult) -> tuple[FitResult,
         raise CompdError(problems)
     remarks = tuple(
         Problem(
-            where=f"effect {effect.effect.id}",
-            what=f"{_named(result, still, part)}: no row shows this",
+            f"effect {effect.effect.id}",
+            f"{_named(result, still, part)}: no row shows this",
             allowed="the plausible range as its uncertainty",
             next_step="measure it where it matters",
         )

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 from compd.text import without_users
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Problem:
     """One thing a person can mend.
 
@@ -60,6 +61,11 @@ class CompdError(Exception):
     def __init__(self, problems: Problem | Sequence[Problem]) -> None:
         self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    @classmethod
+    def of(cls, where: str, what: str, *, value: str = "", allowed: str = "", next_step: str = "") -> Self:
+        """One error of one problem; the parts as in `Problem`."""
+        return cls(Problem(where, what, value, allowed, next_step))
 
     def __reduce__(self) -> tuple[type[CompdError], tuple[tuple[Problem, ...]]]:
         return type(self), (self.problems,)

@@ -28,4 +28,4 @@ def missing_package(where: str, error: ImportError) -> Problem | None:
     if extra is None:
         return None
     what = f"needs the package {package}, which is not installed"
-    return Problem(where=where, what=what, next_step=install_line(extra))
+    return Problem(where, what, next_step=install_line(extra))

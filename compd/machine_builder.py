@@ -21,7 +21,7 @@ from compd.configuration import (
     TurningActuator,
     external_of,
 )
-from compd.errors import PluginError, Problem
+from compd.errors import PluginError
 from compd.model import MachineModel, MachineParts, machine_constants, machine_model
 from compd.model.effects import MachineDetails
 from compd.model.external import ExternalModel, Kinematics, new_external_model
@@ -86,14 +86,12 @@ def build_external(geometry: ExternalGeometry, wiring: Wiring) -> ExternalModel:
     model = new_external_model(own, geometry.links, geometry.scale_signal_period_mm or math.nan)
     wired = [quantity.name for quantity in wiring.quantities]
     if missing := [name for name in model.settings if name not in wired]:
-        raise PluginError(
-            Problem(
-                where="geometry.kinematics",
-                what=f"the class needs {', '.join(missing)}, which no gauge measures",
-                value=geometry.kinematics,
-                allowed=", ".join(wired) or "nothing is wired",
-                next_step="wire it under `wiring: quantities:`, or take it out of `settings`",
-            )
+        raise PluginError.of(
+            "geometry.kinematics",
+            f"the class needs {', '.join(missing)}, which no gauge measures",
+            value=geometry.kinematics,
+            allowed=", ".join(wired) or "nothing is wired",
+            next_step="wire it under `wiring: quantities:`, or take it out of `settings`",
         )
     return model
 
@@ -117,9 +115,7 @@ def own_kinematics(geometry: ExternalGeometry) -> Kinematics | None:
         except (Exception, SystemExit) as error:  # noqa: BLE001  a person's own code may raise anything
             what = f"the class cannot be made without arguments: {type(error).__name__}: {error}"
     if what:
-        raise PluginError(
-            Problem(where=where, what=what, value=f"{file}:{name}", next_step="mend the file or the name")
-        )
+        raise PluginError.of(where, what, value=f"{file}:{name}", next_step="mend the file or the name")
     return own
 
 

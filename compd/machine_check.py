@@ -102,8 +102,8 @@ def _dependences(document: Document, geometry: Geometry, wiring: Wiring) -> Iter
     """Rods and hinges that say one thing twice, so that nothing holds the platform in one direction."""
     for names in dependences_as_drawn(machine_parts(geometry, wiring)):
         yield Problem(
-            where=document.where(("geometry",)),
-            what=f"{', '.join(names)} repeat or contradict each other at machine zero: something of the platform's six "
+            document.where(("geometry",)),
+            f"{', '.join(names)} repeat or contradict each other at machine zero: something of the platform's six "
             "coordinates is held twice, and something not at all",
             next_step="look at `compd machine draw`; mend the joints, axes or actuators of these",
         )
@@ -124,7 +124,7 @@ def _at_machine_zero(
     error: Exception, document: Document, warnings: list[Problem], along: list[Problem]
 ) -> Iterator[Problem]:
     """What the kinematics finds impossible at machine zero, at the key that most likely is the reason."""
-    found = error.problems if isinstance(error, KinematicsError) else (Problem(where="machine zero", what=str(error)),)
+    found = error.problems if isinstance(error, KinematicsError) else (Problem("machine zero", str(error)),)
     in_metres = [warning for warning in warnings if warning.next_step.startswith(_IN_METRES)]
     for problem in found:
         location: Location = (
@@ -136,7 +136,7 @@ def _at_machine_zero(
             next_step = "in metres? all lengths are in mm" + (f"; or {next_step}" if next_step else "")
         elif along:
             where, value, next_step = along[0].where, along[0].value, f"mend the axis: {along[0].next_step}"
-        yield Problem(where=where, what=f"{problem.where}: {problem.what}", value=value, next_step=next_step)
+        yield Problem(where, f"{problem.where}: {problem.what}", value=value, next_step=next_step)
 
 
 def _stroke_warnings(document: Document, geometry: Geometry, model: MachineModel) -> Iterator[Problem]:
@@ -151,8 +151,8 @@ def _stroke_warnings(document: Document, geometry: Geometry, model: MachineModel
     in_metres = shortest_mm * 1e3 <= lengths_mm.min() and lengths_mm.max() <= longest_mm * 1e3
     links = f"link {outside[0]}" if len(outside) == 1 else f"links {', '.join(map(str, outside))}"
     yield Problem(
-        where=document.where(("geometry", "link_length_mm")),
-        what=f"{links} cannot be as long as at machine zero, {lengths_mm.min():.1f} to {lengths_mm.max():.1f} mm: "
+        document.where(("geometry", "link_length_mm")),
+        f"{links} cannot be as long as at machine zero, {lengths_mm.min():.1f} to {lengths_mm.max():.1f} mm: "
         "targets will be refused",
         value=f"{shortest_mm:g} to {longest_mm:g} mm",
         allowed=f"from less than {lengths_mm.min():.1f} to more than {lengths_mm.max():.1f} mm",

@@ -267,4 +267,4 @@ def _number(value: float) -> str:
 
 def _problem(name: str, value: float, allowed: str) -> Problem:
     option = "--" + name.removesuffix("_mm").removesuffix("_deg").replace("_", "-")
-    return Problem(where=option, what="gives no machine", value=f"{value:g}", allowed=allowed)
+    return Problem(option, "gives no machine", value=f"{value:g}", allowed=allowed)

@@ -47,8 +47,8 @@ def slips(document: Document, geometry: Geometry, model: MachineModel) -> Iterat
     tilted_rad = float(np.arccos(min(abs(upright[2, 2]), 1.0)))
     if tilted_rad > _TILTED_RAD:
         yield Problem(
-            where=document.where(("geometry", "tool", "zero_rotation_P_in_M_rad")),
-            what="is not plausible: at machine zero the platform is tilted against the base",
+            document.where(("geometry", "tool", "zero_rotation_P_in_M_rad")),
+            "is not plausible: at machine zero the platform is tilted against the base",
             value=f"{tilted_rad:.3g} rad",
             next_step="in degrees? Rotation vectors are in rad",
         )
@@ -56,8 +56,8 @@ def slips(document: Document, geometry: Geometry, model: MachineModel) -> Iterat
     turned_rad = float(np.linalg.norm(rotation_vector(drawn.T @ model.zero.rotation_M_P)))
     if turned_rad > _TURNED_RAD:
         yield Problem(
-            where=document.where(("geometry", "platform")),
-            what="is not plausible: at machine zero it is turned against zero_rotation_P_in_M_rad",
+            document.where(("geometry", "platform")),
+            "is not plausible: at machine zero it is turned against zero_rotation_P_in_M_rad",
             value=f"{turned_rad:.3g} rad",
             next_step="look whether joints_P_mm, revolute_axes_P and joints_B_mm are in the same order",
         )
@@ -96,15 +96,15 @@ def _far_joints(document: Document, geometry: Geometry) -> Iterator[Problem]:
         nearest = int(squares[joint].argmin())
         if squares[joint, nearest] < _CLEARLY * squares[joint, support - 1]:
             yield Problem(
-                where=document.where(("geometry", "base", "support_of_joint", joint)),
-                what=f"is not plausible: base joint {joint + 1} is nearer to support {nearest + 1}",
+                document.where(("geometry", "base", "support_of_joint", joint)),
+                f"is not plausible: base joint {joint + 1} is nearer to support {nearest + 1}",
                 value=str(support),
                 next_step=f"write {nearest + 1}, or look whether joints_B_mm and supports_B_mm are in order",
             )
         elif own_mm[joint] > allowed_mm:
             yield Problem(
-                where=document.where(("geometry", "base", "joints_B_mm", joint)),
-                what=f"is not plausible: base joint {joint + 1} is far from its support {support}",
+                document.where(("geometry", "base", "joints_B_mm", joint)),
+                f"is not plausible: base joint {joint + 1} is far from its support {support}",
                 value=f"{own_mm[joint]:.1f} mm",
                 allowed=f"{allowed_mm:.1f} mm, after the other joints",
                 next_step="look into the drawing, or ignore this where the machine is so",
@@ -119,8 +119,8 @@ def _base_beside_plate(document: Document, geometry: Geometry) -> Iterator[Probl
     inside = [np.cross(corners_mm[(k + 1) % 3] - corners_mm[k], base_mm - corners_mm[k]) @ normal > 0 for k in range(3)]
     if not all(inside):
         yield Problem(
-            where=document.where(("geometry", "plate_points_M_mm")),
-            what="is not plausible: the base platform is not above the triangle of these points",
+            document.where(("geometry", "plate_points_M_mm")),
+            "is not plausible: the base platform is not above the triangle of these points",
             next_step="look at the signs of the points and of base.origin_B0_in_M_mm",
         )
 
@@ -139,8 +139,8 @@ def axes_along_links(document: Document, geometry: Geometry) -> Iterator[Problem
         along = abs(float(upright @ axis @ link))
         if along > _ALONG:
             yield Problem(
-                where=document.where(("geometry", "platform", "revolute_axes_P", k)),
-                what=f"is not plausible: the axis is not across link {k + 1}, which turns about it",
+                document.where(("geometry", "platform", "revolute_axes_P", k)),
+                f"is not plausible: the axis is not across link {k + 1}, which turns about it",
                 value=f"{np.degrees(np.arccos(min(along, 1.0))):.0f} deg between them",
                 allowed="90 deg at an upright platform",
                 next_step="axes are tangential: (-sin, cos, 0) of the joint's angle",
@@ -149,8 +149,8 @@ def axes_along_links(document: Document, geometry: Geometry) -> Iterator[Problem
 
 def _in_another_order(document: Document, location: Location, what: str, order: Sequence[int]) -> Problem:
     return Problem(
-        where=document.where(location),
-        what=f"is not plausible: {what}",
+        document.where(location),
+        f"is not plausible: {what}",
         next_step=f"in the order {', '.join(str(k + 1) for k in order)} they would not: look into the drawing",
     )
 

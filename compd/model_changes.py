@@ -21,7 +21,7 @@ from compd.comparison import (
 )
 from compd.determined_fit import determined
 from compd.diagnosis import Criteria, library_pool, with_disturbances
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.model.effects import Effect, FittedEffect, Observations, counted_from, recounted
 from compd.model.library import load_library
 from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
@@ -49,12 +49,8 @@ def add_to_model(
     Raises StateError where the model has the effect already, CompdError where it cannot be fitted on this recording.
     """
     if effect.id in [fitted.effect.id for fitted in model.fitted]:
-        raise StateError(
-            Problem(
-                where=f"effect {effect.id}",
-                what="is in the model already",
-                next_step="`compd effect fit` fits it again",
-            )
+        raise StateError.of(
+            f"effect {effect.id}", "is in the model already", next_step="`compd effect fit` fits it again"
         )
     before = compare(aligned, model.fitted, model.covariance)
     kept = _as_counted(model.fitted, aligned.rows)
@@ -85,12 +81,8 @@ def remove_effect(
     """
     ids = [fitted.effect.id for fitted in model.fitted]
     if effect_id not in ids:
-        raise StateError(
-            Problem(
-                where=f"effect {effect_id}",
-                what="is not in the model",
-                allowed=", ".join(ids) or "the model has none",
-            )
+        raise StateError.of(
+            f"effect {effect_id}", "is not in the model", allowed=", ".join(ids) or "the model has none"
         )
     k = ids.index(effect_id)
     before = compare(aligned, model.fitted, model.covariance)
@@ -112,7 +104,7 @@ def refit_model(
     Raises StateError where there are none.
     """
     if not model.fitted:
-        raise StateError(Problem(where="model", what="has no effect to fit", next_step="`compd effect add` adds one"))
+        raise StateError.of("model", "has no effect to fit", next_step="`compd effect add` adds one")
     before = compare(aligned, model.fitted, model.covariance)
     effects = [recounted(fitted.effect, aligned.rows) for fitted in model.fitted]
     unfitted = [
@@ -130,7 +122,7 @@ def undo_step(stored: StoredModel, where: str) -> StoredModel:
     """
     standing = [k for k, step in enumerate(stored.steps) if step.kind != "undo" and not step.undone]
     if not standing:
-        raise StateError(Problem(where=where, what="has no step to undo"))
+        raise StateError.of(where, "has no step to undo")
     last = stored.steps[standing[-1]]
     steps = list(stored.steps)
     steps[standing[-1]] = replace(last, undone=True)

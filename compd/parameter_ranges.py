@@ -50,7 +50,7 @@ def read_range(text: str) -> StatedRange:
     except ValueError:
         low, high = np.nan, np.nan
     if match is None or not low < high:
-        raise CompdError(Problem(where="range", what="is no range of a number", value=text, allowed=_FORM))
+        raise CompdError.of("range", "is no range of a number", value=text, allowed=_FORM)
     return StatedRange(match["effect"], match["parameter"], low, high, match["unit"])
 
 
@@ -61,7 +61,7 @@ def check_ranges(ranges: Iterable[StatedRange], effects: Iterable[Effect]) -> No
     ranges = tuple(ranges)
     times = Counter((stated.effect, stated.parameter) for stated in ranges)
     problems = [
-        Problem(where="range", what="is stated more than once", value=f"{effect}.{parameter}", next_step="keep one")
+        Problem("range", "is stated more than once", value=f"{effect}.{parameter}", next_step="keep one")
         for (effect, parameter), count in times.items()
         if count > 1
     ]
@@ -71,8 +71,8 @@ def check_ranges(ranges: Iterable[StatedRange], effects: Iterable[Effect]) -> No
         if name not in parameters:
             problems.append(
                 Problem(
-                    where="range",
-                    what="is of no effect's parameter",
+                    "range",
+                    "is of no effect's parameter",
                     value=name,
                     allowed=", ".join(of_effect) or "EFFECT.PARAMETER",
                     next_step="`compd effect list` shows all effects, `compd effect show EFFECT` its parameters",
@@ -82,8 +82,8 @@ def check_ranges(ranges: Iterable[StatedRange], effects: Iterable[Effect]) -> No
             own = parameters[name].unit
             problems.append(
                 Problem(
-                    where="range",
-                    what="has another unit than the parameter",
+                    "range",
+                    "has another unit than the parameter",
                     value=str(stated),
                     allowed=", ".join([own, *_UNITS.get(own, {})]),
                 )

@@ -91,7 +91,7 @@ def write_text_file(path: Path, text: str) -> None:
     try:
         write_files({path: text})
     except OSError as error:
-        raise RecordingError(Problem(where=str(path), what=f"cannot be written: {error.strerror}")) from error
+        raise RecordingError.of(str(path), f"cannot be written: {error.strerror}") from error
 
 
 @dataclass(frozen=True)
@@ -159,22 +159,13 @@ class _PlanFileReader:
                 rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if any(cells)]
         except (OSError, UnicodeDecodeError, csv.Error) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error)
-            raise CompdError(
-                Problem(where=str(self._path), what=f"cannot be read: {reason}", next_step=WRITTEN_BY)
-            ) from error
+            raise CompdError.of(str(self._path), f"cannot be read: {reason}", next_step=WRITTEN_BY) from error
         if not rows:
-            raise CompdError(
-                Problem(where=str(self._path), what="is empty", allowed="a header and rows", next_step=WRITTEN_BY)
-            )
+            raise CompdError.of(str(self._path), "is empty", allowed="a header and rows", next_step=WRITTEN_BY)
         if not set(NEEDED_COLUMNS) & set(rows[0][1]):
             # a file that is no plan is not quoted
-            raise CompdError(
-                Problem(
-                    where=f"{self._path}:1",
-                    what="is no header of a plan",
-                    allowed=", ".join(NEEDED_COLUMNS),
-                    next_step=WRITTEN_BY,
-                )
+            raise CompdError.of(
+                f"{self._path}:1", "is no header of a plan", allowed=", ".join(NEEDED_COLUMNS), next_step=WRITTEN_BY
             )
         return rows
 
@@ -228,6 +219,4 @@ class _PlanFileReader:
         return value
 
     def _add(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
-        self._problems.append(
-            Problem(where=f"{self._path}{place}", what=what, value=value, allowed=allowed, next_step=next_step)
-        )
+        self._problems.append(Problem(f"{self._path}{place}", what, value=value, allowed=allowed, next_step=next_step))

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
 
-from compd.errors import PluginError, Problem
+from compd.errors import PluginError
 from compd.files import own_users, read_small_file, trust_problem
 
 GAUGES = "compd.gauges"
@@ -80,14 +80,12 @@ def load(group: str, name: str, where: str, code: Code | None = None) -> Any:
     folders = _preset_folders(group)
     if name in folders:
         return folders[name].driver(name) if group == GAUGES else folders[name].simulated_device(name)
-    raise PluginError(
-        Problem(
-            where=where,
-            what=f"no such {_KIND.get(group, group)}",
-            value=name,
-            allowed=", ".join(sorted(points.keys() | folders.keys())) or "none installed",
-            next_step="choose one of these, or write /absolute/file.py:Name",
-        )
+    raise PluginError.of(
+        where,
+        f"no such {_KIND.get(group, group)}",
+        value=name,
+        allowed=", ".join(sorted(points.keys() | folders.keys())) or "none installed",
+        next_step="choose one of these, or write /absolute/file.py:Name",
     )
 
 
@@ -117,13 +115,11 @@ def _load_point(point: EntryPoint, where: str) -> Any:
     try:
         return point.load()
     except (ImportError, AttributeError, SyntaxError) as error:
-        raise PluginError(
-            Problem(
-                where=where,
-                what=f"{point.value} cannot be loaded: {error}",
-                value=point.name,
-                next_step="reinstall the package that offers it",
-            )
+        raise PluginError.of(
+            where,
+            f"{point.value} cannot be loaded: {error}",
+            value=point.name,
+            next_step="reinstall the package that offers it",
         ) from error
 
 
@@ -146,13 +142,11 @@ class _NoCode:
     """No file, for programs that do what somebody else asks for."""
 
     def module(self, file: Path, where: str, kind: str) -> ModuleType:
-        raise PluginError(
-            Problem(
-                where=where,
-                what=f"the {kind} is Python code, and this program executes no file",
-                value=str(file),
-                next_step="use it on the command line: `compd compare`, `compd diagnose`, `compd effect`",
-            )
+        raise PluginError.of(
+            where,
+            f"the {kind} is Python code, and this program executes no file",
+            value=str(file),
+            next_step="use it on the command line: `compd compare`, `compd diagnose`, `compd effect`",
         )
 
 
@@ -175,37 +169,31 @@ class ListedCode:
     def module(self, file: Path, where: str, kind: str) -> ModuleType:
         listed = self._files.get(str(file))
         if listed is None:
-            raise PluginError(
-                Problem(
-                    where=where,
-                    what=f"the {kind} is Python code that the machine configuration does not list",
-                    value=str(file),
-                    next_step="look at the file, then write under `effects:` of the configuration "
-                    f"`- {{file: {file}, sha256: {HASH_PLACE}}}` with the {HASH_PLACE} that `sha256sum {file}` prints, "
-                    "and let the daemon read its configuration anew (`systemctl reload compd`)",
-                )
+            raise PluginError.of(
+                where,
+                f"the {kind} is Python code that the machine configuration does not list",
+                value=str(file),
+                next_step="look at the file, then write under `effects:` of the configuration "
+                f"`- {{file: {file}, sha256: {HASH_PLACE}}}` with the {HASH_PLACE} that `sha256sum {file}` prints, "
+                "and let the daemon read its configuration anew (`systemctl reload compd`)",
             )
         try:
             content = read_small_file(file, _MAX_CODE_BYTES)
         except OSError as error:
-            raise PluginError(
-                Problem(
-                    where=where,
-                    what=f"cannot read the {kind}'s file: {error.strerror or error}",
-                    value=str(file),
-                    next_step="let the daemon's user read it",
-                )
+            raise PluginError.of(
+                where,
+                f"cannot read the {kind}'s file: {error.strerror or error}",
+                value=str(file),
+                next_step="let the daemon's user read it",
             ) from error
         if (found := hashlib.sha256(content).hexdigest()) != listed:
-            raise PluginError(
-                Problem(
-                    where=where,
-                    what=f"the {kind}'s file has another content than the configuration lists",
-                    value=f"{file}: sha256 {found}",
-                    allowed=listed,
-                    next_step=f"look at what has changed, then write the new hash under {self._key} of the "
-                    "configuration, or restore the file",
-                )
+            raise PluginError.of(
+                where,
+                f"the {kind}'s file has another content than the configuration lists",
+                value=f"{file}: sha256 {found}",
+                allowed=listed,
+                next_step=f"look at what has changed, then write the new hash under {self._key} of the "
+                "configuration, or restore the file",
             )
         module = ModuleType(_module_name(file))
         module.__file__ = str(file)
@@ -237,15 +225,13 @@ def load_module(file: Path, where: str, kind: str) -> ModuleType:
         problem = trust_problem(real, where, kind, own_users())
     except (OSError, RuntimeError) as error:  # RuntimeError: a loop of symbolic links
         why = getattr(error, "strerror", None) or str(error)
-        raise PluginError(
-            Problem(where=where, what=f"cannot read the {kind}'s file: {why}", value=str(file))
-        ) from error
+        raise PluginError.of(where, f"cannot read the {kind}'s file: {why}", value=str(file)) from error
     if problem is not None:
         raise PluginError(problem)
     module_name = _module_name(file)
     spec = importlib.util.spec_from_file_location(module_name, real)
     if spec is None or spec.loader is None or not real.is_file():
-        raise PluginError(Problem(where=where, what="not a Python file", value=str(file)))
+        raise PluginError.of(where, "not a Python file", value=str(file))
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module
     try:
@@ -271,4 +257,4 @@ def _uses_compd(file: Path) -> bool:
 
 def _unloadable(value: str, where: str, kind: str, error: BaseException) -> PluginError:
     name = "" if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: "
-    return PluginError(Problem(where=where, what=f"the {kind}'s file cannot be loaded: {name}{error}", value=value))
+    return PluginError.of(where, f"the {kind}'s file cannot be loaded: {name}{error}", value=value)

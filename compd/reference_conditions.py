@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal, TypeAlias
 
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 
 # ISO 1: lengths are stated at 20 degC.
 REFERENCE_TEMPERATURE_degC = 20.0
@@ -28,14 +28,12 @@ def value_at_zero(quantity: str, at_zero: Mapping[str, float]) -> float:
     Raises CompdError where it was not measured then.
     """
     if quantity not in at_zero:
-        raise CompdError(
-            Problem(
-                where="rows for effects",
-                what="this quantity was not measured at machine zero, from where effects count",
-                value=quantity,
-                allowed=", ".join(sorted(at_zero)) or "nothing was",
-                next_step="take machine zero again: `compd zero`; in a recording write it into its sidecar, under "
-                "`quantities_at_zero:`",
-            )
+        raise CompdError.of(
+            "rows for effects",
+            "this quantity was not measured at machine zero, from where effects count",
+            value=quantity,
+            allowed=", ".join(sorted(at_zero)) or "nothing was",
+            next_step="take machine zero again: `compd zero`; in a recording write it into its sidecar, under "
+            "`quantities_at_zero:`",
         )
     return at_zero[quantity]

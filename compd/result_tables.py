@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from numpy.typing import NDArray
 
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.extras import install_line
 
 if TYPE_CHECKING:
@@ -35,13 +35,7 @@ def data_frame(columns: Columns) -> pd.DataFrame:
     try:
         import pandas as pd
     except ImportError as error:
-        raise CompdError(
-            Problem(
-                where="to_dataframe",
-                what="pandas is not installed",
-                next_step=install_line("notebook"),
-            )
-        ) from error
+        raise CompdError.of("to_dataframe", "pandas is not installed", next_step=install_line("notebook")) from error
     return pd.DataFrame(dict(columns))
 
 

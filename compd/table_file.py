@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from compd.columns import ID_COLUMNS, is_header
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.files import folder_problem
 from compd.tables import ParquetTable, ProblemList, Table, TableBlock, csv_blocks, csv_row_count, read_table
 
@@ -25,9 +25,7 @@ def table_path(path: Path) -> Path:
     tables = [table for suffix in SUFFIXES if (table := path.with_suffix(suffix)).exists()]
     if len(tables) > 1:
         names = ", ".join(table.name for table in tables)
-        raise RecordingError(
-            Problem(where=str(path), what="is beside two tables", value=names, next_step=f"give one of them: {names}")
-        )
+        raise RecordingError.of(str(path), "is beside two tables", value=names, next_step=f"give one of them: {names}")
     return tables[0] if tables else path.with_suffix(CSV)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from compd.comparison import AlignedRecording, ComparisonCriteria, open_recording
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.model.effects import Effect
 from compd.model_file import ModelFile, read_model_file
 from compd.parameter_ranges import fitted_on_machine
@@ -39,24 +39,20 @@ def opened_model(model: Model, aligned: AlignedRecording) -> ModelFile:
     if not isinstance(model, ModelFile):
         return _on_machine(read_model_file(Path(model), machine, links), aligned)
     if model.machine != machine:
-        raise StateError(
-            Problem(
-                where="model",
-                what="belongs to another machine than the recording",
-                value=model.machine,
-                allowed=machine,
-                next_step="give this machine's model, or begin a new one",
-            )
+        raise StateError.of(
+            "model",
+            "belongs to another machine than the recording",
+            value=model.machine,
+            allowed=machine,
+            next_step="give this machine's model, or begin a new one",
         )
     if model.links not in (0, links):
-        raise StateError(
-            Problem(
-                where="model",
-                what="has another number of links than the recording",
-                value=str(model.links),
-                allowed=str(links),
-                next_step="give the model of these links, or begin a new one",
-            )
+        raise StateError.of(
+            "model",
+            "has another number of links than the recording",
+            value=str(model.links),
+            allowed=str(links),
+            next_step="give the model of these links, or begin a new one",
         )
     # an external model, whose effects lack numbers of single links
     return _on_machine(replace(model, links=links), aligned)

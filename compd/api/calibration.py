@@ -16,7 +16,7 @@ from compd.calibration import Calibration, CalibrationPlan, Noise, PoseStudy, re
 from compd.calibration import calibrate as calibrate_aligned
 from compd.comparison import AlignedRecording
 from compd.configuration import Machine, load_machine
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.machine_builder import build_model
 
 
@@ -176,13 +176,11 @@ def plan_calibration(
     """
     configuration = load_machine(machine)
     if configuration.external is not None:
-        raise CompdError(
-            Problem(
-                where=configuration.where("machine"),
-                what="has no drawing of which poses could tell anything",
-                value=configuration.machine,
-                allowed="a machine with `geometry:`",
-            )
+        raise CompdError.of(
+            configuration.where("machine"),
+            "has no drawing of which poses could tell anything",
+            value=configuration.machine,
+            allowed="a machine with `geometry:`",
         )
     model = build_model(configuration.geometry, configuration.wiring)
     stroke_mm = configuration.geometry.link_length_mm

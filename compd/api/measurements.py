@@ -91,14 +91,12 @@ def plan_measurement(
     >>> plan.write("next.csv")
     """
     if len(rivals) < 2 or len(set(rivals)) < len(rivals):
-        raise CompdError(
-            Problem(
-                where="rivals",
-                what="needs two effects or more",
-                value=",".join(rivals),
-                allowed="different ids",
-                next_step="a diagnosis names rivals",
-            )
+        raise CompdError.of(
+            "rivals",
+            "needs two effects or more",
+            value=",".join(rivals),
+            allowed="different ids",
+            next_step="a diagnosis names rivals",
         )
     own = gather_effects(effects)
     contending, others = ([named_effect(name, "rivals", own) for name in names] for names in (rivals, beside))
@@ -106,14 +104,12 @@ def plan_measurement(
     file = opened_model(model, aligned)
     present = [fitted.effect.id for fitted in file.fitted if fitted.effect.id in (*rivals, *beside)]
     if present:
-        raise CompdError(
-            Problem(
-                where="rivals",
-                what="is in the model already",
-                value=", ".join(present),
-                allowed="effects that are not",
-                next_step="`compd effect remove` takes it out",
-            )
+        raise CompdError.of(
+            "rivals",
+            "is in the model already",
+            value=", ".join(present),
+            allowed="effects that are not",
+            next_step="`compd effect remove` takes it out",
         )
     given = _plan_limits(aligned, workspace_M_mm, force_N, temperature_degC, speed_mm_per_s, limits or {})
     sigma_um = compare(aligned, file.fitted, file.covariance).floor.by_axis_um
@@ -143,25 +139,25 @@ def _plan_limits(
     largest = {"force_N": force_N, "speed_mm_per_s": speed_mm_per_s}
     given: dict[str, Any] = {name: value for name, value in largest.items() if value is not None}
     problems = [
-        Problem(where=name, what="is not understood", value=str(pair), allowed="two numbers, low before high")
+        Problem(name, "is not understood", value=str(pair), allowed="two numbers, low before high")
         for name, pair in pairs.items()
         if not (len(pair) == 2 and pair[0] < pair[1])
     ]
     problems += [
-        Problem(where=f"limit of {name}", what="is not understood", value=str(pair), allowed="two numbers, low first")
+        Problem(f"limit of {name}", "is not understood", value=str(pair), allowed="two numbers, low first")
         for name, pair in by_column.items()
         if not (len(pair) == 2 and pair[0] <= pair[1])
     ]
     problems += [
-        Problem(where=name, what="is not understood", value=str(value), allowed="0 or more")
+        Problem(name, "is not understood", value=str(value), allowed="0 or more")
         for name, value in given.items()
         if not value >= 0
     ]
     external = aligned.model is None
     problems += [
         Problem(
-            where=name,
-            what="is a limit of an external machine" if not external else "is no limit of an external machine",
+            name,
+            "is a limit of an external machine" if not external else "is no limit of an external machine",
             allowed="limits by column" if external else "workspace, force, temperature and speed",
             next_step="give `--limit COLUMN=LOW,HIGH`, in Python limits={COLUMN: (LOW, HIGH)}" if external else "",
         )

@@ -10,7 +10,7 @@ from typing import Any
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
 from compd.configuration import Machine, load_machine, shipped_names
 from compd.diagnosis import Criteria
-from compd.errors import CompdError, Problem, StateError
+from compd.errors import CompdError, StateError
 from compd.model.effects import Effect
 from compd.model.library import find_effect, gather_effects, load_library, named_effect
 from compd.model_changes import Refinement, add_to_model, unrefined
@@ -125,12 +125,10 @@ def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapp
     if not isinstance(effect, Effect):
         return named_effect(str(effect), "effect", known)
     if not effect.declared and not _is_of_library(effect):
-        raise CompdError(
-            Problem(
-                where=f"effect {effect.id}",
-                what="is not installed, so that a model file could not name it",
-                next_step='put it into a file and give "/absolute/file.py:NAME"',
-            )
+        raise CompdError.of(
+            f"effect {effect.id}",
+            "is not installed, so that a model file could not name it",
+            next_step='put it into a file and give "/absolute/file.py:NAME"',
         )
     return effect
 
@@ -144,13 +142,11 @@ def _is_of_library(effect: Effect) -> bool:
 def _shipped_links(name: str, path: Path) -> int:
     """Links of the machine that comes with compd under the name in a model file."""
     if name not in shipped_names():
-        raise StateError(
-            Problem(
-                where=str(path),
-                what="no configuration of its machine comes with compd",
-                value=name,
-                allowed=", ".join([*shipped_names(), EXTERNAL]),
-                next_step='give the configuration: machine="my-machine.yaml"',
-            )
+        raise StateError.of(
+            str(path),
+            "no configuration of its machine comes with compd",
+            value=name,
+            allowed=", ".join([*shipped_names(), EXTERNAL]),
+            next_step='give the configuration: machine="my-machine.yaml"',
         )
     return load_machine(name).geometry.links

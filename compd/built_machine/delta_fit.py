@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from compd.arrays import FloatArray, IntArray
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.machine_reach import machine_reach
 from compd.model import MachineModel, effect_deltas, observe, predict, sum_deltas
 from compd.model.kinematics import Movement
@@ -149,13 +149,11 @@ def _check(model: MachineModel) -> None:
     down = upright and bool((_offsets_M_mm(model)[:, 2] > 0).all())
     if not down:
         what = "the platform does not hang below the carriages" if upright else "is no linear delta with upright rails"
-        raise CompdError(
-            Problem(
-                where="machine",
-                what=what,
-                allowed="three actuators that slide along z of {M}, six rods, the platform below the carriages",
-                next_step="`--as csv` writes the numbers of any machine",
-            )
+        raise CompdError.of(
+            "machine",
+            what,
+            allowed="three actuators that slide along z of {M}, six rods, the platform below the carriages",
+            next_step="`--as csv` writes the numbers of any machine",
         )
 
 

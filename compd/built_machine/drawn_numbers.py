@@ -15,7 +15,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.documents import Location, Value
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.machine_builder import build_model
 from compd.model import Deltas, MachineModel, effect_deltas, observe, predict, sum_deltas
 from compd.model.effects import FittedEffect, Observations, Port, needed_quantities
@@ -50,13 +50,11 @@ def built_geometry(configuration: Configuration, fitted: Sequence[FittedEffect])
     Raises CompdError for `machine: external`, KinematicsError where the machine as built has no machine zero.
     """
     if configuration.external is not None:
-        raise CompdError(
-            Problem(
-                where=configuration.where("machine"),
-                what="compd knows no joints of this machine",
-                value=configuration.machine,
-                next_step="write the effects into a model file: `compd effect add`",
-            )
+        raise CompdError.of(
+            configuration.where("machine"),
+            "compd knows no joints of this machine",
+            value=configuration.machine,
+            next_step="write the effects into a model file: `compd effect add`",
         )
     model = build_model(configuration.geometry, configuration.wiring)
     rows = _two_rows(model)

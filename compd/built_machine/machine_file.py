@@ -13,7 +13,7 @@ from compd.arrays import FloatArray
 from compd.built_machine.drawn_numbers import BuiltGeometry, built_geometry
 from compd.configuration import Configuration, load
 from compd.documents import Location, Value, read_text, with_values
-from compd.errors import ConfigurationError, Problem
+from compd.errors import ConfigurationError
 from compd.files import write_files
 from compd.model.effects import FittedEffect
 from compd.model_file import ModelFile
@@ -72,12 +72,10 @@ def write_built_machine(
     """
     drawing = configuration.path
     if out.resolve() == drawing.resolve():
-        raise ConfigurationError(
-            Problem(
-                where=str(out),
-                what="is the file of the drawing",
-                next_step="give the machine as built another name: the drawing's numbers are needed again",
-            )
+        raise ConfigurationError.of(
+            str(out),
+            "is the file of the drawing",
+            next_step="give the machine as built another name: the drawing's numbers are needed again",
         )
     built = built_geometry(configuration, fitted)
     model_file = out.with_name(f"{out.stem}-model.yaml") if built.others else None

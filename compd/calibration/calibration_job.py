@@ -51,14 +51,12 @@ def calibrate(
     without += [name for name in WORDS if blocks and name not in blocks]
     parameters = calibration_parameters(model, rows, recordings[0].ranges, without)
     if not parameters.names or not set(blocks) <= set(WORDS):
-        raise CompdError(
-            Problem(
-                where="blocks",
-                what="name no numbers of this machine's drawing",
-                value=", ".join(blocks),
-                allowed=", ".join(WORDS),
-                next_step="choose of these, or leave it out for all",
-            )
+        raise CompdError.of(
+            "blocks",
+            "name no numbers of this machine's drawing",
+            value=", ".join(blocks),
+            allowed=", ".join(WORDS),
+            next_step="choose of these, or leave it out for all",
         )
     said("derivatives")
     poses = [MeasuredPoses.of(one, parameters) for one in recordings]
@@ -140,14 +138,12 @@ def _one_machine(recordings: Sequence[AlignedRecording]) -> MachineModel:
     hashes = {one.geometry_hash for one in recordings}
     model = recordings[0].model if recordings else None
     if model is None or len(hashes) != 1:
-        raise CompdError(
-            Problem(
-                where=", ".join(str(one.recording.path) for one in recordings) or "calibrate",
-                what="is no calibration of one machine",
-                value=f"{len(hashes)} machines" if hashes != {""} else "an external model, which has no drawing",
-                allowed="recordings of one machine with a drawing",
-                next_step="give the recordings of one machine, or its configuration with --machine",
-            )
+        raise CompdError.of(
+            ", ".join(str(one.recording.path) for one in recordings) or "calibrate",
+            "is no calibration of one machine",
+            value=f"{len(hashes)} machines" if hashes != {""} else "an external model, which has no drawing",
+            allowed="recordings of one machine with a drawing",
+            next_step="give the recordings of one machine, or its configuration with --machine",
         )
     return model
 
@@ -157,8 +153,8 @@ def _check_rows(poses: Sequence[MeasuredPoses]) -> None:
     numbers = [one.aligned.registration_columns.shape[2] for one in poses]
     problems = [
         Problem(
-            where=str(one.aligned.recording.path),
-            what="has too few poses",
+            str(one.aligned.recording.path),
+            "has too few poses",
             value=f"{own} measured values for {count} numbers of the registration",
             allowed="more values than these numbers, by 6 or more",
             next_step="measure more poses; `compd recording check` says which rows are left out",
@@ -170,8 +166,8 @@ def _check_rows(poses: Sequence[MeasuredPoses]) -> None:
     if not problems and rows < FEWEST_ROWS:
         problems.append(
             Problem(
-                where=", ".join(str(one.aligned.recording.path) for one in poses),
-                what="has too few poses",
+                ", ".join(str(one.aligned.recording.path) for one in poses),
+                "has too few poses",
                 value=f"{rows} rows with a pose and every value",
                 allowed=f"{FEWEST_ROWS} or more: of {PARTS} parts each is predicted from the others",
                 next_step="measure more poses: `compd plan --calibrate` chooses them",

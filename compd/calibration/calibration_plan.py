@@ -22,7 +22,7 @@ from compd.calibration.pose_candidates import (
     reachable_box,
 )
 from compd.calibration.pose_design import Information, Observability, exchange, observability, told_directions
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.model import MachineModel
 from compd.model.effects import Observations
 from compd.parameter_ranges import StatedRange
@@ -170,15 +170,13 @@ class PoseStudy:
         """
         before = 0 if self._before is None else len(self._before.machine)
         if count + before < FEWEST_ROWS:
-            raise CompdError(
-                Problem(
-                    where="plan",
-                    what="has fewer poses than a calibration needs",
-                    value=f"{count} poses" + (f" and {before} measured" if before else ""),
-                    allowed=f"{FEWEST_ROWS} or more in all: of {PARTS} parts each is predicted from the others",
-                    next_step="plan more poses, or give the recording of those measured already: "
-                    "`compd plan RECORDING --calibrate N`",
-                )
+            raise CompdError.of(
+                "plan",
+                "has fewer poses than a calibration needs",
+                value=f"{count} poses" + (f" and {before} measured" if before else ""),
+                allowed=f"{FEWEST_ROWS} or more in all: of {PARTS} parts each is predicted from the others",
+                next_step="plan more poses, or give the recording of those measured already: "
+                "`compd plan RECORDING --calibrate N`",
             )
         poses = self.planned(count)
         return CalibrationPlan(

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats.qmc import Sobol
 
 from compd.arrays import FloatArray, IntArray
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.machine_reach import amplification, amplifications, machine_reach, within_stroke
 from compd.model import MachineModel, observe
 from compd.model.effects import Observations
@@ -110,13 +110,11 @@ def reachable(model: MachineModel, poses: FloatArray, stroke_mm: tuple[float, fl
     Raises CompdError where a tool on the plate has no place of its own to plan, or no pose is reached.
     """
     if model.arrangement.on_plate:
-        raise CompdError(
-            Problem(
-                where="plan",
-                what="plans places of a tool on the platform",
-                value="tool on: plate",
-                next_step="choose places on the work by hand",
-            )
+        raise CompdError.of(
+            "plan",
+            "plans places of a tool on the platform",
+            value="tool on: plate",
+            next_step="choose places on the work by hand",
         )
     zero, fixed = model.zero, model.actuators.fixed == 1
     mechanism = Mechanism(model.base_joints_at_0_M_mm, model.platform_joints_P_mm, model.revolute_axes_P, model.hinges)
@@ -150,9 +148,7 @@ def reachable(model: MachineModel, poses: FloatArray, stroke_mm: tuple[float, fl
     off_mm = np.abs(rows.origin_M_mm - pose.origin_M_mm[good]).max(axis=1)
     solved = np.flatnonzero(off_mm < _SAME_MM)
     if not len(solved):
-        raise CompdError(
-            Problem(where="plan", what="no pose within these limits can be reached", next_step="widen --workspace")
-        )
+        raise CompdError.of("plan", "no pose within these limits can be reached", next_step="widen --workspace")
     return PoseCandidates(rows, turns[good], np.flatnonzero(good)).select(solved)
 
 

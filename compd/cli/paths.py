@@ -70,9 +70,7 @@ def _each(value: Any) -> list[Path | str]:
 def _problem(parameter: PathParameter, value: Path | str, has_empty: bool) -> Problem | None:
     path, name = Path(value), parameter.name.removesuffix("_file").upper()
     if not path.parts and (value == "" or has_empty):
-        return Problem(
-            where=f"{name}: ''", what="is empty", allowed=parameter.help, next_step="give it, or leave it out"
-        )
+        return Problem(f"{name}: ''", "is empty", allowed=parameter.help, next_step="give it, or leave it out")
     where = f"{name}: {str(value)!r}"
     if parameter.kind in (PathKind.FOLDER, PathKind.ANY):
         if path == _ROOT:
@@ -81,7 +79,7 @@ def _problem(parameter: PathParameter, value: Path | str, has_empty: bool) -> Pr
             what = "is a file, not a folder"
         else:
             return None
-        return Problem(where=where, what=what, allowed=parameter.help, next_step="give a folder of its own")
+        return Problem(where, what, allowed=parameter.help, next_step="give a folder of its own")
     if parameter.kind is PathKind.NAME_OR_FILE and path.name and "/" not in str(value):
         return None  # the name of a driver or page, though a folder may have it too
     return folder_problem(path, where, parameter.help)

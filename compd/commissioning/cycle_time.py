@@ -133,8 +133,8 @@ def cycle_warnings(configuration: Configuration, cycle: CycleTime) -> list[Probl
     fastest_hz = MAX_SHARE / cycle.median_s
     return [
         Problem(
-            where=configuration.where("loop", "rate_hz"),
-            what=f"a cycle takes {cycle.median_s * 1e3:.2f} ms on this computer: cycles would be missed",
+            configuration.where("loop", "rate_hz"),
+            f"a cycle takes {cycle.median_s * 1e3:.2f} ms on this computer: cycles would be missed",
             value=f"{rate_hz:g} Hz, a cycle every {1e3 / rate_hz:.2f} ms",
             allowed=f"{fastest_hz:.0f} Hz, so that half of the time is left",
             next_step="lower rate_hz, or take a faster computer",

@@ -10,7 +10,7 @@ from compd.commissioning.drift_costs import DRIFT_UM, DriftCost, drift_costs, ex
 from compd.commissioning.jump_trials import FeignedJump, believed_jump, feigned_jumps
 from compd.commissioning.line_budget import LineBudget, line_budgets
 from compd.configuration import Configuration
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.live.acquisition import MIN_MOTION, UNIT_LIMITS
 from compd.machine_builder import build_model
 from compd.stated_noise import SCATTER_RATIO, tolerance_mm
@@ -48,21 +48,17 @@ class Figures:
 def figures_of(configuration: Configuration) -> Figures:
     """All input of the numbers. Raises KinematicsError for an impossible machine zero."""
     if configuration.external is not None:
-        raise CompdError(
-            Problem(
-                where=configuration.where("geometry"),
-                what="is of a machine whose lengths compd does not know: what a fault costs at its tip is not known",
-                value="machine: external",
-                next_step="`compd check` without --what-cannot-be-seen says how far each gauge may jump unseen",
-            )
+        raise CompdError.of(
+            configuration.where("geometry"),
+            "is of a machine whose lengths compd does not know: what a fault costs at its tip is not known",
+            value="machine: external",
+            next_step="`compd check` without --what-cannot-be-seen says how far each gauge may jump unseen",
         )
     if not configuration.wiring.scale:
-        raise CompdError(
-            Problem(
-                where=configuration.where("wiring"),
-                what="has no `scale`: the commanded pose is corrected, and no fault of a scale costs anything",
-                next_step="`compd check` without --what-cannot-be-seen says what is not measured",
-            )
+        raise CompdError.of(
+            configuration.where("wiring"),
+            "has no `scale`: the commanded pose is corrected, and no fault of a scale costs anything",
+            next_step="`compd check` without --what-cannot-be-seen says what is not measured",
         )
     budgets = line_budgets(configuration)
     return Figures(

@@ -91,16 +91,16 @@ def jump_warnings(configuration: Configuration, jumps: Sequence[FeignedJump]) ->
         if math.isinf(jump_mm):
             warnings.append(
                 Problem(
-                    where=configuration.where("gauges", jump.gauge),
-                    what=f"any jump of {named_together(jump.measures)} is accepted once two polls agree",
+                    configuration.where("gauges", jump.gauge),
+                    f"any jump of {named_together(jump.measures)} is accepted once two polls agree",
                     next_step="write `acceleration_mm_per_s2:`, the largest acceleration of what it measures",
                 )
             )
         elif jump_mm > largest_mm:
             warnings.append(
                 Problem(
-                    where=configuration.where("gauges", jump.gauge),
-                    what=f"a jump of {named_together(jump.measures)} of {jump_mm:.3g} mm is believed",
+                    configuration.where("gauges", jump.gauge),
+                    f"a jump of {named_together(jump.measures)} of {jump_mm:.3g} mm is believed",
                     value=f"{_limits_text(configuration.gauges[jump.gauge])}, read every {poll_s * 1e3:.3g} ms",
                     allowed=f"what is believed should be below limits.correction_mm, {largest_mm:g} mm",
                     next_step="write `acceleration_mm_per_s2:` as small as it really is, or poll it more often",
@@ -114,8 +114,8 @@ def reply_warnings(configuration: Configuration) -> list[Problem]:
     gauges = configuration.gauge_objects()
     return [
         Problem(
-            where=configuration.where("lines", line),
-            what=f"replies on this line are anonymous: one of {named_together(unnamed)} that comes late "
+            configuration.where("lines", line),
+            f"replies on this line are anonymous: one of {named_together(unnamed)} that comes late "
             "looks like the answer of another gauge, and costs a pause until the line is in step again",
             next_step="let replies carry an address (see `compd gauge show DRIVER`), or give each gauge a line",
         )

@@ -37,8 +37,8 @@ def _skew_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) 
         if allowed_s is not None and skew_s > allowed_s:
             problems.append(
                 Problem(
-                    where=configuration.where("loop", "skew_s"),
-                    what=f"line `{budget.name}` takes {skew_s * 1e3:.0f} ms for a round: setpoints will be refused",
+                    configuration.where("loop", "skew_s"),
+                    f"line `{budget.name}` takes {skew_s * 1e3:.0f} ms for a round: setpoints will be refused",
                     value=f"{allowed_s:g} s",
                     allowed=f"{skew_s:.3g} s or more",
                     next_step="raise it, or the baud rate, or spread the gauges over more lines",
@@ -47,8 +47,8 @@ def _skew_warnings(configuration: Configuration, budgets: Sequence[LineBudget]) 
         elif allowed_s is None and budget.spread_s > MAX_SPREAD_S:
             problems.append(
                 Problem(
-                    where=configuration.where("lines", budget.name),
-                    what=f"its lengths are measured {budget.spread_s * 1e3:.0f} ms apart within a round: on the move "
+                    configuration.where("lines", budget.name),
+                    f"its lengths are measured {budget.spread_s * 1e3:.0f} ms apart within a round: on the move "
                     "they do not belong together, and no setpoint is refused for it",
                     allowed=f"{MAX_SPREAD_S * 1e3:g} ms, or a limit",
                     next_step="set `round_trigger` where the devices can latch, or say by `loop.skew_s` how far apart "
@@ -73,17 +73,15 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
     """One line's warnings. `stale_after_s`: the shortest of its gauges; `where`: the line's place in the file."""
     if budget.unknown:
         text = f"cannot be planned: {', '.join(budget.unknown)} does not state its bytes per poll"
-        return [
-            Problem(where=where, what=text, next_step="give the driver `traffic`, or measure with `compd gauge watch`")
-        ]
+        return [Problem(where, text, next_step="give the driver `traffic`, or measure with `compd gauge watch`")]
     problems = []
     takes = f"a round of {budget.bytes} bytes takes {budget.usual_s * 1e3:.1f} ms with 10 ms turnaround"
     # A reading is up to a whole round old when the next one comes, and must stay fresh during its reading.
     if 2 * budget.usual_s > stale_after_s:
         problems.append(
             Problem(
-                where=where,
-                what=f"{takes}: readings go stale between two polls",
+                where,
+                f"{takes}: readings go stale between two polls",
                 value=f"{stale_after_s:g} s until stale",
                 allowed=f"{2 * budget.usual_s:.3g} s or more",
                 next_step="raise the baud rate, read registers in one block, or spread the gauges over more lines",
@@ -92,8 +90,8 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
     elif budget.line.poll_every_s + budget.usual_s > stale_after_s:
         problems.append(
             Problem(
-                where=where,
-                what="readings are stale before the next ones come, time and again",
+                where,
+                "readings are stale before the next ones come, time and again",
                 value=f"poll_every_s {budget.line.poll_every_s:g}, {stale_after_s:g} s until stale",
                 allowed=f"poll_every_s below {max(stale_after_s - budget.usual_s, 0.0):.3g} s",
                 next_step="in ms? It is in seconds. Poll more often, or raise `stale_after_s` of the line's gauges",
@@ -102,8 +100,8 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
     if budget.line.poll_every_s and budget.usual_s > budget.line.poll_every_s:
         problems.append(
             Problem(
-                where=where,
-                what=f"{takes}: the wanted rate cannot be reached",
+                where,
+                f"{takes}: the wanted rate cannot be reached",
                 value=f"poll_every_s {budget.line.poll_every_s:g}",
                 allowed=f"{budget.usual_s:.3g} s or more",
                 next_step="raise poll_every_s, or the baud rate",
@@ -113,8 +111,8 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
         held_back_s = budget.usual_s + budget.exchanges * held_s
         problems.append(
             Problem(
-                where=where,
-                what=f"an FTDI adapter holds each reply back for up to 16 ms: a round of {budget.usual_s * 1e3:.1f} ms "
+                where,
+                f"an FTDI adapter holds each reply back for up to 16 ms: a round of {budget.usual_s * 1e3:.1f} ms "
                 f"takes up to {held_back_s * 1e3:.1f}",
                 value="low_latency: false",
                 next_step="leave `low_latency` out",
@@ -123,8 +121,8 @@ def line_warnings(budget: LineBudget, stale_after_s: float, where: str) -> list[
     if budget.gauges > 1 and budget.usual_s + budget.absent_s > stale_after_s:
         problems.append(
             Problem(
-                where=where,
-                what=f"one absent device of {budget.gauges} delays the others by {budget.absent_s * 1e3:.0f} ms: "
+                where,
+                f"one absent device of {budget.gauges} delays the others by {budget.absent_s * 1e3:.0f} ms: "
                 "they go stale whenever it is tried again",
                 value=f"{stale_after_s:g} s until stale",
                 next_step="shorten timeout_s, and a gateway's own wait with `gateway_wait_s`, or give that device a "

@@ -34,8 +34,8 @@ def period_warnings(configuration: Configuration) -> list[Problem]:
         if LATE * period_s > stale_after_s:
             problems.append(
                 Problem(
-                    where=configuration.where("gauges", name),
-                    what=f"a new value comes every {period_s:g} s: readings go stale between two of them",
+                    configuration.where("gauges", name),
+                    f"a new value comes every {period_s:g} s: readings go stale between two of them",
                     value=f"{stale_after_s:g} s until stale",
                     allowed=f"{LATE * period_s:.3g} s or more",
                     next_step=f"let the device send more often and lower `{line.period_key}`, or raise `stale_after_s`",

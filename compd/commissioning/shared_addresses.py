@@ -31,8 +31,8 @@ def _shared_addresses(configuration: Configuration) -> Iterator[Problem]:
         others = [line_of[transport, address, port] for address in addresses if (transport, address, port) in line_of]
         if others:
             yield Problem(
-                where=configuration.where("lines", name, "host"),
-                what=f"resolves to the same address as `{devices[others[0]][1]}` of line `{others[0]}`: "
+                configuration.where("lines", name, "host"),
+                f"resolves to the same address as `{devices[others[0]][1]}` of line `{others[0]}`: "
                 "behind a gateway the units of both wait for each other",
                 value=f"{host}:{port}",
                 allowed="one line per device",

@@ -33,7 +33,7 @@ from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.nuisance import nuisance_beside
 from compd.comparison.outliers import outlier_rows
 from compd.comparison.quantity_ranges import Ranges, quantity_ranges
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.model.effects import ConstantValues, Effect, FittedEffect
 from compd.statistics import cluster_covariance, huber_weights, solve_least_squares
 from compd.units import UM_PER_MM
@@ -169,14 +169,12 @@ def _check_rows(
     measured = int(usable.sum()) * len(aligned.labels)
     if measured <= parameters:
         lacking = [f"{name} has no finite value in {rows} of them" for name, rows in without_value.items() if rows]
-        raise CompdError(
-            Problem(
-                where=str(aligned.recording.path),
-                what=f"{measured} measured values for {parameters} numbers to fit",
-                value="; ".join([f"{int(usable.sum())} rows of {aligned.recording.rows} are usable", *lacking]),
-                allowed="more values than numbers",
-                next_step=_LOOK_AT_FORMULA if lacking else "`compd recording check` says which rows are left out",
-            )
+        raise CompdError.of(
+            str(aligned.recording.path),
+            f"{measured} measured values for {parameters} numbers to fit",
+            value="; ".join([f"{int(usable.sum())} rows of {aligned.recording.rows} are usable", *lacking]),
+            allowed="more values than numbers",
+            next_step=_LOOK_AT_FORMULA if lacking else "`compd recording check` says which rows are left out",
         )
 
 

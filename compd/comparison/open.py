@@ -123,8 +123,8 @@ def _shipped(sidecar_path: Path, problems: list[Problem]) -> Configuration | Non
     if sidecar.machine not in shipped_names():
         problems.append(
             Problem(
-                where=str(sidecar_path),
-                what="no configuration of this machine comes with compd",
+                str(sidecar_path),
+                "no configuration of this machine comes with compd",
                 value=repr(sidecar.machine),
                 allowed=", ".join([*shipped_names(), EXTERNAL]),
                 next_step="give the machine's configuration (--machine PATH, in Python machine=PATH), write its path "

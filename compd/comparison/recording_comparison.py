@@ -19,7 +19,7 @@ from compd.comparison.prediction_uncertainty import Uncertainty, first_order_unc
 from compd.comparison.residual_trends import find_trends
 from compd.comparison.white_residual import row_orders
 from compd.display_unit import MM_PER_RAD
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.model import GaugeNoise, link_residuals
 from compd.model.effects import FittedEffect
 from compd.recording import UsableRows
@@ -93,14 +93,12 @@ def _usable_rows(aligned: AlignedRecording, predicted_mm: FloatArray, criteria: 
     """Rows with a measured and a predicted value."""
     usable = aligned.usable.without(np.asarray(~np.isfinite(predicted_mm).all(axis=1)), NO_QUANTITY)
     if (count := int(usable.mask.sum())) < criteria.fewest_rows:
-        raise RecordingError(
-            Problem(
-                where=str(aligned.recording.path),
-                what="too few rows can be compared",
-                value=str(count),
-                allowed=f"{criteria.fewest_rows} or more",
-                next_step="; ".join(f"{rows} rows: {reason}" for reason, rows in usable.left_out.items()),
-            )
+        raise RecordingError.of(
+            str(aligned.recording.path),
+            "too few rows can be compared",
+            value=str(count),
+            allowed=f"{criteria.fewest_rows} or more",
+            next_step="; ".join(f"{rows} rows: {reason}" for reason, rows in usable.left_out.items()),
         )
     return usable
 

@@ -19,7 +19,7 @@ from compd.arrays import FloatArray
 from compd.compensation.external import compensate_external
 from compd.compensation.rows import Rows, kernel_rows
 from compd.compensation.values import Compensation, Contributions, GaugeValues, Wanted, WarmStart
-from compd.errors import KinematicsError, Problem
+from compd.errors import KinematicsError
 from compd.model import EffectInputs, EffectMemory, MachineModel, PackedMemory, python_effects
 from compd.model.effects import Memory
 from compd.model.external import ExternalModel, given_pose
@@ -229,14 +229,12 @@ def _attitude(model: MachineModel, target_rotation_B0_rad: ArrayLike | None, war
     """The attitude wanted of a hexapod in {M}; for a tripod the guess to start from."""
     if not model.attitude_is_free:
         if target_rotation_B0_rad is not None:
-            raise KinematicsError(
-                Problem(
-                    where="target",
-                    what="a tripod's attitude follows from its tip",
-                    value=str(target_rotation_B0_rad),
-                    allowed="a position alone",
-                    next_step="leave the attitude out",
-                )
+            raise KinematicsError.of(
+                "target",
+                "a tripod's attitude follows from its tip",
+                value=str(target_rotation_B0_rad),
+                allowed="a position alone",
+                next_step="leave the attitude out",
             )
         return warm.rotation_M_P
     if target_rotation_B0_rad is None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.compensation.values import GaugeValues, Wanted, WarmStart
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.model import MachineModel
 from compd.model.kernels import GaugeRows, WantedRows, WarmRows
 from compd.reference_conditions import value_at_zero
@@ -113,13 +113,11 @@ def _over(lead: tuple[int, ...], values: FloatArray | float, core: int) -> Float
 
 def _quantity(quantities: Mapping[str, FloatArray], name: str) -> FloatArray:
     if name not in quantities:
-        raise CompdError(
-            Problem(
-                where="rows for effects",
-                what="this quantity is not measured",
-                value=name,
-                allowed=", ".join(sorted(quantities)) or "nothing is",
-                next_step="add a gauge or a column of this name",
-            )
+        raise CompdError.of(
+            "rows for effects",
+            "this quantity is not measured",
+            value=name,
+            allowed=", ".join(sorted(quantities)) or "nothing is",
+            next_step="add a gauge or a column of this name",
         )
     return quantities[name]

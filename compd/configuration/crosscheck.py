@@ -38,9 +38,7 @@ def warnings(sections: Sections) -> list[Problem]:
     used_lines = {str(options.get("line")) for options in named if isinstance(options, dict)}
     unused = [
         Problem(
-            where=sections.document.where(("lines", name)),
-            what="no gauge uses this line",
-            next_step="remove it or wire a gauge",
+            sections.document.where(("lines", name)), "no gauge uses this line", next_step="remove it or wire a gauge"
         )
         for name in sections.lines
         if used_lines and name not in used_lines
@@ -49,8 +47,8 @@ def warnings(sections: Sections) -> list[Problem]:
     whole = all(_is_whole(sections.wiring, kind, "gauge") for kind in WIRES)
     unused += [
         Problem(
-            where=sections.document.where(("gauges", name)),
-            what="polled but wired to nothing",
+            sections.document.where(("gauges", name)),
+            "polled but wired to nothing",
             next_step="name it under `wiring:` or remove it",
         )
         for name in sections.gauges
@@ -86,7 +84,7 @@ def _option_warnings(sections: Sections) -> Iterator[Problem]:
     for name, options in sections.gauges.items():
         for location, what, value, next_step in sections.drivers[name](options).doubts():
             where = sections.document.where(("gauges", name, *location))
-            yield Problem(where=where, what=what, value=value, next_step=next_step)
+            yield Problem(where, what, value=value, next_step=next_step)
 
 
 def _vote_problems(sections: Sections) -> Iterator[Problem]:
@@ -95,8 +93,8 @@ def _vote_problems(sections: Sections) -> Iterator[Problem]:
     names = [wire.name for _, wire in _entries(sections.wiring, "quantities")]
     if temperature is not None and temperature not in names and None not in names:
         yield Problem(
-            where=sections.document.where(("votes", "frame", "temperature")),
-            what="no such quantity",
+            sections.document.where(("votes", "frame", "temperature")),
+            "no such quantity",
             value=temperature,
             allowed=", ".join(names),
             next_step="write a name under `wiring: quantities:`",
@@ -109,8 +107,8 @@ def _vote_warnings(sections: Sections) -> Iterator[Problem]:
     pairs = [link for link, role in roles if role == "Ra" and (link, "Rb") in roles]
     if getattr(sections.votes, "joint_pair_um", None) is not None and not pairs:
         yield Problem(
-            where=sections.document.where(("votes", "joint_pair_um")),
-            what="no joint has two comparators, Ra and Rb: this vote sees nothing",
+            sections.document.where(("votes", "joint_pair_um")),
+            "no joint has two comparators, Ra and Rb: this vote sees nothing",
             next_step="remove it",
         )
 
@@ -122,8 +120,8 @@ def _shared_process_warnings(sections: Sections) -> Iterator[Problem]:
         shared = set(sections.lines).difference(own_process)
         if options.line in shared and len(shared) > 1 and _from_elsewhere(options.driver, sections.drivers[name]):
             yield Problem(
-                where=sections.document.where(("gauges", name, "driver")),
-                what="this driver is not part of compd and shares a process with other lines: if it keeps the "
+                sections.document.where(("gauges", name, "driver")),
+                "this driver is not part of compd and shares a process with other lines: if it keeps the "
                 "interpreter or crashes, their readings are late or lost too",
                 value=options.driver,
                 next_step=f"write `{options.line}` under `acquisition: own_process:`",
@@ -161,8 +159,8 @@ def _channel_problems(sections: Sections) -> Iterator[Problem]:
         if name not in sections.gauges:
             if name not in gauges_in_file:  # a faulty gauge is already reported
                 yield Problem(
-                    where=where,
-                    what="no such gauge",
+                    where,
+                    "no such gauge",
                     value=channel,
                     allowed=", ".join(map(str, gauges_in_file)),
                     next_step="write a name under `gauges:`",
@@ -172,8 +170,8 @@ def _channel_problems(sections: Sections) -> Iterator[Problem]:
         full_name = resolve_channel(channel, sections.gauges, sections.drivers)
         if full_name is None:
             yield Problem(
-                where=where,
-                what=f"gauge `{name}` has no such single channel",
+                where,
+                f"gauge `{name}` has no such single channel",
                 value=channel,
                 allowed=", ".join(f"{name}.{channel_name}" for channel_name in units),
                 next_step="write gauge.channel",
@@ -181,11 +179,11 @@ def _channel_problems(sections: Sections) -> Iterator[Problem]:
             continue
         delivers = units[full_name.split(".")[1]]
         if unit and delivers != unit:
-            yield Problem(where=where, what=f"needs a gauge in {unit}, this one delivers {delivers}", value=channel)
+            yield Problem(where, f"needs a gauge in {unit}, this one delivers {delivers}", value=channel)
         if full_name in location_of_channel:
             yield Problem(
-                where=where,
-                what=f"wired already at {sections.document.where(location_of_channel[full_name])}",
+                where,
+                f"wired already at {sections.document.where(location_of_channel[full_name])}",
                 value=channel,
                 allowed="each channel once",
             )
@@ -214,8 +212,8 @@ def _frame_problems(sections: Sections) -> Iterator[Problem]:
         return
     if sections.framed is False:
         yield Problem(
-            where=sections.document.where(("wiring", "frame")),
-            what="has frame comparators, but the geometry does not say where they stand",
+            sections.document.where(("wiring", "frame")),
+            "has frame comparators, but the geometry does not say where they stand",
             next_step="write `geometry: base: supports_B_mm` and `plate_points_M_mm`, or leave `frame` out",
         )
     whole = _is_whole(sections.wiring, "frame", "distance")
@@ -224,8 +222,8 @@ def _frame_problems(sections: Sections) -> Iterator[Problem]:
         least = 1 if whole and distance in needed else 0
         if not least <= counts[distance] <= 1:
             yield Problem(
-                where=sections.document.where(("wiring", "frame")),
-                what=f"frame distance {distance} is wired {counts[distance]} times",
+                sections.document.where(("wiring", "frame")),
+                f"frame distance {distance} is wired {counts[distance]} times",
                 allowed="t1..t3 and u1..u6, each exactly once; u1..u6 alone; or none of them",
             )
 
@@ -235,8 +233,8 @@ def _quantity_problems(sections: Sections) -> Iterator[Problem]:
     for name, count in names.items():
         if name is not None and count > 1:
             yield Problem(
-                where=sections.document.where(("wiring", "quantities")),
-                what=f"{name} is wired {count} times",
+                sections.document.where(("wiring", "quantities")),
+                f"{name} is wired {count} times",
                 allowed="each name once",
             )
 
@@ -245,8 +243,8 @@ def _no_such_link(sections: Sections, kind: str, links: int) -> Iterator[Problem
     for i, wire in _entries(sections.wiring, kind):
         if wire.link is not None and wire.link > links:
             yield Problem(
-                where=sections.document.where(("wiring", kind, i, "link")),
-                what="there is no such link",
+                sections.document.where(("wiring", kind, i, "link")),
+                "there is no such link",
                 value=str(wire.link),
                 allowed=f"1..{links}" if links else "none: compd knows no links of this machine",
             )
@@ -260,8 +258,8 @@ def _scale_problems(sections: Sections, count: int) -> Iterator[Problem]:
     for link in range(1, count + 1):
         if not least <= scales[link] <= 1:
             yield Problem(
-                where=sections.document.where(("wiring", "scale")),
-                what=f"link {link} has {scales[link]} scales",
+                sections.document.where(("wiring", "scale")),
+                f"link {link} has {scales[link]} scales",
                 allowed=f"links 1..{count}, each exactly one; or none of them",
             )
 
@@ -277,7 +275,7 @@ def _joint_problems(sections: Sections, links: int) -> Iterator[Problem]:
         roles = Counter(wire.role for wire in wires)
         if max(roles.values()) > 1 or roles["Ra"] != roles["Rb"] or (roles["B"] and roles["Ra"]):
             yield Problem(
-                where=sections.document.where(("wiring", "joint")),
-                what=f"link {link} has comparators {', '.join(sorted(roles.elements()))}",
+                sections.document.where(("wiring", "joint")),
+                f"link {link} has comparators {', '.join(sorted(roles.elements()))}",
                 allowed="at most one S, and either one B or Ra and Rb together",
             )

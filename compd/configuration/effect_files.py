@@ -48,9 +48,7 @@ def effect_file_problems(document: Document, effects: Sequence[Any]) -> Iterator
             continue
         where = document.where(("effects", number))
         if entry.file in seen:
-            yield Problem(
-                where=where, what="is listed twice", value=entry.file, allowed="each file once", next_step="remove one"
-            )
+            yield Problem(where, "is listed twice", value=entry.file, allowed="each file once", next_step="remove one")
             continue
         seen.add(entry.file)
         try:

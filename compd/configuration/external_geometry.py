@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Self
 from pydantic import Field, model_validator
 
 from compd.documents import Positive, Section, refusal
-from compd.errors import ConfigurationError, Problem
+from compd.errors import ConfigurationError
 from compd.plugins import ListedCode
 
 # The name of such a machine, in configurations, model files and sidecars.
@@ -84,14 +84,12 @@ class ExternalGeometry(Section):
         def __getattr__(self, name: str) -> NoReturn:
             if name.startswith("_"):  # of pydantic
                 return super().__getattr__(name)
-            raise UnknownGeometryError(
-                Problem(
-                    where=f"geometry.{name}",
-                    what="this needs a machine whose geometry compd knows",
-                    value="machine: external",
-                    next_step="describe the machine by actuators and rods; or compare recordings with the columns "
-                    "`model_x_mm` ...",
-                )
+            raise UnknownGeometryError.of(
+                f"geometry.{name}",
+                "this needs a machine whose geometry compd knows",
+                value="machine: external",
+                next_step="describe the machine by actuators and rods; or compare recordings with the columns "
+                "`model_x_mm` ...",
             )
 
 

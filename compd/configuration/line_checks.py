@@ -33,8 +33,8 @@ def _port_problems(sections: Sections) -> Iterator[Problem]:
             continue
         if port in line_of_port:
             yield Problem(
-                where=sections.document.where(("lines", name, "port")),
-                what=f"line `{line_of_port[port]}` has the same port",
+                sections.document.where(("lines", name, "port")),
+                f"line `{line_of_port[port]}` has the same port",
                 value=port,
                 allowed="one line per port",
                 next_step="hang both gauges on one line",
@@ -64,8 +64,8 @@ def _kind_problems(sections: Sections) -> Iterator[Problem]:
         location: Location = ("gauges", name, "line")
         if line_name not in lines:
             yield Problem(
-                where=sections.document.where(location),
-                what="no such line",
+                sections.document.where(location),
+                "no such line",
                 value=line_name,
                 allowed=", ".join(map(str, lines)),
                 next_step="write the name of a line under `lines:`",
@@ -77,8 +77,8 @@ def _kind_problems(sections: Sections) -> Iterator[Problem]:
         needed = sections.drivers[name].line_kind
         if needed != definition.carries:
             yield Problem(
-                where=sections.document.where(location),
-                what=f"driver {options['driver']} needs a line that carries {needed}",
+                sections.document.where(location),
+                f"driver {options['driver']} needs a line that carries {needed}",
                 value=f"{line_name} (kind {definition.kind})",
                 allowed="kind " + join_words([kind.kind for kind in kinds_that_carry(needed)], "or"),
             )
@@ -91,8 +91,8 @@ def _library_problems(sections: Sections) -> Iterator[Problem]:
         library = None if definition is None else definition.library
         if library is not None and find_spec(library.package) is None:
             yield Problem(
-                where=sections.document.where(("lines", name, "kind")),
-                what=f"needs the package {library.package}, which is not installed",
+                sections.document.where(("lines", name, "kind")),
+                f"needs the package {library.package}, which is not installed",
                 value=line.kind,
                 next_step=install_line(library.extra),
             )
@@ -106,8 +106,8 @@ def _signal_problems(sections: Sections) -> Iterator[Problem]:
         without = "" if definition is None else definition.without_signals(line)
         if without and (signals := sections.drivers[name](options).serial_signals):
             yield Problem(
-                where=sections.document.where(("gauges", name, "line")),
-                what=f"is asked by {' and '.join(signals)}, which {without} does not have",
+                sections.document.where(("gauges", name, "line")),
+                f"is asked by {' and '.join(signals)}, which {without} does not have",
                 value=options.line,
                 allowed="a serial port, or rfc2217://host:port",
                 next_step="let the device server speak RFC 2217, or use a port of this computer",
@@ -131,8 +131,8 @@ def _power_problems(sections: Sections) -> Iterator[Problem]:
                 against = f"gauge `{by}` on line `{options.line}`"
             if against:
                 yield Problem(
-                    where=sections.document.where(("gauges", name)),
-                    what=f"is powered from {pin.upper()}, which {against} sets otherwise",
+                    sections.document.where(("gauges", name)),
+                    f"is powered from {pin.upper()}, which {against} sets otherwise",
                     allowed=f"{pin}: {str(high).lower()}",
                     next_step="remove the line's key, or give the gauge a line of its own",
                 )
@@ -150,12 +150,12 @@ def _process_problems(sections: Sections) -> Iterator[Problem]:
         where = sections.document.where(("acquisition", "own_process", i))
         if name not in lines:
             yield Problem(
-                where=where,
-                what="no such line",
+                where,
+                "no such line",
                 value=name,
                 allowed=", ".join(map(str, lines)),
                 next_step="write the name of a line under `lines:`",
             )
         elif name in named:
-            yield Problem(where=where, what="named twice", value=name, allowed="each line once", next_step="remove it")
+            yield Problem(where, "named twice", value=name, allowed="each line once", next_step="remove it")
         named.add(name)

@@ -33,8 +33,8 @@ def line_slips(sections: Sections) -> Iterator[Problem]:
                 host = address.split("?")[0].rpartition(":")[0]
             if why := _why_no_port(port, scheme if slashes else ""):
                 yield Problem(
-                    where=sections.document.where(("lines", name, "port")),
-                    what=why,
+                    sections.document.where(("lines", name, "port")),
+                    why,
                     value=port,
                     allowed="a path as /dev/serial/by-id/..., or socket://host:port, rfc2217://host:port",
                     next_step="`compd gauge scan` lists the ports",
@@ -42,16 +42,16 @@ def line_slips(sections: Sections) -> Iterator[Problem]:
         if isinstance(baud, int) and baud not in _BAUDRATES:
             nearest = min(_BAUDRATES, key=lambda rate: abs(rate - baud))
             yield Problem(
-                where=sections.document.where(("lines", name, "baud")),
-                what="is no usual rate",
+                sections.document.where(("lines", name, "baud")),
+                "is no usual rate",
                 value=str(baud),
                 next_step=f"the nearest is {nearest}; ignore this where the device has its own",
             )
         if host is not None and (why := _why_no_host(host)):
             key = "port" if isinstance(port, str) else "host"
             yield Problem(
-                where=sections.document.where(("lines", name, key)),
-                what=why,
+                sections.document.where(("lines", name, key)),
+                why,
                 value=host,
                 allowed="four numbers from 0 to 255, an IPv6 address, or a name",
                 next_step="write the device's own address",
@@ -97,8 +97,8 @@ def _own_port(sections: Sections, name: str, address: str) -> Iterator[Problem]:
     own = {str(tcp.get("host")), "localhost", socket.gethostname().lower()}
     if number == str(tcp["port"]) and (host in own or _is_loopback(host)):
         yield Problem(
-            where=sections.document.where(("lines", name, "port")),
-            what="is the daemon's own port, under sockets.tcp",
+            sections.document.where(("lines", name, "port")),
+            "is the daemon's own port, under sockets.tcp",
             value=address,
             next_step="write the device's address and port",
         )

@@ -293,14 +293,14 @@ def examine(path: Path) -> Examined:
             sections[name] = defaults[name]
         else:
             sections[name] = None
-            problems.append(Problem(where=str(path), what=f"section `{name}` is missing", next_step=f"add `{name}:`"))
+            problems.append(Problem(str(path), f"section `{name}` is missing", next_step=f"add `{name}:`"))
     gauges, drivers = gauges_of(document, problems) if gauged else ({}, {})
     part = {
         name: sections[name] if sections[name] is not None else readable(kind, document.value((name,)))
         for name, kind in kinds.items()
     }
     problems += [
-        Problem(where=document.where(("geometry", *location)), what=what, value=value, allowed=allowed, next_step=step)
+        Problem(document.where(("geometry", *location)), what, value=value, allowed=allowed, next_step=step)
         for location, what, value, allowed, step in (() if is_external(document) else contradictions(part["geometry"]))
     ]
     checked = Sections(
@@ -338,8 +338,8 @@ def gauges_of(
     if not isinstance(section, dict) or not section:
         problems.append(
             Problem(
-                where=document.where(("gauges",)),
-                what="section `gauges` is missing or empty",
+                document.where(("gauges",)),
+                "section `gauges` is missing or empty",
                 next_step="add `gauges:` with one entry per device; without any, leave all wires out, too",
             )
         )
@@ -349,8 +349,8 @@ def gauges_of(
         if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9_]+", name):
             problems.append(
                 Problem(
-                    where=document.where(location),
-                    what="cannot be a gauge's name",
+                    document.where(location),
+                    "cannot be a gauge's name",
                     value=repr(name),
                     allowed="letters, digits and _",
                     next_step="rename it, under `wiring:` too; in quotes if it has digits only",
@@ -360,8 +360,8 @@ def gauges_of(
         if not isinstance(raw, dict) or not isinstance(raw.get("driver"), str):
             problems.append(
                 Problem(
-                    where=document.where(location),
-                    what="needs `driver:`",
+                    document.where(location),
+                    "needs `driver:`",
                     value=value_text(raw.get("driver", "") if isinstance(raw, dict) else raw, location),
                     next_step="`compd check --drivers` lists them",
                 )
@@ -378,7 +378,7 @@ def gauges_of(
             if (why := _why_not_made(driver, options)) is None:
                 gauges[name] = options
             else:
-                problems.append(Problem(where=document.where(location), what=why, next_step="mend the driver"))
+                problems.append(Problem(document.where(location), why, next_step="mend the driver"))
     return gauges, drivers
 
 

@@ -36,8 +36,8 @@ def place_problems(document: Document, sockets: SocketSettings | None, state: St
     if sockets is not None and _is_something_else(Path(sockets.unix.path)):
         problems.append(
             Problem(
-                where=document.where(("sockets", "unix", "path")),
-                what="there is something else that is no socket",
+                document.where(("sockets", "unix", "path")),
+                "there is something else that is no socket",
                 value=sockets.unix.path,
                 next_step="choose a name that is not used yet",
             )
@@ -45,8 +45,8 @@ def place_problems(document: Document, sockets: SocketSettings | None, state: St
     if state is not None and state.model_file is not None and not os.path.lexists(state.model_file):
         problems.append(
             Problem(
-                where=document.where(("state", "model_file")),
-                what="there is no such file",
+                document.where(("state", "model_file")),
+                "there is no such file",
                 value=state.model_file,
                 next_step="`compd effect add` writes a model file; or leave the key out",
             )
@@ -55,8 +55,8 @@ def place_problems(document: Document, sockets: SocketSettings | None, state: St
         if why := _why_impossible(path):
             problems.append(
                 Problem(
-                    where=document.where(location),
-                    what=f"there can be no such directory: {why}",
+                    document.where(location),
+                    f"there can be no such directory: {why}",
                     value=str(path),
                     next_step="choose another one",
                 )
@@ -75,8 +75,8 @@ def place_warnings(document: Document, sockets: SocketSettings | None, state: St
             what = "cannot be written" if existing == path else f"does not exist, and {existing} cannot be written"
             warnings.append(
                 Problem(
-                    where=document.where(location),
-                    what=f"the directory for {what_for} {what} by this user",
+                    document.where(location),
+                    f"the directory for {what_for} {what} by this user",
                     value=str(path),
                     next_step=f"as root: install -d -o USER {path}; USER is who runs the daemon",
                 )
@@ -103,8 +103,8 @@ def _directory_slips(
             why = "is emptied when the computer starts"
         if why:
             yield Problem(
-                where=document.where(location),
-                what=f"the directory for {what_for} {why}",
+                document.where(location),
+                f"the directory for {what_for} {why}",
                 value=str(path),
                 next_step="choose one of its own, such as /var/lib/compd for files and /run/compd for the socket",
             )
@@ -114,8 +114,8 @@ def _open_socket_warnings(document: Document, sockets: SocketSettings | None) ->
     if sockets is None or sockets.tcp is None or not sockets.tcp.is_open:
         return
     yield Problem(
-        where=document.where(("sockets", "tcp", "host")),
-        what="OPEN TO THE NETWORK: other computers can watch and, with the token, set targets; nothing on the way is "
+        document.where(("sockets", "tcp", "host")),
+        "OPEN TO THE NETWORK: other computers can watch and, with the token, set targets; nothing on the way is "
         "encrypted, the token neither",
         value=f"{sockets.tcp.host}, allowed from {', '.join(sockets.tcp.allow)}",
         allowed="127.0.0.1, or ::1, for this computer alone",

@@ -187,8 +187,8 @@ def _out_of_range(plausible: PlausibleRange, location: Location, value: float, d
     if plausible.unit == "mm" and plausible.lowest <= value * 1e3 <= plausible.highest and value < plausible.lowest:
         next_step = f"in metres? then write {value * 1e3:g}"
     return Problem(
-        where=document.where(location),
-        what=f"is not plausible: {reason}",
+        document.where(location),
+        f"is not plausible: {reason}",
         value=f"{value:g} {plausible.unit}",
         allowed=allowed,
         next_step=next_step,
@@ -202,15 +202,15 @@ def _points_out_of_scale(document: Document, sections: Mapping[str, Any]) -> Ite
         largest_mm = max(map(abs, points), default=math.nan)
         if 0 < largest_mm < _MIN_MACHINE_MM:
             yield Problem(
-                where=document.where(location),
-                what="is not plausible: no coordinate is larger than a few millimetres",
+                document.where(location),
+                "is not plausible: no coordinate is larger than a few millimetres",
                 value=f"at most {largest_mm:g} mm",
                 next_step="in metres? then multiply every number by 1000",
             )
         elif largest_mm > _MAX_MACHINE_MM:
             yield Problem(
-                where=document.where(location),
-                what="is not plausible: no machine is a hundred metres large",
+                document.where(location),
+                "is not plausible: no machine is a hundred metres large",
                 value=f"{largest_mm:g} mm",
                 next_step="all lengths are in mm",
             )
@@ -230,8 +230,8 @@ def _times_that_do_not_fit(document: Document, sections: Mapping[str, Any]) -> I
     valid_for_s = _value(sections, "sockets", "valid_for_s")
     if rate_hz and valid_for_s and valid_for_s * rate_hz < 2:
         yield Problem(
-            where=document.where(("sockets", "valid_for_s")),
-            what="is not plausible: a setpoint ends before the next one comes",
+            document.where(("sockets", "valid_for_s")),
+            "is not plausible: a setpoint ends before the next one comes",
             value=f"{valid_for_s:g} s, one every {1 / rate_hz:g} s",
             allowed=f"{2 / rate_hz:g} s or more",
             next_step="write five periods or more",
@@ -241,8 +241,8 @@ def _times_that_do_not_fit(document: Document, sections: Mapping[str, Any]) -> I
         back_off_s = getattr(line, "back_off_s", None)
         if back_off_s is not None and back_off_s[0] > back_off_s[1]:
             yield Problem(
-                where=document.where(("lines", name, "back_off_s")),
-                what="is not plausible: the first wait is the longest",
+                document.where(("lines", name, "back_off_s")),
+                "is not plausible: the first wait is the longest",
                 value=f"{list(back_off_s)} s",
                 next_step="write the first wait, then the longest",
             )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from compd.configuration.machine_configuration import Configuration, load
-from compd.errors import CompdError, ConfigurationError, Problem
+from compd.errors import CompdError, ConfigurationError
 
 # Directories in the installed package, and in a checkout.
 _PLACES = (Path(__file__).parents[1] / "shipped_config", Path(__file__).parents[2] / "config")
@@ -47,14 +47,12 @@ def load_machine(machine: Machine) -> Configuration:
     if isinstance(machine, Path) or "/" in machine or machine.endswith((".yaml", ".yml")):
         return load(Path(machine))
     if machine not in shipped_names():
-        raise ConfigurationError(
-            Problem(
-                where="machine",
-                what="no configuration of this name comes with compd",
-                value=machine,
-                allowed=", ".join(shipped_names()),
-                next_step="choose one of these, or give the path of your machine's configuration (NAME.yaml)",
-            )
+        raise ConfigurationError.of(
+            "machine",
+            "no configuration of this name comes with compd",
+            value=machine,
+            allowed=", ".join(shipped_names()),
+            next_step="choose one of these, or give the path of your machine's configuration (NAME.yaml)",
         )
     return load(shipped_configuration(f"{machine}.yaml"))
 
@@ -76,11 +74,6 @@ def shipped_configuration(name: str) -> Path:
     for place in _PLACES:
         if (place / name).is_file():
             return place / name
-    raise CompdError(
-        Problem(
-            where=str(_PLACES[0]),
-            what="the shipped configurations are missing",
-            value=name,
-            next_step="reinstall compd",
-        )
+    raise CompdError.of(
+        str(_PLACES[0]), "the shipped configurations are missing", value=name, next_step="reinstall compd"
     )

@@ -193,12 +193,10 @@ def driver_under_test(
     """
     gauge = load(GAUGES, name, f"driver {name}")
     if issubclass(gauge, PushedGauge):
-        raise PluginError(
-            Problem(
-                where=f"driver {name}",
-                what="its device speaks by itself: there are no requests whose replies could be damaged",
-                next_step="try it with `compd gauge read` on a server or broker of yours",
-            )
+        raise PluginError.of(
+            f"driver {name}",
+            "its device speaks by itself: there are no requests whose replies could be damaged",
+            next_step="try it with `compd gauge read` on a server or broker of yours",
         )
     device = load(SIMULATED_GAUGES, simulator or name, f"simulated device of {name}")
     chosen = (gauge.sample_options if options is None else options) or {}
@@ -208,8 +206,8 @@ def driver_under_test(
         raise PluginError(
             [
                 Problem(
-                    where=f"driver {name}, options.{'.'.join(map(str, detail['loc']))}",
-                    what=detail["msg"],
+                    f"driver {name}, options.{'.'.join(map(str, detail['loc']))}",
+                    detail["msg"],
                     next_step="give the driver `sample_options`, or name a file with --options",
                 )
                 for detail in error.errors(include_url=False)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from compd.client import Client, connect
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 from compd.gauge import Quality
 
 # Timeout (s) of taking machine zero, which averages the gauges for a second.
@@ -51,21 +51,12 @@ def wait_for_gauges(
             return
         if time.monotonic() > end_s:
             break
-    raise DaemonError(
-        Problem(
-            where="gauges",
-            what=f"not all are read within {GAUGES_TIMEOUT_S:g} s",
-            value=", ".join(not_good),
-            next_step=TOO_SLOW,
-        )
+    raise DaemonError.of(
+        "gauges", f"not all are read within {GAUGES_TIMEOUT_S:g} s", value=", ".join(not_good), next_step=TOO_SLOW
     )
 
 
 def _refused(error: DaemonError) -> DaemonError:
     """The error in place of the daemon's, which tells the owner of a real machine to mend a gauge."""
     reason = error.problems[0].what.partition("\n")[0]
-    return DaemonError(
-        Problem(
-            where="machine zero", what=f"the daemon refused it {ZERO_TRIES} times", value=reason, next_step=TOO_SLOW
-        )
-    )
+    return DaemonError.of("machine zero", f"the daemon refused it {ZERO_TRIES} times", value=reason, next_step=TOO_SLOW)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 
 # Longest wait (s) for a start: the first one compiles the kernels, up to two minutes on a slow computer.
 START_TIMEOUT_S = 180.0
@@ -59,11 +59,9 @@ def _wait_until_ready(command: Command, process: subprocess.Popen[bytes], log: P
     end_s = time.monotonic() + START_TIMEOUT_S
     while not command.ready.exists():
         if process.poll() is not None or time.monotonic() > end_s:
-            raise DaemonError(
-                Problem(
-                    where=f"compd {' '.join(command.arguments)}",
-                    what="did not start",
-                    next_step="read what it printed:\n" + log.read_text(errors="replace")[-8000:],
-                )
+            raise DaemonError.of(
+                f"compd {' '.join(command.arguments)}",
+                "did not start",
+                next_step="read what it printed:\n" + log.read_text(errors="replace")[-8000:],
             )
         time.sleep(POLL_EVERY_S)

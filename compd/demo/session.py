@@ -18,7 +18,7 @@ from compd.client import Client, connect
 from compd.configuration import Configuration, ToolOnPlatformSettings
 from compd.demo.machine_zero import ANSWER_TIMEOUT_S, take_zero
 from compd.demo.simulated_daemon import simulated_daemon
-from compd.errors import CompdError, DaemonError, Problem
+from compd.errors import CompdError, DaemonError
 from compd.simulation import ControlClient
 
 # Kinds of compensation: of nothing, of the joints, of joints and frame.
@@ -107,12 +107,10 @@ def run_demo(configuration: Configuration, seconds: float, seed: int, on_change:
     scales, and if one does not start.
     """
     if not configuration.wiring.scale:
-        raise CompdError(
-            Problem(
-                where="wiring",
-                what="has no `scale`, and the demo drives a machine by its scales",
-                next_step="give another machine, or none for the shipped tripod",
-            )
+        raise CompdError.of(
+            "wiring",
+            "has no `scale`, and the demo drives a machine by its scales",
+            next_step="give another machine, or none for the shipped tripod",
         )
     for attempts_left in reversed(range(ATTEMPTS)):
         with simulated_daemon(configuration, seed, SPEEDUP, ZERO_HOLD_S) as directory:

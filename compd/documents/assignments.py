@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from compd.documents.yaml_reader import parse_yaml
-from compd.errors import ConfigurationError, Problem
+from compd.errors import ConfigurationError
 
 
 def assigned(option: str, assignments: Sequence[str], example: str) -> dict[str, Any]:
@@ -16,8 +16,6 @@ def assigned(option: str, assignments: Sequence[str], example: str) -> dict[str,
     for assignment in assignments:
         key, equals, value = assignment.partition("=")
         if not equals:
-            raise ConfigurationError(
-                Problem(where=option, what="is not KEY=VALUE", value=assignment, allowed=f"{option} {example}")
-            )
+            raise ConfigurationError.of(option, "is not KEY=VALUE", value=assignment, allowed=f"{option} {example}")
         data[key], _ = parse_yaml(value, Path(f"{option} {key}"))
     return data

@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from compd.documents.yaml_reader import Location, dotted, parse_yaml
-from compd.errors import ConfigurationError, Problem
+from compd.errors import ConfigurationError
 
 # A number, a vector, or a word that needs no quotes.
 Value: TypeAlias = float | Sequence[float] | str
@@ -87,9 +87,7 @@ def _child(node: yaml.Node, location: Location, uses: Mapping[int, int], where: 
         child = _found(node, part)
         if child is None or uses[id(child)] > 1:
             what = "is missing, or merged from an anchor" if child is None else "is written once for several places"
-            raise ConfigurationError(
-                Problem(where=where, what=what, next_step="write the values out in each place, without an anchor")
-            )
+            raise ConfigurationError.of(where, what, next_step="write the values out in each place, without an anchor")
         node = child
     return node
 
@@ -188,11 +186,9 @@ def _commented_lines(text: str) -> set[int]:
 
 
 def _unusual(where: str) -> ConfigurationError:
-    return ConfigurationError(
-        Problem(
-            where=where,
-            what="is written so that its numbers cannot be replaced one by one",
-            allowed="numbers, and vectors as [x, y, z]",
-            next_step="write it so",
-        )
+    return ConfigurationError.of(
+        where,
+        "is written so that its numbers cannot be replaced one by one",
+        allowed="numbers, and vectors as [x, y, z]",
+        next_step="write it so",
     )

@@ -151,8 +151,8 @@ def unknown_key(document: Document, location: Location, allowed: Sequence[str]) 
     """
     close = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
     return Problem(
-        where=document.where(location),
-        what="unknown key",
+        document.where(location),
+        "unknown key",
         allowed=", ".join(allowed),
         next_step=f"did you mean `{close[0]}`?" if close else "remove it",
     )
@@ -164,8 +164,8 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
     context = detail.get("ctx", {})
     if detail["type"] == _REFUSAL:
         return Problem(
-            where=where,
-            what=context["what"],
+            where,
+            context["what"],
             value="" if value is None else value_text(value, location),
             allowed=context["allowed"],
             next_step=context["next_step"],
@@ -175,17 +175,17 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
     if detail["loc"] and detail["loc"][-1] == "[key]":
         name = detail["loc"][-2]
         return Problem(
-            where=where.removesuffix(".[key]"),
-            what="a name must be a text",
+            where.removesuffix(".[key]"),
+            "a name must be a text",
             value=repr(name),
             next_step=f"write it in quotes: '{name}'",
         )
     if detail["type"] == "missing" and detail["loc"] and isinstance(detail["loc"][-1], int):
         return Problem(
-            where=document.where(location[:-1]), what="has too few entries", value=value_text(detail["input"], location)
+            document.where(location[:-1]), "has too few entries", value=value_text(detail["input"], location)
         )
     if detail["type"] == "missing":
-        return Problem(where=where, what="is missing", next_step=f"add `{location[-1]}:`")
+        return Problem(where, "is missing", next_step=f"add `{location[-1]}:`")
     allowed = {
         "literal_error": str(context.get("expected", "")),
         "union_tag_invalid": str(context.get("expected_tags", "")),
@@ -202,7 +202,7 @@ def _problem(detail: ErrorDetails, document: Document, root: Location, kind: Any
     what = _WHAT.get(detail["type"], message)
     shown = value_text(value, location)
     step = _remedy(what, value) if shown else ""
-    return Problem(where=where, what=what, value=shown, allowed=allowed, next_step=step)
+    return Problem(where, what, value=shown, allowed=allowed, next_step=step)
 
 
 def _remedy(what: str, value: Any) -> str:

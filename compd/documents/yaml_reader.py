@@ -259,9 +259,9 @@ class _Reading:
         if holds_secret(location):
             rest.pop("value", None)
         where = f"{self.path}:{line}"
-        self.problems.append(Problem(where=f"{where} {dotted(location)}".rstrip(), what=what, **rest))
+        self.problems.append(Problem(f"{where} {dotted(location)}".rstrip(), what, **rest))
         rest.pop("value", None)
-        self.unquoted.append(Problem(where=where, what=what, **rest))
+        self.unquoted.append(Problem(where, what, **rest))
 
 
 def _check_structure(text: str, path: Path) -> None:
@@ -343,4 +343,4 @@ def _too_deep(path: Path, line: int) -> Exception:
 
 
 def _unusable(where: Path | str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> Exception:
-    return ConfigurationError(Problem(where=str(where), what=what, value=value, allowed=allowed, next_step=next_step))
+    return ConfigurationError.of(str(where), what, value=value, allowed=allowed, next_step=next_step)

@@ -56,8 +56,8 @@ class FileKind:
         """The problem of a file that is not of this kind. where : the file, or file:line."""
         count = "" if self.least == len(self.keys) else f"at least {self.least} of "
         return Problem(
-            where=str(where),
-            what=f"is not {self.name}",
+            str(where),
+            f"is not {self.name}",
             allowed=f"`key: value` lines with {count}{', '.join(sorted(self.keys))}",
             next_step=self.next_step or f"give the path of {self.name}",
         )
@@ -66,6 +66,6 @@ class FileKind:
 def without_values(problems: Sequence[Problem]) -> list[Problem]:
     """The same problems of a file that has not been recognised: where and what, and no value of it."""
     return [
-        Problem(where=problem.where, what=problem.what, allowed=problem.allowed, next_step=problem.next_step)
+        Problem(problem.where, problem.what, allowed=problem.allowed, next_step=problem.next_step)
         for problem in problems
     ]

@@ -39,8 +39,8 @@ def trust_problem(path: Path, where: str, what: str, users: Collection[int]) -> 
         name = f"the {what}'s file" if is_file else f"the directory of the {what}'s file"
         if status.st_uid not in users:
             return Problem(
-                where=where,
-                what=f"{name} belongs to another user, who could put anything in its place",
+                where,
+                f"{name} belongs to another user, who could put anything in its place",
                 value=f"{place}: user {status.st_uid}",
                 allowed=f"user {', '.join(map(str, sorted(users)))}",
                 next_step=f"look at it, then copy it with `install -m 644` to a directory of your own or of root's, "
@@ -48,8 +48,8 @@ def trust_problem(path: Path, where: str, what: str, users: Collection[int]) -> 
             )
         if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and (is_file or not is_shared):
             return Problem(
-                where=where,
-                what=f"{name} may be written by group or others",
+                where,
+                f"{name} may be written by group or others",
                 value=f"{place}: mode {stat.S_IMODE(status.st_mode):o}",
                 allowed="mode 644 or stricter" if is_file else "mode 755 or stricter",
                 next_step=f"chmod go-w {place}",

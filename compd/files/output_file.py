@@ -41,7 +41,7 @@ def check_replaceable(path: Path, marks: Sequence[bytes], what: str, overwrite: 
         problem = "is not a file"
     if problem is not None:
         next_step = "choose another name, or " + ("remove it" if overwrite is None else "write over it: --overwrite")
-        raise CompdError(Problem(where=str(path), what=problem, next_step=next_step))
+        raise CompdError.of(str(path), problem, next_step=next_step)
 
 
 def folder_problem(path: Path, where: str = "", allowed: str = "") -> Problem | None:
@@ -49,19 +49,14 @@ def folder_problem(path: Path, where: str = "", allowed: str = "") -> Problem | 
     if path.name and not path.is_dir():
         return None
     return Problem(
-        where=where or str(path),
-        what="is a folder, not a file",
-        allowed=allowed,
-        next_step=f"give a file in it: {path / 'NAME'}",
+        where or str(path), "is a folder, not a file", allowed=allowed, next_step=f"give a file in it: {path / 'NAME'}"
     )
 
 
 def check_directory(path: Path) -> None:
     """Raise CompdError where the directory of a file that is to be written is not there; called before long work."""
     if not path.parent.is_dir():
-        raise CompdError(
-            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
-        )
+        raise CompdError.of(str(path), "its directory does not exist", value=str(path.parent), next_step="make it")
 
 
 def refused_path(error: OSError) -> Problem | None:
@@ -69,4 +64,4 @@ def refused_path(error: OSError) -> Problem | None:
     next_step = _REFUSALS.get(error.errno or 0)
     if next_step is None or error.filename is None:
         return None
-    return Problem(where=str(error.filename), what=f"was refused: {error.strerror}", next_step=next_step)
+    return Problem(str(error.filename), f"was refused: {error.strerror}", next_step=next_step)

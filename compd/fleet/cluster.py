@@ -31,12 +31,8 @@ def check_installed() -> None:
         import plotly  # noqa: F401
         import pyarrow  # noqa: F401
     except ImportError as error:
-        raise CompdError(
-            Problem(
-                where="compd fleet",
-                what=f"needs the package {error.name}, which is not installed",
-                next_step=install_line("fleet"),
-            )
+        raise CompdError.of(
+            "compd fleet", f"needs the package {error.name}, which is not installed", next_step=install_line("fleet")
         ) from error
 
 
@@ -118,14 +114,12 @@ def _connected(scheduler: str) -> Iterator[Client]:
     try:
         client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise CompdError(
-            Problem(
-                where="--scheduler",
-                what="no Dask scheduler answers",
-                value=scheduler,
-                allowed="tcp://HOST:PORT, as `dask scheduler` prints it",
-                next_step="start one with `dask scheduler`, or leave it out: then this computer does the work",
-            )
+        raise CompdError.of(
+            "--scheduler",
+            "no Dask scheduler answers",
+            value=scheduler,
+            allowed="tcp://HOST:PORT, as `dask scheduler` prints it",
+            next_step="start one with `dask scheduler`, or leave it out: then this computer does the work",
         ) from error
     # a lost scheduler is reported as the outcome of an item, too
     with silence_logging_cmgr(logging.CRITICAL), client:
@@ -140,17 +134,15 @@ def check_workers(client: Client, scheduler: str, paths: Sequence[Path] = ()) ->
     # functions of the standard library: any worker has them
     releases = client.run(version, "compd", on_error="return")
     if not releases:
-        raise CompdError(
-            Problem(
-                where=scheduler,
-                what="the scheduler has no worker",
-                next_step=f"start one on each computer: `dask worker {scheduler} --nworkers auto --nthreads 1`",
-            )
+        raise CompdError.of(
+            scheduler,
+            "the scheduler has no worker",
+            next_step=f"start one on each computer: `dask worker {scheduler} --nworkers auto --nthreads 1`",
         )
     problems = [
         Problem(
-            where=f"worker {worker}",
-            what="has no compd"
+            f"worker {worker}",
+            "has no compd"
             if isinstance(release, PackageNotFoundError)
             else "has another release of compd than this computer",
             value="" if isinstance(release, Exception) else str(release),
@@ -163,8 +155,8 @@ def check_workers(client: Client, scheduler: str, paths: Sequence[Path] = ()) ->
     for path in paths:
         problems += [
             Problem(
-                where=f"worker {worker}",
-                what="does not see a file",
+                f"worker {worker}",
+                "does not see a file",
                 value=str(path),
                 next_step="put recordings, configurations and models where all computers have them under one name",
             )

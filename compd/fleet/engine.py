@@ -170,8 +170,8 @@ def _portable(error: Exception) -> Exception:
 def _worker_died(item: object, worker: str) -> CompdError:
     return _WorkerDied(
         Problem(
-            where=str(item),
-            what="the process that worked on it died",
+            str(item),
+            "the process that worked on it died",
             value=worker,
             next_step="the worker's log, or `dmesg`, says why: most often memory is short",
         )
@@ -181,28 +181,24 @@ def _worker_died(item: object, worker: str) -> CompdError:
 def _no_worker(item: object) -> CompdError:
     return _NoWorker(
         Problem(
-            where=str(item),
-            what=f"was not worked on: for {MAX_WITHOUT_WORKERS_S:g} s the cluster had no worker",
+            str(item),
+            f"was not worked on: for {MAX_WITHOUT_WORKERS_S:g} s the cluster had no worker",
             next_step="start workers: `dask worker tcp://HOST:PORT`",
         )
     )
 
 
 def _scheduler_lost(item: object) -> CompdError:
-    return CompdError(
-        Problem(
-            where=str(item),
-            what="was not worked on: the scheduler has ended, or cannot be reached any more",
-            next_step="start it again: `dask scheduler`",
-        )
+    return CompdError.of(
+        str(item),
+        "was not worked on: the scheduler has ended, or cannot be reached any more",
+        next_step="start it again: `dask scheduler`",
     )
 
 
 def _unreadable(item: object, error: Exception) -> CompdError:
-    return CompdError(
-        Problem(
-            where=str(item),
-            what=f"its worker cannot do this work: {type(error).__name__}: {error}",
-            next_step="install on every worker the release of compd that runs here",
-        )
+    return CompdError.of(
+        str(item),
+        f"its worker cannot do this work: {type(error).__name__}: {error}",
+        next_step="install on every worker the release of compd that runs here",
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.files import file_stamp
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import Outcome, outcomes
@@ -85,7 +85,7 @@ def examine_fleet(
         interrupted = True
         for recording in todo:
             if recording not in results:
-                not_done = CompdError(Problem(where=str(recording), what=NOT_DONE))
+                not_done = CompdError.of(str(recording), NOT_DONE)
                 results[recording] = _result(Outcome(recording, None, not_done), examination, "")
     return FleetRun(tuple(results[recording] for recording in recordings), kept, interrupted)
 

@@ -65,8 +65,8 @@ def machine_files(
 
 def _second(path: Path, machine: str, first: Path, kind: str) -> Problem:
     return Problem(
-        where=str(path),
-        what=f"is the second of its kind for machine {machine}",
+        str(path),
+        f"is the second of its kind for machine {machine}",
         value=f"the first is {first}",
         allowed=f"{kind} for each machine",
         next_step=f"leave one of them out; or, where machines that are built alike have one each, say which is whose: "

@@ -117,15 +117,15 @@ def _shared_configurations(configurations: Sequence[str], directories: Sequence[
 def _by_directory(shared: Mapping[str, int], root: str) -> Problem:
     where = join_words([f"of {configuration} in {count} directories" for configuration, count in shared.items()])
     return Problem(
-        where=root,
-        what=f"has recordings {where}: each directory counts as a machine",
+        root,
+        f"has recordings {where}: each directory counts as a machine",
         next_step="say otherwise where they are campaigns of one machine: --machines-by sidecar",
     )
 
 
 def _of_one_machine(machine: str, count: int, root: str) -> Problem:
     return Problem(
-        where=root,
-        what=f"has {count} recordings of one machine, {machine}, as their sidecars say",
+        root,
+        f"has {count} recordings of one machine, {machine}, as their sidecars say",
         next_step=f"say where the name stands if they are of several: '{root}/{PLACEHOLDER}_*.csv'",
     )

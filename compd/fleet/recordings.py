@@ -64,8 +64,8 @@ def find_recordings(places: Sequence[str | Path], by: MachinesBy = MachinesBy.au
         if not matches:
             problems.append(
                 Problem(
-                    where=place,
-                    what="nothing of this name is there",
+                    place,
+                    "nothing of this name is there",
                     allowed="a directory, a recording, or a pattern in quotes: '2026-*/*.csv', '{machine}_{date}.csv'",
                 )
             )
@@ -84,8 +84,8 @@ def find_recordings(places: Sequence[str | Path], by: MachinesBy = MachinesBy.au
         raise CompdError(
             [
                 Problem(
-                    where=", ".join(map(str, places)),
-                    what="has no recording",
+                    ", ".join(map(str, places)),
+                    "has no recording",
                     allowed="NAME.csv or NAME.parquet with its sidecar NAME.yaml beside it",
                     next_step="name the directory in which recordings are",
                 ),
@@ -150,7 +150,7 @@ def _looks_like_sidecar(path: Path) -> bool:
 
 def _without_table(sidecar: Path) -> Problem:
     return Problem(
-        where=str(sidecar),
-        what="is a sidecar without a table, so no recording",
+        str(sidecar),
+        "is a sidecar without a table, so no recording",
         allowed=" or ".join(sidecar.with_suffix(ending).name for ending in TABLES) + " beside it",
     )

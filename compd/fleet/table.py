@@ -17,7 +17,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.files import check_replaceable, write_files
 from compd.fleet.recording_result import Command, FleetEstimate, RecordingResult
 
@@ -75,20 +75,16 @@ def check_table_path(path: Path, command: Command, overwrite: bool = False) -> N
     unless `overwrite`.
     """
     if not path.parent.is_dir():
-        raise CompdError(
-            Problem(where=str(path), what="its directory does not exist", value=str(path.parent), next_step="make it")
-        )
+        raise CompdError.of(str(path), "its directory does not exist", value=str(path.parent), next_step="make it")
     if not is_table(path):
         check_replaceable(path, (), "", overwrite)
         return
     if overwrite or not (other := {result.command for result in earlier_results(path)} - {command}):
         return
-    raise CompdError(
-        Problem(
-            where=str(path),
-            what=f"has results of `compd fleet {other.pop()}`, which would be lost",
-            next_step="give this table a name of its own (--out), or replace that one (--overwrite)",
-        )
+    raise CompdError.of(
+        str(path),
+        f"has results of `compd fleet {other.pop()}`, which would be lost",
+        next_step="give this table a name of its own (--out), or replace that one (--overwrite)",
     )
 
 
@@ -121,24 +117,20 @@ def read_table(path: Path) -> tuple[RecordingResult, ...]:
     import pyarrow.parquet as pq
 
     if not is_table(path):
-        raise CompdError(
-            Problem(
-                where=str(path),
-                what="is not a table of a fleet",
-                allowed="what `compd fleet diagnose` or `compd fleet compare` has written",
-                next_step="give that table, or the directory of the recordings",
-            )
+        raise CompdError.of(
+            str(path),
+            "is not a table of a fleet",
+            allowed="what `compd fleet diagnose` or `compd fleet compare` has written",
+            next_step="give that table, or the directory of the recordings",
         )
     table = pq.read_table(path)
     if table.schema.metadata[FORMAT_KEY] != FORMAT:
-        raise CompdError(
-            Problem(
-                where=str(path),
-                what="was written by another release of compd",
-                value=table.schema.metadata[FORMAT_KEY].decode(errors="replace"),
-                allowed=FORMAT.decode(),
-                next_step="create the table again",
-            )
+        raise CompdError.of(
+            str(path),
+            "was written by another release of compd",
+            value=table.schema.metadata[FORMAT_KEY].decode(errors="replace"),
+            allowed=FORMAT.decode(),
+            next_step="create the table again",
         )
     by_recording = groupby(table.to_pylist(), key=lambda row: (row["recording"], row["command"]))
     return tuple(_result(list(rows)) for _, rows in by_recording)

@@ -231,6 +231,4 @@ def _table(words: set[str], factors: Mapping[str, float]) -> str:
 
 
 def _question(index: int, what: str, seen: Sequence[str], next_step: str) -> Problem:
-    return Problem(
-        where=f"replies, character {index + 1}", what=what, value=", ".join(map(repr, seen)), next_step=next_step
-    )
+    return Problem(f"replies, character {index + 1}", what, value=", ".join(map(repr, seen)), next_step=next_step)

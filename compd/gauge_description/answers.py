@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.gauge_description.capture import unescaped
 
 SKIPPED = "-"
@@ -55,7 +55,7 @@ def range_of(text: str) -> Range:
         lowest, highest = map(float, text.split(","))
     except ValueError as error:
         allowed = f"--range=-25,25, or --range {UNKNOWN} where the manual does not say"
-        raise CompdError(Problem(where="--range", what="is no range", value=text, allowed=allowed)) from error
+        raise CompdError.of("--range", "is no range", value=text, allowed=allowed) from error
     return lowest, highest
 
 
@@ -68,7 +68,7 @@ def error_reply(text: str) -> tuple[bytes, str]:
         problem = "has no reply"
     except ValueError as error:
         problem = str(error)
-    raise CompdError(Problem(where="--error", what=problem, value=text, allowed="'ERR0=sensor_fault'"))
+    raise CompdError.of("--error", problem, value=text, allowed="'ERR0=sensor_fault'")
 
 
 def factor_words(text: str) -> tuple[str, ...]:

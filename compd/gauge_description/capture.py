@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from compd.clock import MonotonicClock
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.gauge import LineFault, Quality
 from compd.gauge_tools import open_tapped_stream
 from compd.line_settings import PolledLineSettings
@@ -37,7 +37,7 @@ def read_capture(path: Path) -> list[CapturedReply]:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not in UTF-8"
-        raise CompdError(Problem(where=str(path), what=f"cannot be read: {why}")) from error
+        raise CompdError.of(str(path), f"cannot be read: {why}") from error
     for number, line in enumerate(lines, start=1):
         text = line.strip()
         if not text or text.startswith("#"):
@@ -64,19 +64,13 @@ def saved_capture(captured: Sequence[CapturedReply]) -> Path:
 def _bytes_of_line(where: str, text: str) -> bytes:
     data = text[1:].strip()
     if text[0] not in "<>" or not data:
-        raise CompdError(
-            Problem(
-                where=where,
-                what="is neither sent nor received",
-                allowed="> hex, < hex, or quoted text, # comment",
-            )
-        )
+        raise CompdError.of(where, "is neither sent nor received", allowed="> hex, < hex, or quoted text, # comment")
     try:
         if data[0] in "\"'":
             return unescaped(data[1:-1])
         return bytes.fromhex(data)
     except ValueError as error:
-        raise CompdError(Problem(where=where, what=f"cannot be read: {error}", allowed='3F 0D, or "?\\r"')) from error
+        raise CompdError.of(where, f"cannot be read: {error}", allowed='3F 0D, or "?\\r"') from error
 
 
 def unescaped(text: str) -> bytes:
@@ -117,12 +111,10 @@ def capture_live(
             line.close()
     except LineFault as fault:
         hint = "--timeout longer than the period of unsolicited readings, or --out with the device's request"
-        raise CompdError(
-            Problem(
-                where=str(getattr(settings, "port", settings)),
-                what=f"reply {len(captured) + 1}: {fault}",
-                next_step="check port, baud, format" + (", request and its terminator" if request else f"; {hint}"),
-            )
+        raise CompdError.of(
+            str(getattr(settings, "port", settings)),
+            f"reply {len(captured) + 1}: {fault}",
+            next_step="check port, baud, format" + (", request and its terminator" if request else f"; {hint}"),
         ) from fault
     return captured
 

@@ -28,8 +28,8 @@ class ObservedChannels:
             shown = ", ".join(exchange.texts(k)[0].strip() for exchange, k in places)
             self.problems.append(
                 Problem(
-                    where="--names",
-                    what=f"{len(names)} names for {len(places)} numbers",
+                    "--names",
+                    f"{len(names)} names for {len(places)} numbers",
                     value=",".join(names),
                     next_step=f"a name for each of {shown}; {SKIPPED} skips one",
                 )
@@ -37,7 +37,7 @@ class ObservedChannels:
         self._names = {(exchange.request, k): name for (exchange, k), name in zip(places, names, strict=False)}
         self._read = [place for place, name in zip(places, names, strict=False) if name != SKIPPED]
         if not self._read:
-            self.problems.append(Problem(where="--names", what="skips every number", value=",".join(names)))
+            self.problems.append(Problem("--names", "skips every number", value=",".join(names)))
         units = self._for_each("--unit", "units", answers.units)
         self._ranges = self._for_each("--range", "ranges", answers.ranges)
         self._units = {
@@ -90,8 +90,8 @@ class ObservedChannels:
         skip = ",".join(SKIPPED if whole else f"c{k + 1}" for k, whole in enumerate(bare))
         self.problems.append(
             Problem(
-                where="--names",
-                what="whole numbers that change stand beside the others: counters, a clock, a status?",
+                "--names",
+                "whole numbers that change stand beside the others: counters, a clock, a status?",
                 value=", ".join(text for text, whole in zip(shown, bare, strict=True) if whole),
                 next_step=f"name each of {', '.join(shown)}, or skip it by {SKIPPED}: --names={skip}",
             )
@@ -104,8 +104,8 @@ class ObservedChannels:
             if not unit:
                 self.problems.append(
                     Problem(
-                        where=where,
-                        what=f"which unit has the number? the replies {_units_text(reply_units)}",
+                        where,
+                        f"which unit has the number? the replies {_units_text(reply_units)}",
                         value=exchange.texts(k)[0].strip(),
                         next_step="--unit mm (um, inch, degC ...); --unit mm,inch where each channel has its own",
                     )
@@ -115,8 +115,8 @@ class ObservedChannels:
             ):
                 self.problems.append(
                     Problem(
-                        where=where,
-                        what="the replies name another unit",
+                        where,
+                        "the replies name another unit",
                         value=unit,
                         allowed=", ".join(filter(None, reply_units)),
                         next_step="leave out --unit, or set the device to one unit; to multiply the number, "
@@ -127,8 +127,8 @@ class ObservedChannels:
     def _ask_for_ranges(self) -> None:
         self.problems.append(
             Problem(
-                where="--range",
-                what="which values can the sensor deliver? what is beyond them is no measurement",
+                "--range",
+                "which values can the sensor deliver? what is beyond them is no measurement",
                 allowed="LOWEST,HIGHEST in mm (degC ...); once for each channel, or once for all",
                 next_step=f"--range=-25,25, from the manual; --range {UNKNOWN} where it does not say",
             )
@@ -140,7 +140,7 @@ class ObservedChannels:
             return [given[0]] * len(self._read)
         if given and len(given) != len(self._read):
             text = f"{len(given)} {what} for {len(self._read)} channels"
-            self.problems.append(Problem(where=where, what=text, allowed="one for each channel, or one for all"))
+            self.problems.append(Problem(where, text, allowed="one for each channel, or one for all"))
             return [given[0]] * len(self._read)
         return list(given)
 

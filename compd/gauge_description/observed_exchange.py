@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
-from compd.errors import Problem
 from compd.gauge_description.ambiguities import decimal_mark_of
 from compd.gauge_description.answers import Answers, factor_words
 from compd.gauge_description.reply_columns import DescriptionError, ReplyColumn, columns_of
@@ -97,14 +96,12 @@ class ObservedExchange:
         Raises DescriptionError for too few that differ, and for one that is built differently.
         """
         if len(set(bodies)) < MIN_REPLIES:
-            raise DescriptionError(
-                Problem(
-                    where=f"replies to {request!r}" if request else "replies",
-                    what="too few that differ",
-                    value=str(len(set(bodies))),
-                    allowed=f"{MIN_REPLIES} or more",
-                    next_step="move the gauge between two captures: near zero, far out, and to the other side",
-                )
+            raise DescriptionError.of(
+                f"replies to {request!r}" if request else "replies",
+                "too few that differ",
+                value=str(len(set(bodies))),
+                allowed=f"{MIN_REPLIES} or more",
+                next_step="move the gauge between two captures: near zero, far out, and to the other side",
             )
         self.request = request
         self.end = ""
@@ -123,7 +120,7 @@ class ObservedExchange:
         self.columns = columns if self.mark == "." else columns_of(bodies, self.mark, words, answers.constants)
         self.numbers = [k for k, column in enumerate(self.columns) if _may_be_channel(column)]
         if not self.numbers:
-            raise DescriptionError(Problem(where="replies", what="no number in them", value=repr(bodies[0])))
+            raise DescriptionError.of("replies", "no number in them", value=repr(bodies[0]))
 
     def texts(self, k: int) -> list[str]:
         """Column `k` of every reply."""

@@ -25,23 +25,18 @@ def read_back(options: Mapping[str, Any], driver: type[Gauge[Any]], captured: Se
         checked = driver.Options.model_validate({**options, "line": "learned"})
     except ValidationError as error:
         raise DescriptionError(
-            [
-                Problem(where="description", what=detail["msg"], value=str(detail["input"]))
-                for detail in separate_errors(error)
-            ]
+            [Problem("description", detail["msg"], value=str(detail["input"])) for detail in separate_errors(error)]
         ) from error
     texts = []
     for k, replies in enumerate(rounds(captured)):
         try:
             readings = driver(checked).read(_RepeatedReplies(replies))
         except LineFault as fault:
-            raise DescriptionError(
-                Problem(
-                    where=f"reply {k + 1}",
-                    what=f"does not fit the description: {fault}",
-                    value=", ".join(map(repr, replies.values())),
-                    allowed=str(options.get("in") or [request["in"] for request in options["requests"]]),
-                )
+            raise DescriptionError.of(
+                f"reply {k + 1}",
+                f"does not fit the description: {fault}",
+                value=", ".join(map(repr, replies.values())),
+                allowed=str(options.get("in") or [request["in"] for request in options["requests"]]),
             ) from fault
         texts.append(", ".join(f"{r.value:.6g}" if r.ok else str(r.quality) for r in readings))
     return texts

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.gauge_description.unit_words import is_wire_unit
 
 _SIGNS = ("", "+", "-", " ")
@@ -38,22 +38,18 @@ class VaryingWord(NamedTuple):
 def terminator_of(replies: Sequence[bytes]) -> bytes:
     """Control characters that end every reply; b"" if all are equally long without any. Raises DescriptionError."""
     if not replies or not all(replies):
-        raise DescriptionError(
-            Problem(where="replies", what="there is none, or an empty one", next_step="check port, baud and format")
-        )
+        raise DescriptionError.of("replies", "there is none, or an empty one", next_step="check port, baud and format")
     ending = re.search(rb"[\x00-\x1f]*$", replies[0])
     terminator = ending[0] if ending else b""
     while not all(reply.endswith(terminator) for reply in replies):
         terminator = terminator[1:]
     if not terminator and len({len(reply) for reply in replies}) > 1:
         k = next(k for k, reply in enumerate(replies) if len(reply) != len(replies[0]))
-        raise DescriptionError(
-            Problem(
-                where=f"reply {k + 1}",
-                what="has no terminator in common with reply 1, and another length",
-                value=repr(replies[k]),
-                next_step="capture whole replies, each with its end",
-            )
+        raise DescriptionError.of(
+            f"reply {k + 1}",
+            "has no terminator in common with reply 1, and another length",
+            value=repr(replies[k]),
+            next_step="capture whole replies, each with its end",
         )
     return terminator
 
@@ -159,12 +155,10 @@ def _cut_off(columns: Sequence[ReplyColumn], constant: bytes) -> list[ReplyColum
 
 def _difference(k: int, index: int, body: bytes, first: bytes) -> DescriptionError:
     """The error for reply `k`, whose form differs from the first one's from byte `index` on."""
-    return DescriptionError(
-        Problem(
-            where=f"reply {k + 1}, character {index + 1}",
-            what="is built differently from reply 1",
-            value=repr(body),
-            allowed=repr(first),
-            next_step="if it is an error reply, name it: --error 'TEXT=quality'; if it is damaged, capture it again",
-        )
+    return DescriptionError.of(
+        f"reply {k + 1}, character {index + 1}",
+        "is built differently from reply 1",
+        value=repr(body),
+        allowed=repr(first),
+        next_step="if it is an error reply, name it: --error 'TEXT=quality'; if it is damaged, capture it again",
     )

@@ -74,24 +74,20 @@ def _target(
     if name is None and len(gauges) == 1:
         (name,) = gauges
     if name is None or name not in gauges:
-        raise ConfigurationError(
-            Problem(
-                where=f"{document.path} gauges",
-                what="no such gauge" if name else "name one of its gauges",
-                value=name or "",
-                allowed=", ".join(gauges),
-            )
+        raise ConfigurationError.of(
+            f"{document.path} gauges",
+            "no such gauge" if name else "name one of its gauges",
+            value=name or "",
+            allowed=", ".join(gauges),
         )
     options = gauges[name]
     line = lines.get(options.line)
     if line is None and not port.port:
-        raise ConfigurationError(
-            Problem(
-                where=document.where(("gauges", name, "line")),
-                what="the file has no line of this name",
-                value=options.line,
-                next_step="--port, and --baud and --format for a serial port; or add it under `lines:`",
-            )
+        raise ConfigurationError.of(
+            document.where(("gauges", name, "line")),
+            "the file has no line of this name",
+            value=options.line,
+            next_step="--port, and --baud and --format for a serial port; or add it under `lines:`",
         )
     if line is None:
         line = line_settings(port, drivers[name].line_kind)

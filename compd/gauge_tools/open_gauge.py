@@ -56,8 +56,8 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
         raise ConfigurationError(
             [
                 Problem(
-                    where=f"--set {'.'.join(map(str, detail['loc']))}",
-                    what=detail["msg"],
+                    f"--set {'.'.join(map(str, detail['loc']))}",
+                    detail["msg"],
                     next_step="`--set KEY=VALUE` for each option that the driver needs",
                 )
                 for detail in separate_errors(error)
@@ -70,7 +70,7 @@ def gauge_of_driver(driver: str, port: PortArguments, assignments: Sequence[str]
 def option_doubts(target: GaugeTarget) -> list[Problem]:
     """What is probably a slip among the gauge's options: a channel without a range, an odd factor."""
     return [
-        Problem(where=".".join(map(str, (target.name, *location))), what=what, value=value, next_step=next_step)
+        Problem(".".join(map(str, (target.name, *location))), what, value=value, next_step=next_step)
         for location, what, value, next_step in target.gauge.doubts()
     ]
 
@@ -108,8 +108,8 @@ def _settings(port: PortArguments, kind: LineDefinition) -> LineSettings:
         raise ConfigurationError(
             [
                 Problem(
-                    where=f"--{'.'.join(map(str, detail['loc'])) or 'line'}",
-                    what=detail["msg"],
+                    f"--{'.'.join(map(str, detail['loc'])) or 'line'}",
+                    detail["msg"],
                     value=str(detail["input"]) if detail["loc"] else "",
                 )
                 for detail in separate_errors(error)

@@ -38,8 +38,8 @@ def install_problems(configuration: Configuration, program: Path, page: bool) ->
         if not path.is_relative_to(below):
             problems.append(
                 Problem(
-                    where=f"{configuration.path}: {key}",
-                    what="the service may not write there",
+                    f"{configuration.path}: {key}",
+                    "the service may not write there",
                     value=str(path),
                     allowed=f"a path below {below}",
                     next_step=f"correct it, or widen the unit with `systemctl edit {DAEMON}` and install it by hand",
@@ -48,8 +48,8 @@ def install_problems(configuration: Configuration, program: Path, page: bool) ->
     if page and find_spec("starlette") is None:
         problems.append(
             Problem(
-                where="the page in the browser",
-                what="what it needs is not installed",
+                "the page in the browser",
+                "what it needs is not installed",
                 value="starlette",
                 next_step=f"{program.with_name('pip')} install 'compd[page]'; or leave the page out: --no-page",
             )

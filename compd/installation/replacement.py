@@ -96,9 +96,7 @@ def go_back(socket: str, clock: Clock | None = None) -> Replacement:
     units = _installed_units()
     if problems := [
         *(
-            Problem(
-                where=str(_before(unit)), what="there is no release to go back to", next_step="compd service upgrade"
-            )
+            Problem(str(_before(unit)), "there is no release to go back to", next_step="compd service upgrade")
             for unit in units
             if not _before(unit).exists()
         ),
@@ -112,7 +110,7 @@ def _restart_problems(socket: str) -> list[Problem]:
     """Why a restart would lose something."""
     unit = unit_path(DAEMON)
     if not unit.exists():
-        return [Problem(where=str(unit), what="there is no service", next_step="compd service install MACHINE.yaml")]
+        return [Problem(str(unit), "there is no service", next_step="compd service install MACHINE.yaml")]
     try:
         with connect(socket, _TIMEOUT_S) as client:
             model = client.model()
@@ -122,8 +120,8 @@ def _restart_problems(socket: str) -> list[Problem]:
         return []
     return [
         Problem(
-            where="the model that runs",
-            what="is lost with a restart",
+            "the model that runs",
+            "is lost with a restart",
             value=model["applied"].get("file", "no effects"),
             next_step=model["kept_text"],
         )
@@ -152,8 +150,8 @@ def _exchange(socket: str, new: Mapping[str, str], clock: Clock) -> Replacement:
 
 def _worse(came: Replacement, next_step: str) -> Problem:
     return Problem(
-        where="the release that replaced the one before",
-        what=f"did not come as far as the one before within {PATIENCE_S:g} s",
+        "the release that replaced the one before",
+        f"did not come as far as the one before within {PATIENCE_S:g} s",
         value=came.after,
         allowed=f"{State.OK}, or {came.before} as before",
         next_step=f"{next_step}; look at `journalctl --unit {DAEMON}`",

@@ -32,9 +32,7 @@ def shipped_file(name: str, program: Path) -> str:
     for place in _PLACES:
         if (place / name).is_file():
             return (place / name).read_text(encoding="utf-8").replace(_SHIPPED_PROGRAM, str(program))
-    raise CompdError(
-        Problem(where=str(_PLACES[0]), what="the shipped units are missing", value=name, next_step="reinstall compd")
-    )
+    raise CompdError.of(str(_PLACES[0]), "the shipped units are missing", value=name, next_step="reinstall compd")
 
 
 def unit_path(unit: str) -> Path:
@@ -74,8 +72,8 @@ def program_problems(program: Path) -> list[Problem]:
 
 def _program_problem(path: Path, what: str, next_step: str) -> Problem:
     return Problem(
-        where="the service's program",
-        what=what,
+        "the service's program",
+        what,
         value=str(path),
         allowed=f"a program outside {', '.join(_HIDDEN)}",
         next_step=next_step,

@@ -44,8 +44,8 @@ class SystemCommand:
 
     def _problem(self, why: str) -> Problem:
         return Problem(
-            where=str(self),
-            what=f"failed: {self.purpose}",
+            str(self),
+            f"failed: {self.purpose}",
             value=why,
             next_step="mend what it says, then give the same command again: steps that are done do no harm twice",
         )

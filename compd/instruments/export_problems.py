@@ -28,14 +28,12 @@ class ExportProblems:
         """Add a problem at a line of the file, or a row of the sheet, from 1; 0 for the file as a whole."""
         where = f"{self.path}:{line}" if line else str(self.path)
         value = value if len(value) <= _VALUE_WIDTH else value[: _VALUE_WIDTH - 3] + "..."
-        self.problems.append(Problem(where=where, what=what, value=value, allowed=allowed, next_step=next_step))
+        self.problems.append(Problem(where, what, value=value, allowed=allowed, next_step=next_step))
 
     def ask(self, what: str, value: str, answers: Sequence[str], line: int = 0) -> None:
         """Add a question: several readings are possible, and each of `answers` settles it."""
         where = f"{self.path}:{line}" if line else str(self.path)
-        self.problems.append(
-            Problem(where=where, what=what, value=value, allowed=" or ".join(answers), next_step="say which")
-        )
+        self.problems.append(Problem(where, what, value=value, allowed=" or ".join(answers), next_step="say which"))
 
     def check(self) -> None:
         """Raise RecordingError if there is a problem."""

@@ -38,8 +38,8 @@ def is_of_numbers(columns: Sequence[Sequence[str]]) -> bool:
 def no_table(path: Path) -> Problem:
     """The problem of a text that is none."""
     return Problem(
-        where=str(path),
-        what="is no table of measurements",
+        str(path),
+        "is no table of measurements",
         allowed="rows of numbers, with a header or without",
         next_step="give the path of the instrument's export",
     )

@@ -9,7 +9,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.instruments.axes import ATTITUDE_AXES, LENGTH_AXES, POSE_AXES, POSITION_AXES
 from compd.units import unit_factor
 
@@ -44,7 +44,7 @@ class Samples:
         """(N, d) lengths in `unit`, attitude in rad. Raises CompdError if `unit` is no unit of a length."""
         factor = unit_factor("mm", self.unit)
         if factor is None:
-            raise CompdError(Problem(where="unit", what="is no unit of a length", value=self.unit))
+            raise CompdError.of("unit", "is no unit of a length", value=self.unit)
         attitude = [axis in ATTITUDE_AXES for axis in self.axes]
         return np.asarray(np.where(attitude, self.values, self.values * factor))
 
@@ -68,7 +68,7 @@ class Samples:
         if self.time_s is None:
             return None
         if self.start is None:
-            raise CompdError(Problem(where="start", what="is needed: this format stamps its rows with a date"))
+            raise CompdError.of("start", "is needed: this format stamps its rows with a date")
         return [self.start + timedelta(seconds=time_s) for time_s in self.time_s.tolist()]
 
     def need(self, shape: str, *allowed: tuple[str, ...], time: bool = False) -> None:
@@ -78,16 +78,12 @@ class Samples:
         """
         if tuple(self.axes) not in allowed:
             axes = " or ".join(", ".join(some) for some in allowed)
-            raise CompdError(
-                Problem(where=shape, what="has no place for these", value=", ".join(self.axes), allowed=axes)
-            )
+            raise CompdError.of(shape, "has no place for these", value=", ".join(self.axes), allowed=axes)
         if time and self.time_s is None:
-            raise CompdError(
-                Problem(
-                    where=shape,
-                    what="is samples at a constant rate, and these are points without a time",
-                    next_step="choose another format for points",
-                )
+            raise CompdError.of(
+                shape,
+                "is samples at a constant rate, and these are points without a time",
+                next_step="choose another format for points",
             )
         if time and len(self.values) < 2:
-            raise CompdError(Problem(where=shape, what="has no rate with fewer than two samples"))
+            raise CompdError.of(shape, "has no rate with fewer than two samples")

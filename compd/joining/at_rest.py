@@ -126,7 +126,7 @@ def match_at_rest(
     reachable = np.asarray(np.isfinite(expected_mm).all(axis=1))
     no_pose = int((~reachable).sum())
     if not reachable.any():
-        raise RecordingError(Problem(where=str(recording.path), what="the gauges give a pose in no dwell"))
+        raise RecordingError.of(str(recording.path), "the gauges give a pose in no dwell")
     kept = [dwell for dwell, known in zip(dwells, reachable, strict=True) if known]
     places_mm = expected_mm[reachable]
     measured_mm = export.values[:, : places_mm.shape[1]]
@@ -186,7 +186,7 @@ def _problems(
     problems = reflector_problems(export, instrument.reflectors, at_rest=True)
 
     def add(where: Path, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
-        problems.append(Problem(where=str(where), what=what, value=value, allowed=allowed, next_step=next_step))
+        problems.append(Problem(str(where), what, value=value, allowed=allowed, next_step=next_step))
 
     if recording.reference is not None:
         what = "has a reference already"
@@ -281,15 +281,13 @@ def _by_places(result: Assignment | NoAssignment, dwells: list[Dwell], export: I
         if result.point is not None and result.dwell is not None:
             dwell = dwells[min(result.dwell, len(dwells) - 1)]
             where += f":{export.line[result.point]}, beside {dwell}"
-        raise RecordingError(
-            Problem(
-                where=where,
-                what=result.why,
-                value=result.value,
-                allowed=result.allowed,
-                next_step="check that both are of one measurement, their unit and the machine; delete points that were "
-                "measured beside it; with names of points: --by name",
-            )
+        raise RecordingError.of(
+            where,
+            result.why,
+            value=result.value,
+            allowed=result.allowed,
+            next_step="check that both are of one measurement, their unit and the machine; delete points that were "
+            "measured beside it; with names of points: --by name",
         )
     left_out = {}
     fits_none = np.flatnonzero((result.dwell < 0) & ~result.unclear)
@@ -322,13 +320,11 @@ def _by_name(
         first_row = {dwell: row for row, dwell in reversed([*enumerate(targets.tolist(), start=1)])}
         dwells = [replace(dwell, point=str(first_row.get(k, ""))) for k, dwell in enumerate(dwells)]
     if not any(ids):
-        raise RecordingError(
-            Problem(
-                where=str(export.path),
-                what="the recording has no ids of points that names could be",
-                allowed="a column `point` in the recording, or the plan that was measured",
-                next_step="give --plan PLAN.csv, or join --by order",
-            )
+        raise RecordingError.of(
+            str(export.path),
+            "the recording has no ids of points that names could be",
+            allowed="a column `point` in the recording, or the plan that was measured",
+            next_step="give --plan PLAN.csv, or join --by order",
         )
     order = np.arange(len(export.name)) if export.time_s is None else np.argsort(export.time_s, kind="stable")
     sizes = [len(dwells[dwell].rows) if dwell >= 0 else 0 for dwell in targets]
@@ -343,17 +339,15 @@ def _by_name(
     if named.without:
         left_out["points of the recording without a name in the export"] = listed(named.without)
     if not (dwell_of >= 0).any():
-        raise RecordingError(
-            Problem(
-                where=str(export.path),
-                what="no name is a point of the recording"
-                if not named.unclear
-                else "the places were visited several times, and the points do not stand in the order of measuring",
-                value=listed(export.name),
-                allowed=listed([own for own in dict.fromkeys(ids) if own]),
-                next_step="name the points as the recording or the plan does, list them in the order of measuring or "
-                "with times, or join --by order",
-            )
+        raise RecordingError.of(
+            str(export.path),
+            "no name is a point of the recording"
+            if not named.unclear
+            else "the places were visited several times, and the points do not stand in the order of measuring",
+            value=listed(export.name),
+            allowed=listed([own for own in dict.fromkeys(ids) if own]),
+            next_step="name the points as the recording or the plan does, list them in the order of measuring or "
+            "with times, or join --by order",
         )
     check = check_names(places_mm, measured_mm, dwell_of, repeat_distance_mm(sigma_mm), in_M)
     if check.why or len(check.wrong) or check.rms_mm > check.allowed_mm:

@@ -120,12 +120,10 @@ def match_by_time(
     )
     matched = int(np.isfinite(reference).all(axis=1).sum())
     if not matched:
-        raise RecordingError(
-            Problem(
-                where=str(track.path),
-                what=f"no row matches at an offset of {offset.offset_s:.3f} s: {_counts_text(left_out)}",
-                next_step="check the offset; rows in motion are taken with --moving",
-            )
+        raise RecordingError.of(
+            str(track.path),
+            f"no row matches at an offset of {offset.offset_s:.3f} s: {_counts_text(left_out)}",
+            next_step="check the offset; rows in motion are taken with --moving",
         )
     measured = dict(zip(_column_names(track, instrument), reference.T, strict=True))
     columns = {**recording.with_texts(recording.columns), **measured}
@@ -150,8 +148,8 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
     if moving and track.time_std_s > 0:
         problems.append(
             Problem(
-                where=str(track.path),
-                what="has times that are too coarse for rows in motion: speed times their uncertainty is an error",
+                str(track.path),
+                "has times that are too coarse for rows in motion: speed times their uncertainty is an error",
                 value=f"+- {track.time_std_s:.2g} s",
                 allowed="rows at rest, or times as fine as the rows",
                 next_step="leave --moving out, or export with fractions of a second",
@@ -160,16 +158,16 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
     if recording.reference is not None:
         problems.append(
             Problem(
-                where=str(recording.sidecar.path),
-                what="has a reference already",
+                str(recording.sidecar.path),
+                "has a reference already",
                 value=recording.reference.quantity,
                 next_step="join to a recording of gauges alone",
             )
         )
     problems += [
         Problem(
-            where=str(track.path),
-            what="no standard uncertainty",
+            str(track.path),
+            "no standard uncertainty",
             value=str(sigma),
             allowed=f"more than 0 {unit}",
             next_step=f"leave --sigma-{unit} out where it is not known",
@@ -179,15 +177,13 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
     ]
     if instrument.sigma_urad is not None and track.rotation_rad is None:
         problems.append(
-            Problem(
-                where=str(track.path), what="has no attitude", next_step="leave --sigma-urad out, or export rx, ry, rz"
-            )
+            Problem(str(track.path), "has no attitude", next_step="leave --sigma-urad out, or export rx, ry, rz")
         )
     if not recording.has_time:
         problems.append(
             Problem(
-                where=str(recording.path),
-                what="has no `time_s` to compare with the instrument's",
+                str(recording.path),
+                "has no `time_s` to compare with the instrument's",
                 allowed="a time in each row",
                 next_step="join with --by order, name or distance",
             )
@@ -195,8 +191,7 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
     if recording.motion_mm is None:
         problems.append(
             Problem(
-                where=str(recording.path),
-                what="has neither scales nor a commanded pose to compare the instrument's motion with",
+                str(recording.path), "has neither scales nor a commanded pose to compare the instrument's motion with"
             )
         )
     length = track.axes == (LENGTH,)
@@ -204,8 +199,8 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
     if length and (instrument.link is None) == (instrument.ball is None):
         problems.append(
             Problem(
-                where=str(track.path),
-                what="is a length of an unknown object" if instrument.link is None else "is one length",
+                str(track.path),
+                "is a length of an unknown object" if instrument.link is None else "is one length",
                 allowed="--link or --ball",
                 next_step="name its link with --link, or its fixed ball with --ball",
             )
@@ -213,8 +208,8 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
     if length and instrument.link is not None and not 1 <= instrument.link <= links:
         problems.append(
             Problem(
-                where=str(track.path),
-                what="is a length, of no link of this machine",
+                str(track.path),
+                "is a length, of no link of this machine",
                 value=str(instrument.link),
                 allowed=f"1 to {links}",
                 next_step="say which link it measures with --link",
@@ -223,8 +218,8 @@ def _problems(recording: Recording, track: Track, instrument: Instrument, moving
     if not length and (instrument.link is not None or instrument.ball is not None):
         problems.append(
             Problem(
-                where=str(track.path),
-                what="is a position, not a length",
+                str(track.path),
+                "is a position, not a length",
                 value=", ".join(track.axes),
                 next_step="leave --link and --ball out",
             )

@@ -105,8 +105,8 @@ def _mean(values: FloatArray) -> float:
 
 def _neither_time_nor_point(recording: Recording) -> Problem:
     return Problem(
-        where=str(recording.path),
-        what="has neither `time_s` nor `point`, so rows at rest cannot be told from rows in motion",
+        str(recording.path),
+        "has neither `time_s` nor `point`, so rows at rest cannot be told from rows in motion",
         allowed="one of the two columns",
         next_step="where each row is a place at rest, number the places in a column `point`",
     )
@@ -114,12 +114,10 @@ def _neither_time_nor_point(recording: Recording) -> Problem:
 
 def _no_dwell(recording: Recording) -> Problem:
     if recording.point is not None:
-        return Problem(
-            where=str(recording.path), what="no row has an id in `point`", next_step="write one into rows at rest"
-        )
+        return Problem(str(recording.path), "no row has an id in `point`", next_step="write one into rows at rest")
     return Problem(
-        where=str(recording.path),
-        what="the machine stands still nowhere",
+        str(recording.path),
+        "the machine stands still nowhere",
         allowed=f"{MIN_ROWS} rows and {MIN_S:g} s or more within {STILL_MM * 1e3:g} um on every scale",
         next_step="record faster, or dwell longer; where each row is a place at rest, say so with a column `point`",
     )

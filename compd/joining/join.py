@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.comparison import read_with_machine
 from compd.configuration import load_machine
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.instruments import InstrumentExport, track_of
 from compd.joining.assignment import REPEAT_MM
 from compd.joining.at_rest import RestJoin, match_at_rest
@@ -58,18 +58,14 @@ def choose_by(by: JoinBy | None, export: InstrumentExport) -> JoinBy:
         "; or --by distance: in any order, each place once"
     )
     if export.time_s is None:
-        raise RecordingError(
-            Problem(where=str(export.path), what="has no times, so it cannot be joined by time", next_step=next_step)
-        )
+        raise RecordingError.of(str(export.path), "has no times, so it cannot be joined by time", next_step=next_step)
     if len(export.values) > 1:
         steps_mm = np.linalg.norm(np.diff(export.values[:, :3], axis=0), axis=1)
         if np.median(np.abs(np.diff(export.time_s))) >= _TRACK_PERIOD_S and np.median(steps_mm) > REPEAT_MM:
-            raise RecordingError(
-                Problem(
-                    where=str(export.path),
-                    what="has times, but most of its rows are points by themselves, and no track in time",
-                    next_step=f"{next_step}; or --by time",
-                )
+            raise RecordingError.of(
+                str(export.path),
+                "has times, but most of its rows are points by themselves, and no track in time",
+                next_step=f"{next_step}; or --by time",
             )
     return "time"
 
@@ -91,7 +87,7 @@ def match_export(gauges: Path, export: InstrumentExport, options: JoinOptions) -
     """
     by = choose_by(options.by, export)
     if option := unfit_option(by, options):
-        raise RecordingError(Problem(where=option, what=f"contradicts --by {by}", next_step="leave it out"))
+        raise RecordingError.of(option, f"contradicts --by {by}", next_step="leave it out")
     if by == "time" and (problems := of_points_at_rest(export, options.instrument.reflectors)):
         raise RecordingError(problems)
     if by == "time":

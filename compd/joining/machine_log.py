@@ -169,7 +169,7 @@ def _wanted(table: NumberColumns, named: Sequence[str]) -> dict[int, tuple[str, 
         if not equals or place is None:
             what = "names no column of the log" if equals else "is not understood"
             allowed = ", ".join(table.header) if equals else _FORM
-            problems.problems.append(Problem(where=f"--log {text}", what=what, value=source, allowed=allowed))
+            problems.problems.append(Problem(f"--log {text}", what, value=source, allowed=allowed))
             continue
         wanted[place] = target, unit
     wanted = {k: target for k, target in wanted.items() if target[0] != "-"}
@@ -190,8 +190,8 @@ def _in_unit(table: NumberColumns, k: int, name: str, unit: str) -> tuple[FloatA
     if factor is None:
         table.problems.problems.append(
             Problem(
-                where=f"{table.path}, column {header}",
-                what=f"is in {unit}, which is no unit of {name}" if unit else "has no unit",
+                f"{table.path}, column {header}",
+                f"is in {unit}, which is no unit of {name}" if unit else "has no unit",
                 allowed=f"a unit that can be told in {target}",
                 next_step=f'say it: --log "{header}={name}:UNIT"',
             )

@@ -24,8 +24,8 @@ def name_problems(
     if check.why or not len(check.wrong):
         return [
             Problem(
-                where=str(export.path),
-                what=check.why
+                str(export.path),
+                check.why
                 or "the distances between points are farther from those of the dwells than a machine can be wrong",
                 value=f"{check.rms_mm:.3g} mm rms" if np.isfinite(check.rms_mm) else "",
                 allowed=f"{check.allowed_mm:.3g} mm or less"
@@ -50,8 +50,8 @@ def name_problems(
         elsewhere += f": {name} and {swapped[0]} are swapped" if swapped else ""
         problems.append(
             Problem(
-                where=f"{export.path}:{export.line[point]}",
-                what=f"{name} is {off_mm:.3g} mm from where point {own} was{elsewhere}",
+                f"{export.path}:{export.line[point]}",
+                f"{name} is {off_mm:.3g} mm from where point {own} was{elsewhere}",
                 next_step="mend the names in the export, or delete the line",
             )
         )

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.joining.distances import MAX_RMS_MM
 from compd.joining.monotone_match import CLEAR_MARGIN, match_in_order
 from compd.plan_file import TIP_COLUMNS, WRITTEN_BY
@@ -42,13 +42,11 @@ def dwell_of_plan_rows(expected_mm: FloatArray, plan_mm: FloatArray, path: Path)
     match = match_in_order(residual_mm, MAX_RMS_MM)
     clear = (match.dwell >= 0) & (match.margin >= CLEAR_MARGIN)
     if not clear.any():
-        raise RecordingError(
-            Problem(
-                where=str(path),
-                what="the machine dwelled at no place of the plan, in its order",
-                value=f"nearest {np.nanmin(residual_mm):.3g} mm" if np.isfinite(residual_mm).any() else "",
-                allowed=f"{MAX_RMS_MM:g} mm",
-                next_step="give the plan that was measured, or join --by order",
-            )
+        raise RecordingError.of(
+            str(path),
+            "the machine dwelled at no place of the plan, in its order",
+            value=f"nearest {np.nanmin(residual_mm):.3g} mm" if np.isfinite(residual_mm).any() else "",
+            allowed=f"{MAX_RMS_MM:g} mm",
+            next_step="give the plan that was measured, or join --by order",
         )
     return np.where(clear, match.dwell, -1).astype(np.int64)

@@ -40,9 +40,7 @@ def reflector_places(texts: Sequence[str]) -> dict[str, Place]:
         name = "" if match is None else match["name"]
         if match is None or name in places:
             what = "is not understood" if match is None else "names a reflector that has a place already"
-            problems.append(
-                Problem(where=f"{_OPTION} {text}", what=what, allowed=f"a name, and x, y, z in mm: {_FORM}")
-            )
+            problems.append(Problem(f"{_OPTION} {text}", what, allowed=f"a name, and x, y, z in mm: {_FORM}"))
         else:
             x, y, z = map(float, match.groups()[1:])
             places[name] = x, y, z
@@ -58,7 +56,7 @@ def reflector_problems(export: InstrumentExport, places: Mapping[str, Place], at
     problems = list[Problem]()
 
     def add(what: str, value: str, allowed: str, next_step: str = "") -> None:
-        problems.append(Problem(where=str(export.path), what=what, value=value, allowed=allowed, next_step=next_step))
+        problems.append(Problem(str(export.path), what, value=value, allowed=allowed, next_step=next_step))
 
     leave_out = "measure with one, or leave the column out with --columns"
     if told and not at_rest:
@@ -81,7 +79,7 @@ def of_points_at_rest(export: InstrumentExport, places: Mapping[str, Place]) -> 
     if export.visit is not None:
         what = "a column of visits is of points at rest"
         allowed = "--by order, name or distance"
-        problems.append(Problem(where=str(export.path), what=what, allowed=allowed, next_step="leave the column out"))
+        problems.append(Problem(str(export.path), what, allowed=allowed, next_step="leave the column out"))
     return problems
 
 

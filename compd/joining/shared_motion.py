@@ -7,7 +7,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.instruments import Track
 
 # Least motion (mm) of both for a visible pattern; ten times that of a reversal.
@@ -59,15 +59,13 @@ class SharedMotion:
 
     def refusal(self, what: str, value: str, allowed: str) -> RecordingError:
         """The error that the offset cannot be estimated."""
-        return RecordingError(
-            Problem(
-                where=str(self.track.path),
-                what=f"the clock offset cannot be determined: {what}",
-                value=value,
-                allowed=allowed,
-                next_step="record with moves between dwells of different length, or give --offset S; join points at "
-                "rest --by order, name or distance",
-            )
+        return RecordingError.of(
+            str(self.track.path),
+            f"the clock offset cannot be determined: {what}",
+            value=value,
+            allowed=allowed,
+            next_step="record with moves between dwells of different length, or give --offset S; join points at "
+            "rest --by order, name or distance",
         )
 
     def covered(self, earliest_s: float, latest_s: float) -> BoolArray:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from compd.errors import ConfigurationError, Problem
+from compd.errors import ConfigurationError
 
 
 @dataclass(frozen=True)
@@ -32,21 +32,17 @@ class PortArguments:
         """`host` and `port` of a line. Raises ConfigurationError for another port: what it is not, and an example."""
         address = self.host_and_port
         if address is None:
-            raise ConfigurationError(
-                Problem(where="--port", what=what, value=self.port, allowed=f"host:port, such as {example}")
-            )
+            raise ConfigurationError.of("--port", what, value=self.port, allowed=f"host:port, such as {example}")
         return {"host": address[0], "port": address[1]}
 
     def serial_keys(self) -> dict[str, Any]:
         """`port`, `baud` and `format` of a line. Raises ConfigurationError where one is missing."""
         if self.baud is None or self.format is None:
-            raise ConfigurationError(
-                Problem(
-                    where="--baud, --format",
-                    what="a serial port needs both",
-                    value=self.port,
-                    allowed="--baud 9600 --format 7E2",
-                    next_step="look them up in the device's manual; they differ from device to device",
-                )
+            raise ConfigurationError.of(
+                "--baud, --format",
+                "a serial port needs both",
+                value=self.port,
+                allowed="--baud 9600 --format 7E2",
+                next_step="look them up in the device's manual; they differ from device to device",
             )
         return {"port": self.port, "baud": self.baud, "format": self.format}

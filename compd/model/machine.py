@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.errors import KinematicsError, Problem
+from compd.errors import KinematicsError
 from compd.link_count import LinkCount
 from compd.model.effects import AtZero, EffectProgram, FittedEffect, MachineConstants, MachineDetails, build_program
 from compd.model.kernels import require
@@ -414,13 +414,8 @@ def _check_shapes(
     if errors:
         raise ValueError("; ".join(errors))
     if carriers.min() < 0 or carriers.max() > 2:
-        raise KinematicsError(
-            Problem(
-                where="support_of_joint",
-                what="names a support that is not there",
-                value=str(carriers.tolist()),
-                allowed="0, 1 or 2",
-            )
+        raise KinematicsError.of(
+            "support_of_joint", "names a support that is not there", value=str(carriers.tolist()), allowed="0, 1 or 2"
         )
 
 

@@ -208,28 +208,24 @@ def read_document(path: Path, content: bytes | None = None) -> tuple[ModelDocume
     except ConfigurationError as error:
         raise StateError(error.problems) from error
     if isinstance(data.get("format"), int) and data["format"] > FORMAT:
-        raise StateError(
-            Problem(
-                where=where,
-                what="was written by a later release of compd",
-                value=f"format: {data['format']}",
-                allowed=f"format: 1 to {FORMAT}",
-                next_step=f"install release {data.get('release', 'that wrote it')} or later, or fit the effects anew",
-            )
+        raise StateError.of(
+            where,
+            "was written by a later release of compd",
+            value=f"format: {data['format']}",
+            allowed=f"format: 1 to {FORMAT}",
+            next_step=f"install release {data.get('release', 'that wrote it')} or later, or fit the effects anew",
         )
     try:
         document = ModelDocument.model_validate(data)
     except ValidationError as error:
         raise StateError([_problem(detail, where) for detail in error.errors(include_url=False)]) from error
     if document.checksum and document.checksum != (fitting := _checksum(data)):
-        raise StateError(
-            Problem(
-                where=where,
-                what="was changed after it was written: its checksum does not fit",
-                value=document.checksum,
-                allowed=fitting,
-                next_step="take it from a copy; where the change is meant, remove the line `checksum`",
-            )
+        raise StateError.of(
+            where,
+            "was changed after it was written: its checksum does not fit",
+            value=document.checksum,
+            allowed=fitting,
+            next_step="take it from a copy; where the change is meant, remove the line `checksum`",
         )
     state = {"effects": data.get("effects") or [], "covariance": data.get("covariance") or []}
     state |= {"fitted_range": data["fitted_range"]} if data.get("fitted_range") else {}
@@ -266,8 +262,8 @@ def _problem(detail: ErrorDetails, where: str) -> Problem:
         "literal_error": ("is none of the choices", str(detail.get("ctx", {}).get("expected", ""))),
     }.get(detail["type"], (detail["msg"].removeprefix("Value error, "), ""))
     return Problem(
-        where=f"{where}{place}",
-        what=what,
+        f"{where}{place}",
+        what,
         value=_shown(detail),
         allowed=allowed,
         next_step="mend it, or take the file from a copy",
@@ -307,12 +303,8 @@ def write_stored(path: Path, stored: StoredModel) -> None:
         # the daemon, another user, must be able to read it
         write_files({path: text}, mode=0o644)
     except OSError as error:
-        raise StateError(
-            Problem(
-                where=str(path),
-                what=f"cannot be written: {error.strerror}",
-                next_step="choose a place that may be written",
-            )
+        raise StateError.of(
+            str(path), f"cannot be written: {error.strerror}", next_step="choose a place that may be written"
         ) from error
 
 

@@ -147,27 +147,23 @@ class ModelFile:
             Where a column is missing, the class gives no pose, or the model is of a machine that compd knows.
         """
         if self.machine != EXTERNAL:
-            raise CompdError(
-                Problem(
-                    where="predict",
-                    what="is of a machine that compd knows",
-                    value=self.machine,
-                    allowed=f"a model of `machine: {EXTERNAL}`",
-                    next_step="`compare` predicts the rows of its recordings",
-                )
+            raise CompdError.of(
+                "predict",
+                "is of a machine that compd knows",
+                value=self.machine,
+                allowed=f"a model of `machine: {EXTERNAL}`",
+                next_step="`compare` predicts the rows of its recordings",
             )
         names = list(map(str, rows))
         columns = {name: np.asarray(rows[name], dtype=np.float64) for name in names}
         links = next(i for i in count() if f"scale_{i + 1}_mm" not in columns)
         for fitted in self.fitted:
             if len(fitted.theta) != len(fitted.effect.columns(links)):
-                raise CompdError(
-                    Problem(
-                        where=f"effect {fitted.effect.id}",
-                        what="has numbers for another number of scales",
-                        value=f"{links} columns scale_<i>_mm",
-                        next_step="give the scales of the machine on which it was fitted",
-                    )
+                raise CompdError.of(
+                    f"effect {fitted.effect.id}",
+                    "has numbers for another number of scales",
+                    value=f"{links} columns scale_<i>_mm",
+                    next_step="give the scales of the machine on which it was fitted",
                 )
         model = new_external_model(kinematics, links)
         return predict_external(replace(model, effects=self.fitted, covariance=self.covariance), columns)

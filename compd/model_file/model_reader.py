@@ -40,24 +40,20 @@ def read_model_file(
     """
     document, stored = read_document(path, content)
     if stored.machine != machine:
-        raise StateError(
-            Problem(
-                where=str(path),
-                what="belongs to another machine",
-                value=stored.machine,
-                allowed=machine,
-                next_step="give this machine's model file, or begin a new one",
-            )
+        raise StateError.of(
+            str(path),
+            "belongs to another machine",
+            value=stored.machine,
+            allowed=machine,
+            next_step="give this machine's model file, or begin a new one",
         )
     if geometry and stored.geometry and stored.geometry != geometry:
-        raise StateError(
-            Problem(
-                where=str(path),
-                what="was fitted on another geometry of this machine",
-                value=stored.geometry,
-                allowed=geometry,
-                next_step="fit it again with `compd effect fit`",
-            )
+        raise StateError.of(
+            str(path),
+            "was fitted on another geometry of this machine",
+            value=stored.geometry,
+            allowed=geometry,
+            next_step="fit it again with `compd effect fit`",
         )
     problems: list[Problem] = []
     found: list[tuple[Effect, EffectEntry, str]] = []
@@ -79,8 +75,8 @@ def read_model_file(
     if not problems and len(covariance) != parameters:
         problems.append(
             Problem(
-                where=f"{path}, covariance",
-                what="has another size than the parameters",
+                f"{path}, covariance",
+                "has another size than the parameters",
                 value=str(covariance.shape),
                 allowed=f"({parameters}, {parameters})",
                 next_step="fit it again with `compd effect fit`",
@@ -109,15 +105,15 @@ def _warnings(document: ModelDocument, fitted: Sequence[FittedEffect], links: in
     """What the file does not say of itself, as those of releases up to 0.2 do not."""
     if not document.checksum:
         yield Problem(
-            where=str(path),
-            what="has no checksum: what was changed in it after it was written cannot be seen",
+            str(path),
+            "has no checksum: what was changed in it after it was written cannot be seen",
             next_step="`compd effect fit` writes one",
         )
     needed = dict.fromkeys(chain.from_iterable(needed_quantities(effect.effect, links) for effect in fitted))
     if unknown := [name for name in needed if name not in document.fitted_range]:
         yield Problem(
-            where=str(path),
-            what="does not say in which range it was fitted: its effects are extrapolated without a limit",
+            str(path),
+            "does not say in which range it was fitted: its effects are extrapolated without a limit",
             value=", ".join(unknown),
             next_step="fit it again with `compd effect fit`",
         )
@@ -139,8 +135,8 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
     if sorted(values) != sorted(names):
         problems.append(
             Problem(
-                where=where,
-                what=f"has not the parameters of {effect.id}",
+                where,
+                f"has not the parameters of {effect.id}",
                 value=", ".join(values),
                 allowed=", ".join(names),
                 next_step="fit it again with `compd effect fit`",
@@ -149,8 +145,8 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
         return FittedEffect(effect, np.zeros(len(columns)))
     problems += [
         Problem(
-            where=f"{where}, {effect.id}, {column.name}",
-            what="is in another unit than the effect has" if units[column.name] else "has no unit",
+            f"{where}, {effect.id}, {column.name}",
+            "is in another unit than the effect has" if units[column.name] else "has no unit",
             value=f"unit: {units[column.name]}" if units[column.name] else "",
             allowed=f"unit: {column.parameter.unit}",
             next_step=f"write the value in {column.parameter.unit}, and `unit: {column.parameter.unit}`",
@@ -161,8 +157,8 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
     known = [*names, *(constant.name for constant in effect.constants)]
     problems += [
         Problem(
-            where=f"{where}, {effect.id}, plausible",
-            what="is a range of no number of this effect",
+            f"{where}, {effect.id}, plausible",
+            "is a range of no number of this effect",
             value=name,
             allowed=", ".join(known),
             next_step="mend the name, or remove it",
@@ -176,8 +172,8 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
     if missing:
         problems.append(
             Problem(
-                where=where,
-                what=f"has not the shape constants of {effect.id}",
+                where,
+                f"has not the shape constants of {effect.id}",
                 allowed=", ".join(missing),
                 next_step="remove the effect and add it again: `compd effect add` searches them",
             )
@@ -193,8 +189,8 @@ def _error_problems(fitted: FittedEffect, entry: EffectEntry, links: int, where:
         if math.isnan(std) or math.isclose(std, of_covariance, rel_tol=_ROUNDING):
             continue
         yield Problem(
-            where=f"{where}, {fitted.effect.id}, {estimate['name']}",
-            what="has a standard error that is not the one of the covariance",
+            f"{where}, {fitted.effect.id}, {estimate['name']}",
+            "has a standard error that is not the one of the covariance",
             value=f"std: {std:g}",
             allowed=f"std: {of_covariance:g}",
             next_step="write that one, or mend the covariance",

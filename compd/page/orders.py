@@ -82,7 +82,7 @@ class Orders:
         if name == "shadow" and subject:
             self._path(subject)
         if name == "adopt" and not _HASH.fullmatch(subject):
-            raise DaemonError(Problem(where="page", what=_NO_HASH, value=subject))
+            raise DaemonError.of("page", _NO_HASH, value=subject)
         return await asyncio.to_thread(self._ask, name, subject, by)
 
     def _ask(self, name: str, subject: str, by: str) -> Mapping[str, Any]:
@@ -94,7 +94,7 @@ class Orders:
         answer = client.accept(subject)
         if refused := answer.get("not_believed"):
             raise DaemonError(
-                [Problem(where=channel, what=f"still not believed: {reason}") for channel, reason in refused.items()]
+                [Problem(channel, f"still not believed: {reason}") for channel, reason in refused.items()]
             )
         return answer
 
@@ -105,7 +105,7 @@ class Orders:
         try:
             descriptor = opened(path)
         except OSError as error:
-            raise DaemonError(Problem(where=str(path), what=f"cannot be read: {error.strerror or error}")) from error
+            raise DaemonError.of(str(path), f"cannot be read: {error.strerror or error}") from error
         try:
             return client.model(path, shadow=True, descriptor=descriptor)
         finally:
@@ -114,7 +114,7 @@ class Orders:
     def _path(self, subject: str) -> Path:
         """Path of an offered model file. Raises DaemonError for any other name."""
         if (path := self._files.path_of(subject)) is None:
-            raise DaemonError(Problem(where="page", what=_NOT_OFFERED, value=subject, next_step=_NAME_IT))
+            raise DaemonError.of("page", _NOT_OFFERED, value=subject, next_step=_NAME_IT)
         return path
 
     def _command(self, *words: str) -> str:

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import uvicorn
 
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 from compd.page.connections import ConnectionLimits, Connections, raised_descriptor_limit
 from compd.page.counted_log import CountedLog
 from compd.page.daemon_link import DaemonLink
@@ -123,12 +123,10 @@ def _listener(host: str, port: int) -> socket.socket:
         listener.bind((host, port))
     except OSError as error:
         listener.close()
-        raise DaemonError(
-            Problem(
-                where=f"{host}:{port}",
-                what=f"cannot listen: {error.strerror}",
-                next_step="give another --port, or end the page that runs there",
-            )
+        raise DaemonError.of(
+            f"{host}:{port}",
+            f"cannot listen: {error.strerror}",
+            next_step="give another --port, or end the page that runs there",
         ) from error
     listener.listen()
     return listener

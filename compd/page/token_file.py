@@ -11,7 +11,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from compd.documents import parse_yaml, read_text
-from compd.errors import ConfigurationError, Problem
+from compd.errors import ConfigurationError
 from compd.files import FileKind
 from compd.page.guard import Role, Token, hashed, new_token
 
@@ -79,4 +79,4 @@ def add_token(path: Path, role_and_name: str) -> str:
 
 
 def _problem(path: Path | str, what: str, next_step: str) -> ConfigurationError:
-    return ConfigurationError(Problem(where=str(path), what=what, next_step=next_step))
+    return ConfigurationError.of(str(path), what, next_step=next_step)

@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.comparison import AlignedRecording
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.link_count import scale_count
 from compd.model import MachineModel, observe
 from compd.model.effects import Effect, MachineConstants, Observations, needed_quantities
@@ -221,13 +221,11 @@ def _observe_programmes(
     pose, scale_mm = model.reach(tip)
     if (pose.reason != Reason.OK).any():
         unreachable = tip[pose.reason != Reason.OK][0]
-        raise RecordingError(
-            Problem(
-                where="the next measurement",
-                what="a place within the limits is out of reach",
-                value=str(np.round(unreachable, 1).tolist()),
-                next_step="narrow the workspace with --workspace",
-            )
+        raise RecordingError.of(
+            "the next measurement",
+            "a place within the limits is out of reach",
+            value=str(np.round(unreachable, 1).tolist()),
+            next_step="narrow the workspace with --workspace",
         )
     starts = programme_starts(np.array([len(programme) for programme in chosen]))
     direction = np.concatenate([programme.direction for programme in chosen])

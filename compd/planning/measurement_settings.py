@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 
 # Column -> lowest and highest value that it may be set to.
 SettingLimits: TypeAlias = Mapping[str, tuple[float, float]]
@@ -121,14 +121,12 @@ def _steps(name: str, values: FloatArray, limits: tuple[float, float] | None) ->
         steps = np.union1d(steps, limits)
     within = steps[(limits[0] <= steps) & (steps <= limits[1])]
     if not len(within):
-        raise CompdError(
-            Problem(
-                where=f"limit of {name}",
-                what="leaves no value",
-                value=f"{limits[0]:g} to {limits[1]:g}",
-                allowed=", ".join(f"{step:g}" for step in steps),
-                next_step="widen it, or leave it out",
-            )
+        raise CompdError.of(
+            f"limit of {name}",
+            "leaves no value",
+            value=f"{limits[0]:g} to {limits[1]:g}",
+            allowed=", ".join(f"{step:g}" for step in steps),
+            next_step="widen it, or leave it out",
         )
     return np.asarray(within)
 

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.instruments import (
     CSV_MARK,
     MARK,
@@ -96,25 +96,21 @@ def target_bytes(
     if shape == "csv":
         return write_csv_targets(targets)
     if any(target.tip_M_mm is None for target in targets):
-        raise CompdError(
-            Problem(
-                where=f"--as {shape}",
-                what="needs places of the tip, and this plan sets columns of a machine whose kinematics is not known",
-                value=", ".join(name for name in rows[0] if name not in NOT_SET),
-                allowed="--as csv",
-                next_step="leave --as out, or take --as csv",
-            )
+        raise CompdError.of(
+            f"--as {shape}",
+            "needs places of the tip, and this plan sets columns of a machine whose kinematics is not known",
+            value=", ".join(name for name in rows[0] if name not in NOT_SET),
+            allowed="--as csv",
+            next_step="leave --as out, or take --as csv",
         )
     if shape == "sa":
         return write_sa_targets(targets)
     if motion is None:
-        raise CompdError(
-            Problem(
-                where="--as gcode",
-                what="needs a feed between the places, which no plan knows",
-                allowed="more than 0 mm/min",
-                next_step="give --feed, in mm/min",
-            )
+        raise CompdError.of(
+            "--as gcode",
+            "needs a feed between the places, which no plan knows",
+            allowed="more than 0 mm/min",
+            next_step="give --feed, in mm/min",
         )
     return write_gcode(targets, motion, title)
 

@@ -181,15 +181,13 @@ def _programmes(
     """
     if aligned.ends is not None:
         held = "within the length of the bar" if aligned.ends.of_lengths else "in its pins"
-        raise CompdError(
-            Problem(
-                where=str(aligned.recording.path),
-                what=f"rows are chosen all over the workspace, and this reference measures only {held}",
-                allowed="a reference that follows the tip: tool_position, tool_pose, link_length",
-                next_step="measure from further balls, at other heights, warm and cold"
-                if aligned.ends.of_lengths
-                else "measure at further pins, warm and cold, or with a reference that follows the tip",
-            )
+        raise CompdError.of(
+            str(aligned.recording.path),
+            f"rows are chosen all over the workspace, and this reference measures only {held}",
+            allowed="a reference that follows the tip: tool_position, tool_pose, link_length",
+            next_step="measure from further balls, at other heights, warm and cold"
+            if aligned.ends.of_lengths
+            else "measure at further pins, warm and cold, or with a reference that follows the tip",
         )
     if aligned.model is not None:
         given = limits if isinstance(limits, ProgrammeLimits) else recorded_limits(aligned)
@@ -198,13 +196,11 @@ def _programmes(
     # what the model's effects are computed from is varied too: only then are these parted from the others
     possible = setting_programmes(aligned, [*effects, *(fitted.effect for fitted in model)], by_column)
     if not len(possible.lengths):
-        raise CompdError(
-            Problem(
-                where=str(aligned.recording.path),
-                what="nothing that these effects are computed from was varied",
-                value=", ".join(effect.id for effect in effects),
-                next_step="record a column by which they differ, or give limits within which one can be varied",
-            )
+        raise CompdError.of(
+            str(aligned.recording.path),
+            "nothing that these effects are computed from was varied",
+            value=", ".join(effect.id for effect in effects),
+            next_step="record a column by which they differ, or give limits within which one can be varied",
         )
     return possible
 

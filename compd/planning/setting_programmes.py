@@ -129,8 +129,8 @@ def _motion_columns(rows: Observations) -> dict[str, FloatArray]:
 def _check_names(limits: SettingLimits, names: Sequence[str]) -> None:
     problems = [
         Problem(
-            where=f"limit of {name}",
-            what="is no column that these effects are computed from",
+            f"limit of {name}",
+            "is no column that these effects are computed from",
             allowed=", ".join(names) or "none: they are computed from no column",
             next_step="correct the name, or leave the limit out",
         )

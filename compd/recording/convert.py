@@ -80,20 +80,18 @@ def _problems(source: Path, sidecar: Path, destination: Path, overwrite: bool) -
     if destination.suffix not in allowed:
         problems.append(
             Problem(
-                where=str(destination),
-                what=f"is no format into which {source.name} can be converted",
+                str(destination),
+                f"is no format into which {source.name} can be converted",
                 value=destination.suffix,
                 allowed=" or ".join(allowed),
                 next_step="end the name in this",
             )
         )
     if not sidecar.is_file():
-        problems.append(
-            Problem(where=str(sidecar), what="the sidecar is missing", next_step="give a recording with its sidecar")
-        )
+        problems.append(Problem(str(sidecar), "the sidecar is missing", next_step="give a recording with its sidecar"))
     targets = {destination, destination.with_suffix(".yaml")} - {sidecar}
     problems += [
-        Problem(where=str(target), what="is there already", next_step="choose another name, or give --overwrite")
+        Problem(str(target), "is there already", next_step="choose another name, or give --overwrite")
         for target in sorted(targets)
         if target.exists() and not overwrite
     ]

@@ -30,9 +30,7 @@ def exclude_rows(recording: Path, rows: Collection[int], reason: str) -> None:
     """
     if not reason.strip() or not rows:
         what = "needs a reason" if rows else "needs a row"
-        raise RecordingError(
-            Problem(where="exclusion", what=what, allowed='rows and a reason, as in "the beam was cut"')
-        )
+        raise RecordingError.of("exclusion", what, allowed='rows and a reason, as in "the beam was cut"')
     document, text = _with_rows_free(recording, rows)
     entries = document.setdefault(_KEY, CommentedSeq())
     entries.append(_entry(sorted(rows), reason.strip()))
@@ -63,13 +61,8 @@ def rows_of_text(text: str, where: str) -> list[int]:
                 raise ValueError
             rows.update(stretch)
     except ValueError:
-        raise RecordingError(
-            Problem(
-                where=where,
-                what="names no rows",
-                value=text,
-                allowed="rows as a spreadsheet shows them, 2 or more, as in 17-20,25",
-            )
+        raise RecordingError.of(
+            where, "names no rows", value=text, allowed="rows as a spreadsheet shows them, 2 or more, as in 17-20,25"
         ) from None
     return sorted(rows)
 
@@ -133,7 +126,7 @@ def _write(recording: Path, document: CommentedMap, before: str) -> None:
         _checked(path)
     except (OSError, CompdError) as error:
         write_files({path: before})
-        raise RecordingError(Problem(where=str(path), what=f"cannot be changed: {error}")) from error
+        raise RecordingError.of(str(path), f"cannot be changed: {error}") from error
 
 
 def _checked(path: Path) -> Sidecar:

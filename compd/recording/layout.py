@@ -139,8 +139,8 @@ def machine_problems(
     if machine != configuration.machine:
         problems.append(
             Problem(
-                where=where,
-                what="the sidecar is for another machine",
+                where,
+                "the sidecar is for another machine",
                 value=machine,
                 allowed=configuration.machine,
                 next_step="give this machine's configuration, or mend `machine:` in the sidecar",
@@ -160,8 +160,8 @@ def machine_problems(
         if count != expected:
             problems.append(
                 Problem(
-                    where=where,
-                    what=f"{count} {what} columns, {configuration.machine} has {expected}",
+                    where,
+                    f"{count} {what} columns, {configuration.machine} has {expected}",
                     allowed=f"{expected} {column}" if expected else "none",
                     next_step="add the missing columns, or name the right machine",
                 )
@@ -312,8 +312,8 @@ def _check_folds(names: Sequence[str], sidecar: Sidecar, problems: ProblemList) 
     if unknown:
         problems.problems.append(
             Problem(
-                where=f"{sidecar.path} folds",
-                what="names what rows cannot be divided by",
+                f"{sidecar.path} folds",
+                "names what rows cannot be divided by",
                 value=", ".join(unknown),
                 allowed=", ".join((TIME, PLACE, *columns)),
                 next_step="name a column, or delete it",

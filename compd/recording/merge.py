@@ -66,8 +66,8 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
     first, *others = recordings
     problems = [
         Problem(
-            where=str(recording.sidecar.path),
-            what=f"{_fitted_anew(recording)} fitted anew for every recording",
+            str(recording.sidecar.path),
+            f"{_fitted_anew(recording)} fitted anew for every recording",
             value=f"reference.quantity: {recording.reference.quantity}"
             if recording.reference.of_fixed_places
             else "reference.frame: instrument",
@@ -79,8 +79,8 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
     ]
     problems += [
         Problem(
-            where=str(recording.sidecar.path),
-            what="recordings of several reflectors are not merged: each names its own",
+            str(recording.sidecar.path),
+            "recordings of several reflectors are not merged: each names its own",
             value="reference.reflectors",
             next_step="give them to `compd calibrate` side by side",
         )
@@ -89,8 +89,8 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
     ]
     problems += [
         Problem(
-            where=str(recording.path),
-            what="has no time, so that nothing says when it began",
+            str(recording.path),
+            "has no time, so that nothing says when it began",
             allowed="recordings with `time_s`",
             next_step="put its rows into one table with a column `session`, or diagnose it by itself",
         )
@@ -116,7 +116,7 @@ def _problems(recordings: Sequence[Recording]) -> list[Problem]:
             ),
         )
         problems += [
-            Problem(where=str(recording.sidecar.path), what=what, value=value, allowed=allowed, next_step=next_step)
+            Problem(str(recording.sidecar.path), what, value=value, allowed=allowed, next_step=next_step)
             for what, value, allowed, next_step in comparisons
             if value != allowed
         ]

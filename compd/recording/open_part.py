@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.files import write_files
 from compd.recording.parquet_writer import arrow_batch, arrow_schema, write_parquet
 from compd.tables import arrow_modules
@@ -63,20 +63,18 @@ class OpenPart:
         try:
             return self._path.open("rb")
         except OSError as error:
-            raise RecordingError(
-                Problem(where=str(self._path), what=f"cannot be read: {error.strerror}", next_step="give NAME.arrow")
+            raise RecordingError.of(
+                str(self._path), f"cannot be read: {error.strerror}", next_step="give NAME.arrow"
             ) from error
 
     def _reader(self, file: Any) -> Any:
         try:
             return self._arrow.ipc.open_stream(file)
         except (OSError, MemoryError, self._arrow.ArrowException) as error:
-            raise RecordingError(
-                Problem(
-                    where=str(self._path),
-                    what="is no Arrow stream, or ends before its first row",
-                    allowed="what `compd record --format parquet` left",
-                )
+            raise RecordingError.of(
+                str(self._path),
+                "is no Arrow stream, or ends before its first row",
+                allowed="what `compd record --format parquet` left",
             ) from error
 
 

@@ -161,8 +161,8 @@ class RecordingBuilder:
             last_row = max([self._last_row, *table.row[-1:].tolist()])
             problems.problems.append(
                 Problem(
-                    where=f"{sidecar.path} excluded_rows",
-                    what=f"{rows_text(absent.tolist())} of the file: no such row",
+                    f"{sidecar.path} excluded_rows",
+                    f"{rows_text(absent.tolist())} of the file: no such row",
                     allowed=f"rows {FIRST_ROW} to {last_row}" if last_row >= FIRST_ROW else "",
                     next_step="count as the spreadsheet does: the header is row 1",
                 )
@@ -275,8 +275,8 @@ class RecordingBuilder:
 
     def _visits_again(self) -> Problem:
         return Problem(
-            where=f"{self._path} column `visit`",
-            what="numbers come back for rows in another session, at another place or after other visits",
+            f"{self._path} column `visit`",
+            "numbers come back for rows in another session, at another place or after other visits",
             value=f"{self._visits.again} numbers",
             allowed="a visit has rows that follow each other in one session at one place; a return is another",
             next_step="number the visits on from session to session, if all is to be unique",
@@ -301,8 +301,8 @@ class RecordingBuilder:
 
 def _no_reference(sidecar: Sidecar) -> Problem:
     return Problem(
-        where=str(sidecar.path),
-        what="names no reference",
+        str(sidecar.path),
+        "names no reference",
         allowed="`reference:` with its `quantity:`",
         next_step="write reference: {quantity: tool_position, frame: machine}"
         if sidecar.external

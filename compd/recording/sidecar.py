@@ -273,7 +273,7 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
     Raises RecordingError for a file of a newer format, in which nothing else can be judged.
     """
     if not path.is_file():
-        problems.append(Problem(where=str(path), what="the sidecar is missing", next_step=f"write it: {_EXAMPLE}"))
+        problems.append(Problem(str(path), "the sidecar is missing", next_step=f"write it: {_EXAMPLE}"))
         return None
     try:
         document = read_document(path, SIDECAR)
@@ -289,8 +289,8 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
     elif reference.unit != "um" and sections["machine"] not in (None, EXTERNAL):
         problems.append(
             Problem(
-                where=document.where(("reference", "unit")),
-                what=f"belongs to `machine: {EXTERNAL}`",
+                document.where(("reference", "unit")),
+                f"belongs to `machine: {EXTERNAL}`",
                 value=reference.unit,
                 allowed="um, or nothing",
                 next_step="delete it, and give the columns in mm",
@@ -301,8 +301,8 @@ def read_sidecar(path: Path, problems: list[Problem]) -> Sidecar | None:
     if sections["quantities_at_zero"] is not None and sections["machine"] == EXTERNAL:
         problems.append(
             Problem(
-                where=document.where(("quantities_at_zero",)),
-                what="belongs to a machine with a machine zero; an external model's effects count as they are written",
+                document.where(("quantities_at_zero",)),
+                "belongs to a machine with a machine zero; an external model's effects count as they are written",
                 allowed=f"the name of a configuration, not `machine: {EXTERNAL}`",
                 next_step="delete it",
             )
@@ -374,14 +374,12 @@ def sidecar_text(contents: Mapping[str, Any], directory: Path) -> str:
 def _refuse_newer_format(document: Document) -> None:
     value = document.value(("format",))
     if isinstance(value, int) and value > FORMAT:
-        raise RecordingError(
-            Problem(
-                where=document.where(("format",)),
-                what="was written by a newer release of compd",
-                value=str(value),
-                allowed=f"1 to {FORMAT}",
-                next_step="update compd on this computer, or export the recording with the older release",
-            )
+        raise RecordingError.of(
+            document.where(("format",)),
+            "was written by a newer release of compd",
+            value=str(value),
+            allowed=f"1 to {FORMAT}",
+            next_step="update compd on this computer, or export the recording with the older release",
         )
 
 

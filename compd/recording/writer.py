@@ -59,35 +59,31 @@ def write_recording_files(contents: Mapping[Path, Content]) -> None:
         write_files(contents, mode=0o644)
     except OSError as error:
         directory = list(contents)[-1].parent
-        raise RecordingError(Problem(where=str(directory), what=f"cannot be written to: {error.strerror}")) from error
+        raise RecordingError.of(str(directory), f"cannot be written to: {error.strerror}") from error
 
 
 def _problems(path: Path, arrays: Mapping[str, FloatArray], overwrite: bool) -> list[Problem]:
     problems = [
-        Problem(where=str(target), what="is there already", next_step="choose another name, or remove it")
+        Problem(str(target), "is there already", next_step="choose another name, or remove it")
         for target in (path, path.with_suffix(".yaml"))
         if target.exists() and not overwrite
     ]
     if path.suffix not in SUFFIXES:
         what = "a recording is NAME.csv or NAME.parquet"
-        problems.append(Problem(where=str(path), what=what, value=path.suffix, allowed=", ".join(SUFFIXES)))
+        problems.append(Problem(str(path), what, value=path.suffix, allowed=", ".join(SUFFIXES)))
     for name, values in arrays.items():
         where = f"{path}: column {name}"
         if parse_name(name) is None and not is_covariate(name):
             problems.append(
-                Problem(
-                    where=where, what="no column of the format", value=name, allowed="see the format, or <name>_<unit>"
-                )
+                Problem(where, "no column of the format", value=name, allowed="see the format, or <name>_<unit>")
             )
         if values.ndim != 1 or len(values) != len(next(iter(arrays.values()))):
-            problems.append(Problem(where=where, what="not as long as the others", value=str(values.shape)))
+            problems.append(Problem(where, "not as long as the others", value=str(values.shape)))
         if np.isinf(values).any():
-            problems.append(
-                Problem(where=where, what="holds an infinite number", allowed="a number, or nan for an empty cell")
-            )
+            problems.append(Problem(where, "holds an infinite number", allowed="a number, or nan for an empty cell"))
     time_s = arrays.get("time_s")
     if time_s is not None and (np.isnan(time_s).any() or (np.diff(_rounded("time_s", time_s)) <= 0).any()):
-        problems.append(Problem(where=f"{path}: column time_s", what="does not rise by a microsecond every row"))
+        problems.append(Problem(f"{path}: column time_s", "does not rise by a microsecond every row"))
     return problems
 
 

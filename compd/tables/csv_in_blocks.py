@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.tables.csv_cells import HeaderTest
 from compd.tables.csv_table import is_plain, parse_table, plain_numbers
 from compd.tables.problem_list import ProblemList
@@ -70,6 +70,4 @@ def _labels(path: Path, id_columns: Collection[str]) -> dict[str, tuple[str, ...
 
 
 def _unreadable(path: Path, error: OSError) -> RecordingError:
-    return RecordingError(
-        Problem(where=str(path), what=f"cannot be read: {error.strerror}", next_step="give the path of a CSV file")
-    )
+    return RecordingError.of(str(path), f"cannot be read: {error.strerror}", next_step="give the path of a CSV file")

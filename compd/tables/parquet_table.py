@@ -37,12 +37,8 @@ def arrow_modules(path: Path) -> tuple[Any, Any]:
         import pyarrow
         import pyarrow.parquet
     except ImportError as error:
-        raise RecordingError(
-            Problem(
-                where=str(path),
-                what="is a Parquet file, and pyarrow is not installed",
-                next_step=install_line("parquet"),
-            )
+        raise RecordingError.of(
+            str(path), "is a Parquet file, and pyarrow is not installed", next_step=install_line("parquet")
         ) from error
     return pyarrow, pyarrow.parquet
 
@@ -117,14 +113,12 @@ class ParquetTable:
             kind = self._schema.types[self._names.index(name)]
             where = f"{self._path}: column {name}"
             if self._names.count(name) > 1:
-                problems.append(
-                    Problem(where=where, what="two columns of the same name", next_step="rename or delete one")
-                )
+                problems.append(Problem(where, "two columns of the same name", next_step="rename or delete one"))
             elif not self._is_number(kind) and not (self._is_text(kind) and name in id_columns):
                 problems.append(
                     Problem(
-                        where=where,
-                        what="holds no numbers",
+                        where,
+                        "holds no numbers",
                         value=str(kind),
                         allowed="double, or another type of number; null where nothing was measured",
                         next_step="for time_s write seconds from the start; convert or delete other columns",
@@ -198,21 +192,21 @@ def _cells(column: Any) -> list[str]:
 
 def _unreadable(path: Path, error: OSError) -> Problem:
     what = f"cannot be read: {os.strerror(error.errno) if error.errno else error}"
-    return Problem(where=str(path), what=what, next_step="give the path of a Parquet file")
+    return Problem(str(path), what, next_step="give the path of a Parquet file")
 
 
 def _too_large(path: Path) -> Problem:
     return Problem(
-        where=str(path),
-        what="needs more memory than there is, or is damaged",
+        str(path),
+        "needs more memory than there is, or is damaged",
         next_step="divide it into several recordings, or copy it again",
     )
 
 
 def _damaged(path: Path) -> Problem:
     return Problem(
-        where=str(path),
-        what="is no Parquet file, or a part of one: its end is missing or damaged",
+        str(path),
+        "is no Parquet file, or a part of one: its end is missing or damaged",
         next_step="copy or export it again; what `compd record` left after a kill is NAME.arrow, see `compd recording "
         "convert`",
     )

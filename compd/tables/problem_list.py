@@ -26,15 +26,11 @@ class ProblemList:
 
     def add(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
         """Add a problem at `place` in this file: "row 5", "column scale_1_mm (E)", or "" for the whole file."""
-        self.problems.append(
-            Problem(where=self._where(place), what=what, value=value, allowed=allowed, next_step=next_step)
-        )
+        self.problems.append(Problem(self._where(place), what, value=value, allowed=allowed, next_step=next_step))
 
     def warn(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
         """Add a warning, as `add` a problem."""
-        self.warnings.append(
-            Problem(where=self._where(place), what=what, value=value, allowed=allowed, next_step=next_step)
-        )
+        self.warnings.append(Problem(self._where(place), what, value=value, allowed=allowed, next_step=next_step))
 
     def _where(self, place: str) -> str:
         return f"{self.path}: {place}" if place else str(self.path)

@@ -49,9 +49,7 @@ class PresetDirectory:
     def read(self, name: str) -> tuple[Preset, Document]:
         """A preset and the file that it was read from. Raises PluginError, with every problem and its line."""
         if name not in self.names():
-            raise PluginError(
-                Problem(where=str(self._folder), what="no such preset", value=name, allowed=", ".join(self.names()))
-            )
+            raise PluginError.of(str(self._folder), "no such preset", value=name, allowed=", ".join(self.names()))
         try:
             with as_file(self._folder / f"{name}{SUFFIX}") as path:
                 document = read_document(path, PRESET)
@@ -70,7 +68,7 @@ class PresetDirectory:
         except ValidationError as error:
             raise PluginError(_problems(document, error, ("sample",))) from error
         except ValueError as error:
-            raise PluginError(Problem(where=document.where(("options",)), what=str(error))) from error
+            raise PluginError.of(document.where(("options",)), str(error)) from error
 
     def _simulated_device(self, name: str) -> type:
         """The simulated device's class: that of the base driver, with this description. Errors as for the driver."""
@@ -147,8 +145,8 @@ def _problems(document: Document, error: ValidationError, root: Location = ()) -
         value, unknown = document.value(location), detail["type"] == "extra_forbidden"
         problems.append(
             Problem(
-                where=document.where(location),
-                what=WORDS.get(detail["type"], detail["msg"].removeprefix("Value error, ")),
+                document.where(location),
+                WORDS.get(detail["type"], detail["msg"].removeprefix("Value error, ")),
                 value="" if unknown or value is None or isinstance(value, dict | list) else str(value),
                 allowed=str(context.get("expected") or context.get("pattern") or ""),
                 next_step="drivers/compd_drivers/presets/README.md says what a preset may hold",

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.live.loop import Commands
 from compd.live.service import Errands, Messages, RequestContext, Requests, TargetKeys
 from compd.live.service.client_session import ClientSession
@@ -56,7 +56,7 @@ def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
 
 
 def requests(tip: str, rotation: bool) -> Requests:
-    commands = Commands(StateError(Problem(where="zero", what="none")))
+    commands = Commands(StateError.of("zero", "none"))
     return Requests(
         RequestContext(
             messages=Messages(

@@ -12,7 +12,7 @@ import numpy as np
 from compd.clock import MonotonicClock
 from compd.compensation import Compensation
 from compd.compensation.values import Contributions
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.live.loop import Commands, Setpoint
 from compd.live.memory import PollRequests, SharedRing
 from compd.live.service import Errands, Listeners, Messages, Publisher, RequestContext, Requests, TargetKeys, TcpAccess
@@ -25,7 +25,7 @@ PERIOD_S = 0.005
 TIMEOUT_S = 20
 TARGET_KEYS = TargetKeys("tip_B0_mm", rotation=False)
 VERSION = {"class": "VERSION", "protocol": 1, "release": "1", "machine": "test", "config_hash": "00"}
-NO_ZERO = StateError(Problem(where="zero", what="none"))
+NO_ZERO = StateError.of("zero", "none")
 
 
 def setpoint(seq: int, time_s: float | None = None) -> Setpoint:

@@ -154,33 +154,31 @@ def plan(
 
 def _by_column(texts: list[str]) -> dict[str, tuple[float, float]]:
     """The limits COLUMN=LOW,HIGH by column. Raises CompdError for the first malformed one."""
-    from compd.errors import CompdError, Problem
+    from compd.errors import CompdError
 
     limits: dict[str, tuple[float, float]] = {}
     for text in texts:
         name, _, numbers = text.partition("=")
         low, high = _numbers(f"--limit {name}", numbers, 2)
         if name in limits:
-            raise CompdError(Problem(where=f"--limit {name}", what="is given twice", next_step="leave one out"))
+            raise CompdError.of(f"--limit {name}", "is given twice", next_step="leave one out")
         limits[name] = low, high
     return limits
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:
     """The numbers of an option. Raises CompdError unless there are `count`."""
-    from compd.errors import CompdError, Problem
+    from compd.errors import CompdError
 
     try:
         values = [float(number) for number in text.split(",")]
     except ValueError:
         values = []
     if len(values) != count:
-        raise CompdError(
-            Problem(
-                where=option,
-                what="is not understood",
-                value=text,
-                allowed="a number" if count == 1 else f"{count} numbers with commas, low before high",
-            )
+        raise CompdError.of(
+            option,
+            "is not understood",
+            value=text,
+            allowed="a number" if count == 1 else f"{count} numbers with commas, low before high",
         )
     return values

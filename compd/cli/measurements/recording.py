@@ -66,9 +66,7 @@ def merge(
     from compd.table_file import written_path
 
     if len(recordings) < 2:
-        raise CompdError(
-            Problem(where="compd recording merge", what="needs two recordings or more", value=str(recordings[0]))
-        )
+        raise CompdError.of("compd recording merge", "needs two recordings or more", value=str(recordings[0]))
     problems: list[Problem] = []
     parts = []
     for path in recordings:

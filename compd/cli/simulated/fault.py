@@ -27,7 +27,7 @@ def fault(
 
     With DIRECTORY alone the lines are listed, with the fault of each and those that it can have.
     """
-    from compd.errors import CompdError, Problem
+    from compd.errors import CompdError
     from compd.simulation import ControlClient
 
     with ControlClient(simulation / "control.sock") as machine:
@@ -37,18 +37,14 @@ def fault(
                 typer.echo(f"{name}: {state['fault'] or 'works'}; can be {_quoted(state['faults'])}")
             return
         if line not in lines:
-            raise CompdError(
-                Problem(where="LINE", what="is no line of this machine", value=line, allowed=", ".join(lines))
-            )
+            raise CompdError.of("LINE", "is no line of this machine", value=line, allowed=", ".join(lines))
         faults = lines[line]["faults"]
         if kind not in (*faults, NO_FAULT):
-            raise CompdError(
-                Problem(
-                    where="FAULT",
-                    what=f"is no fault of {line} can have" if kind else f"{line} needs one",
-                    value=kind or "",
-                    allowed=_quoted([*faults, NO_FAULT]),
-                )
+            raise CompdError.of(
+                "FAULT",
+                f"is no fault of {line} can have" if kind else f"{line} needs one",
+                value=kind or "",
+                allowed=_quoted([*faults, NO_FAULT]),
             )
         machine.ask("FAULT", line=line, fault=None if kind == NO_FAULT else kind)
     typer.echo(f"{line}: {'works again' if kind == NO_FAULT else kind}")

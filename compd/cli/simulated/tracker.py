@@ -61,16 +61,14 @@ def tracker(
     """
     from datetime import datetime
 
-    from compd.errors import CompdError, Problem
+    from compd.errors import CompdError
     from compd.files import check_replaceable, write_files
     from compd.simulation import Looks
 
     written = written_forms()[shape.value]
     _check_options(written, link, points, unit)
     if not out.parent.is_dir():
-        raise CompdError(
-            Problem(where=str(out), what="its directory does not exist", value=str(out.parent), next_step="make it")
-        )
+        raise CompdError.of(str(out), "its directory does not exist", value=str(out.parent), next_step="make it")
     check_replaceable(out, (), "an export", overwrite)
     looks = Looks(link)
     start = datetime.now()
@@ -80,9 +78,7 @@ def tracker(
     else:
         samples = looks.at_rate(rate_hz, unit, start) if written.constant_rate else looks.track(unit, start)
     if not len(samples.values):
-        raise CompdError(
-            Problem(where=str(out), what="the machine has not rested once", next_step="let the tracker look for longer")
-        )
+        raise CompdError.of(str(out), "the machine has not rested once", next_step="let the tracker look for longer")
     write_files({out: written.write(samples)})
     typer.echo(f"{len(looks)} looks in {looks.seconds:.0f} s" + (f", {len(samples.values)} points" if points else ""))
     if hint := _for_join(written, link, points, unit, rate_hz):
@@ -98,18 +94,16 @@ def _check_options(written: WrittenForm, link: int | None, points: bool, unit: s
 
     problems = []
     if unit not in UNIT_KINDS[0]:
-        problems.append(
-            Problem(where="--unit", what="is no unit of a length", value=unit, allowed=", ".join(UNIT_KINDS[0]))
-        )
+        problems.append(Problem("--unit", "is no unit of a length", value=unit, allowed=", ".join(UNIT_KINDS[0])))
     where = f"--as {written.name}"
     if link is None and POSITION_AXES not in written.axes:
-        problems.append(Problem(where=where, what="is one length", next_step="name the link: --link 1"))
+        problems.append(Problem(where, "is one length", next_step="name the link: --link 1"))
     if points and not written.holds_points:
-        problems.append(Problem(where=where, what="is a track", next_step="leave --points out"))
+        problems.append(Problem(where, "is a track", next_step="leave --points out"))
     if link is not None and LENGTH_AXES not in written.axes:
         others = " or ".join(form.name for form in written_forms().values() if LENGTH_AXES in form.axes)
         step = f"leave --link out, or choose --as {others}"
-        problems.append(Problem(where=where, what="is x, y, z", next_step=step))
+        problems.append(Problem(where, "is x, y, z", next_step=step))
     if problems:
         raise CompdError(problems)
 
@@ -122,7 +116,7 @@ def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate
     from compd.cli.waiting import connect_patiently
     from compd.client import connect
     from compd.clock import MonotonicClock
-    from compd.errors import CompdError, Problem
+    from compd.errors import CompdError
     from compd.simulation import ControlClient
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -146,9 +140,7 @@ def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate
         except KeyboardInterrupt:
             pass  # the usual end
     if not len(looks):
-        raise CompdError(
-            Problem(where=str(out), what="the tracker has not looked once", next_step="let it look for longer")
-        )
+        raise CompdError.of(str(out), "the tracker has not looked once", next_step="let it look for longer")
     if not apart_mm:
         return ""
     rms_um = float(np.sqrt(np.mean(np.square(apart_mm)))) * UM_PER_MM

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from compd.cli.paths import PathKind
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 
 _ROOT = Path(__file__).parents[3]
 # Directories in an installed package, and in a checkout with and without `make docs`.
@@ -42,12 +42,8 @@ def documentation_directory() -> Path:
     for place in _PLACES:
         if any((place / f"index{suffix}").is_file() for suffix in _SUFFIXES):
             return place
-    raise CompdError(
-        Problem(
-            where=str(_PLACES[0]),
-            what="the documentation is not there",
-            next_step="install compd again: every wheel has it",
-        )
+    raise CompdError.of(
+        str(_PLACES[0]), "the documentation is not there", next_step="install compd again: every wheel has it"
     )
 
 
@@ -71,14 +67,12 @@ def find_page(directory: Path, name: str) -> Path:
     ending = [page for page in pages if page.endswith(f"/{wanted}")]
     if len(ending) == 1:
         return pages[ending[0]]
-    raise CompdError(
-        Problem(
-            where="compd docs",
-            what="more than one page has this name" if ending else "there is no such page",
-            value=name,
-            allowed=", ".join(ending or _near(wanted, list(pages))),
-            next_step="name one of these, or leave the name out for the front page",
-        )
+    raise CompdError.of(
+        "compd docs",
+        "more than one page has this name" if ending else "there is no such page",
+        value=name,
+        allowed=", ".join(ending or _near(wanted, list(pages))),
+        next_step="name one of these, or leave the name out for the front page",
     )
 
 

@@ -85,15 +85,13 @@ def _report(came: Replacement, other: str) -> None:
 
 
 def _require_root() -> None:
-    from compd.errors import CompdError, Problem
+    from compd.errors import CompdError
 
     if os.geteuid():
-        raise CompdError(
-            Problem(
-                where="compd service",
-                what="changes files of the system, which this user may not",
-                value=f"user {os.geteuid()}",
-                allowed="root",
-                next_step="give the same command with sudo; --dry-run shows what install does",
-            )
+        raise CompdError.of(
+            "compd service",
+            "changes files of the system, which this user may not",
+            value=f"user {os.geteuid()}",
+            allowed="root",
+            next_step="give the same command with sudo; --dry-run shows what install does",
         )

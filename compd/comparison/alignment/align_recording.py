@@ -18,7 +18,7 @@ from compd.comparison.criteria import ComparisonCriteria, SpeedCriteria
 from compd.compensation import scales_of_command
 from compd.configuration import Configuration
 from compd.display_unit import ATTITUDE_LABELS
-from compd.errors import CompdError, Problem, RecordingError
+from compd.errors import CompdError, RecordingError
 from compd.machine_builder import build_model
 from compd.model import MachineModel, Prediction, observe
 from compd.model.effects import Observations
@@ -53,7 +53,7 @@ def recorded_observations(
     """
     if recording.reference is None:
         where = str(recording.path)
-        raise RecordingError(Problem(where=where, what="names no reference", next_step="add one with `compd join`"))
+        raise RecordingError.of(where, "names no reference", next_step="add one with `compd join`")
     starts = session_starts(recording)
     if model is None:
         return external_observations(recording, starts, criteria.speeds)
@@ -77,13 +77,11 @@ def align_observations(
     """
     assert recording.reference is not None
     if recording.target_P_mm is not None and (model is None or model.arrangement.on_plate):
-        raise RecordingError(
-            Problem(
-                where=f"{recording.sidecar.path} reference.reflectors",
-                what="are on the platform of a machine that carries its tool, and this recording's is none",
-                allowed="machines of which the platform carries the tool",
-                next_step="make a recording of each reflector by itself",
-            )
+        raise RecordingError.of(
+            f"{recording.sidecar.path} reference.reflectors",
+            "are on the platform of a machine that carries its tool, and this recording's is none",
+            allowed="machines of which the platform carries the tool",
+            next_step="make a recording of each reflector by itself",
         )
     if held and part_of is None:
         _check_held(recording, model, held)
@@ -119,7 +117,7 @@ def align_observations(
         )
     measured_mm = recording.reference_mm
     if measured_mm is None:
-        raise RecordingError(Problem(where=str(recording.path), what="has no column of the reference"))
+        raise RecordingError.of(str(recording.path), "has no column of the reference")
     axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
     registration = None if part_of is None else part_of.registration
     target = None if part_of is None else part_of.target
@@ -190,14 +188,12 @@ def _check_held(recording: Recording, model: MachineModel | None, held: frozense
     fitted |= HELD["target.place"] if instrument and attitude else frozenset()
     fitted |= HELD["target.attitude"] if attitude else frozenset()
     if idle := held - fitted:
-        raise CompdError(
-            Problem(
-                where=str(recording.path),
-                what="has nothing of a registration that these numbers are of: holding them changes nothing",
-                value=", ".join(sorted(idle)),
-                allowed=", ".join(sorted(fitted)) or "none: the reference is in the machine's frame, without attitudes",
-                next_step="leave them out of what is held",
-            )
+        raise CompdError.of(
+            str(recording.path),
+            "has nothing of a registration that these numbers are of: holding them changes nothing",
+            value=", ".join(sorted(idle)),
+            allowed=", ".join(sorted(fitted)) or "none: the reference is in the machine's frame, without attitudes",
+            next_step="leave them out of what is held",
         )
 
 
@@ -308,13 +304,11 @@ def _scales_mm(recording: Recording, model: MachineModel) -> FloatArray:
         return recording.scale_mm
     if recording.commanded_mm is not None:
         return scales_of_command(model, recording.commanded_mm, recording.commanded_rotation_rad)
-    raise RecordingError(
-        Problem(
-            where=str(recording.path),
-            what="has neither scale columns nor a commanded pose",
-            allowed="scale_1_mm ..., or commanded_x_mm ...",
-            next_step="a machine's recording needs one of the two; `machine: external` needs none",
-        )
+    raise RecordingError.of(
+        str(recording.path),
+        "has neither scale columns nor a commanded pose",
+        allowed="scale_1_mm ..., or commanded_x_mm ...",
+        next_step="a machine's recording needs one of the two; `machine: external` needs none",
     )
 
 

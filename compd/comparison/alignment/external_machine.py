@@ -17,7 +17,7 @@ from compd.arrays import BoolArray, FloatArray
 from compd.columns import is_sensitivity
 from compd.comparison.alignment.velocity import velocities
 from compd.comparison.criteria import SpeedCriteria
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.model import Deltas, observe_external
 from compd.model.effects import Observations
 from compd.model.kinematics import Movement
@@ -30,13 +30,11 @@ def external_prediction(recording: Recording) -> FloatArray:
     """(N, m) what the user's own model predicts for each measured coordinate."""
     predicted = recording.model_mm if recording.model_link_mm is None else recording.model_link_mm
     if predicted is None:
-        raise RecordingError(
-            Problem(
-                where=str(recording.path),
-                what="`machine: external`, but no column of the model's prediction",
-                allowed="model_x_mm ...",
-                next_step="add the model's prediction, or name the machine",
-            )
+        raise RecordingError.of(
+            str(recording.path),
+            "`machine: external`, but no column of the model's prediction",
+            allowed="model_x_mm ...",
+            next_step="add the model's prediction, or name the machine",
         )
     return np.asarray(predicted)
 

@@ -70,13 +70,11 @@ class FixedEnds:
         of_row = _indices(end, self.number)
         unknown = np.unique(end[(end >= 0) & (of_row < 0)])
         if len(unknown):
-            raise RecordingError(
-                Problem(
-                    where=where,
-                    what=f"too few rows have {', '.join(name(int(number)) for number in unknown[:5])}: none is among "
-                    "the rows that were drawn as a sample",
-                    next_step="exclude these rows, or make a recording of them by itself",
-                )
+            raise RecordingError.of(
+                where,
+                f"too few rows have {', '.join(name(int(number)) for number in unknown[:5])}: none is among "
+                "the rows that were drawn as a sample",
+                next_step="exclude these rows, or make a recording of them by itself",
             )
         return replace(self, of_row=of_row)
 
@@ -131,7 +129,7 @@ def place_balls(
         if (problem := _why_no_ball(tip_mm[known & (end == number)], absolute, name(int(number)), where))
     ]
     if not len(numbers):
-        problems = [Problem(where=where, what="has no row with a distance and a pose", next_step="measure some")]
+        problems = [Problem(where, "has no row with a distance and a pose", next_step="measure some")]
     if problems:
         raise RecordingError(problems)
     places, added = [], []
@@ -156,8 +154,8 @@ def place_pins(tip_mm: FloatArray, end: IntArray, name: Callable[[int], str], wh
     known = (end >= 0) & np.isfinite(tip_mm).all(axis=1)
     numbers = np.unique(end[known])
     if not len(numbers):
-        raise RecordingError(
-            Problem(where=where, what="has no row with a pin and a pose", next_step="name the pin of each row in `pin`")
+        raise RecordingError.of(
+            where, "has no row with a pin and a pose", next_step="name the pin of each row in `pin`"
         )
     places = np.array([np.median(tip_mm[known & (end == number)], axis=0) for number in numbers])
     names = tuple(name(int(number)) for number in numbers)
@@ -176,8 +174,8 @@ def _why_no_ball(tip_mm: FloatArray, absolute: bool, name: str, where: str) -> P
     if len(tip_mm) > parameters:
         return None
     return Problem(
-        where=where,
-        what=f"{name} has {len(tip_mm)} rows, and {parameters} numbers are fitted for it",
+        where,
+        f"{name} has {len(tip_mm)} rows, and {parameters} numbers are fitted for it",
         allowed=f"{parameters + 1} rows or more",
         next_step="measure more places from it, or exclude its rows",
     )
@@ -192,8 +190,8 @@ def _beside_plane(tip_mm: FloatArray, place_mm: FloatArray, name: str, where: st
     if sizes[2] > PLANE_SHARE * sizes[0] or height_mm <= PLANE_SHARE * width_mm:
         return None
     return Problem(
-        where=where,
-        what=f"all places measured from {name} lie in one plane, so that it may be on either side of it",
+        where,
+        f"all places measured from {name} lie in one plane, so that it may be on either side of it",
         value=f"{height_mm:.3g} mm beside the plane",
         allowed="places at several heights, or all in a plane through the ball",
         next_step="measure some places nearer to the ball's pole",

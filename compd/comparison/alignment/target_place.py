@@ -22,7 +22,7 @@ from compd.arrays import BoolArray, FloatArray
 from compd.comparison.alignment.measured_attitude import measured_attitude, target_turn
 from compd.comparison.alignment.registration import Registration, register, registration_columns
 from compd.comparison.criteria import ComparisonCriteria
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.statistics import MIN_SIGMA, robust_sigma
 
 ROUNDS = 20
@@ -43,13 +43,11 @@ def held_numbers(names: Iterable[str]) -> frozenset[str]:
     names = list(names)
     single = HELD["frame"] | HELD["target"]
     if unknown := [name for name in names if name not in HELD and name not in single]:
-        raise CompdError(
-            Problem(
-                where="hold",
-                what="is no part of a registration",
-                value=", ".join(unknown),
-                allowed=", ".join([*HELD, *sorted(single)]),
-            )
+        raise CompdError.of(
+            "hold",
+            "is no part of a registration",
+            value=", ".join(unknown),
+            allowed=", ".join([*HELD, *sorted(single)]),
         )
     return frozenset(number for name in names for number in HELD.get(name, frozenset({name})))
 

@@ -15,7 +15,7 @@ from compd.comparison.alignment.target_place import held_numbers
 from compd.comparison.criteria import ComparisonCriteria
 from compd.comparison.stream.recording_stream import Block, RecordingStream
 from compd.comparison.thinning import SEED
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.machine_builder import build_model
 from compd.model import MachineModel
 from compd.model.effects import Observations
@@ -86,7 +86,7 @@ def draw_sample(
         end_s = float(part.time_s[-1])
         progress(count)
     if not recordings:
-        raise RecordingError(Problem(where=str(stream.path), what="has no rows", next_step="record some"))
+        raise RecordingError.of(str(stream.path), "has no rows", next_step="record some")
     recording = replace(recordings[0].extended_by(*recordings[1:]), left_out=dict(left_out))
     rows = observations[0].extended_by(*observations[1:])
     rows = replace(rows, session_start=session_starts(recording))

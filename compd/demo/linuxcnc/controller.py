@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from compd.configuration import shipped_configuration
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 
 # User for LinuxCNC, which refuses to run as root: present in every Debian, without files of its own.
 ORDINARY_USER = "nobody"
@@ -95,7 +95,7 @@ class LinuxCnc:
 
     def __enter__(self) -> Self:
         if reason := obstacle():
-            raise DaemonError(Problem(where="LinuxCNC", what="cannot be started", next_step=reason))
+            raise DaemonError.of("LinuxCNC", "cannot be started", next_step=reason)
         self._write_files()
         with (self.directory / "output.log").open("wb") as log:
             self._process = subprocess.Popen(
@@ -308,4 +308,4 @@ class LinuxCnc:
     def _problem(self, what: str) -> DaemonError:
         log = self.directory / "output.log"
         tail = log.read_text(errors="replace")[-3000:] if log.exists() else ""
-        return DaemonError(Problem(where="LinuxCNC", what=what, next_step=f"read what it printed:\n{tail}"))
+        return DaemonError.of("LinuxCNC", what, next_step=f"read what it printed:\n{tail}")

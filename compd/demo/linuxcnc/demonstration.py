@@ -22,7 +22,7 @@ from compd.demo.linuxcnc.motion_log import MotionSample, TipErrors, read_motion_
 from compd.demo.machine_zero import take_zero
 from compd.demo.processes import Command, run_commands
 from compd.demo.simulated_daemon import simulated_daemon
-from compd.errors import CompdError, DaemonError, Problem
+from compd.errors import CompdError, DaemonError
 from compd.gauge import Quality
 from compd.simulation import ControlClient, Mechanism
 
@@ -234,9 +234,5 @@ def _compd(*arguments: str) -> str:
         [sys.executable, "-P", "-m", "compd", *arguments], capture_output=True, text=True, check=False
     )
     if result.returncode:
-        raise CompdError(
-            Problem(
-                where=f"compd {' '.join(arguments)}", what="failed", next_step=f"read what it says:\n{result.stderr}"
-            )
-        )
+        raise CompdError.of(f"compd {' '.join(arguments)}", "failed", next_step=f"read what it says:\n{result.stderr}")
     return result.stdout

@@ -61,8 +61,8 @@ def row_splits(aligned: AlignedRecording, criteria: FoldCriteria = FoldCriteria(
 def _undivided(aligned: AlignedRecording, name: str, criteria: FoldCriteria) -> Problem:
     by_place = f"the tip moves along two axes, and {2 * criteria.sectors} places were measured"
     return Problem(
-        where=f"{aligned.recording.sidecar.path} folds",
-        what="does not divide the rows",
+        f"{aligned.recording.sidecar.path} folds",
+        "does not divide the rows",
         value=name,
         allowed=by_place if name == PLACE else "a column with two values or more, `time` or `place`",
         next_step="name another column, or delete `folds:`",

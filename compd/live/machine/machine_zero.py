@@ -100,12 +100,10 @@ class MachineZero:
             directory.mkdir(parents=True, exist_ok=True)
             write_files({**_old_file(directory), path: text})
         except OSError as error:
-            raise StateError(
-                Problem(
-                    where=str(path),
-                    what=f"machine zero cannot be written: {error.strerror}",
-                    next_step="make the state directory writable for the daemon's user, then take zero again",
-                )
+            raise StateError.of(
+                str(path),
+                f"machine zero cannot be written: {error.strerror}",
+                next_step="make the state directory writable for the daemon's user, then take zero again",
             ) from error
         return path
 
@@ -161,28 +159,22 @@ def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> Mac
     try:
         content = json.loads(read_small_file(path, _MAX_FILE_BYTES).decode())
     except FileNotFoundError as error:
-        raise StateError(
-            Problem(where=str(path), what="machine zero has never been taken", next_step=_TAKE_ONE)
-        ) from error
+        raise StateError.of(str(path), "machine zero has never been taken", next_step=_TAKE_ONE) from error
     except OSError as error:
-        raise StateError(Problem(where=str(path), what=f"machine zero cannot be read: {error.strerror}")) from error
+        raise StateError.of(str(path), f"machine zero cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        raise StateError(
-            Problem(where=str(path), what=f"machine zero is not JSON: {error}", next_step=_TAKE_ONE)
-        ) from error
+        raise StateError.of(str(path), f"machine zero is not JSON: {error}", next_step=_TAKE_ONE) from error
     zero = _parse_zero(content, path)
     if zero.zero_hash != zero_hash:
-        raise StateError(
-            Problem(
-                where=str(path),
-                what="machine zero was taken with another geometry, gauges or wiring",
-                value=zero.zero_hash,
-                allowed=zero_hash,
-                next_step=_TAKE_ONE,
-            )
+        raise StateError.of(
+            str(path),
+            "machine zero was taken with another geometry, gauges or wiring",
+            value=zero.zero_hash,
+            allowed=zero_hash,
+            next_step=_TAKE_ONE,
         )
     if missing := sorted(set(channels) - set(zero.readings_mm)):
-        raise StateError(Problem(where=str(path), what=f"machine zero lacks {', '.join(missing)}", next_step=_TAKE_ONE))
+        raise StateError.of(str(path), f"machine zero lacks {', '.join(missing)}", next_step=_TAKE_ONE)
     return zero
 
 
@@ -191,14 +183,12 @@ def _parse_zero(content: Any, path: Path) -> MachineZero:
     if not ZERO_FILE.recognises(content):
         raise StateError(ZERO_FILE.refused(path))
     if isinstance(content, dict) and isinstance(version := content.get("format"), int) and version > _FORMAT:
-        raise StateError(
-            Problem(
-                where=str(path),
-                what="was written by a later release of compd",
-                value=f"format {version}",
-                allowed=f"format {_FORMAT}",
-                next_step="install that release, or move the file away and take machine zero with this one",
-            )
+        raise StateError.of(
+            str(path),
+            "was written by a later release of compd",
+            value=f"format {version}",
+            allowed=f"format {_FORMAT}",
+            next_step="install that release, or move the file away and take machine zero with this one",
         )
     try:
         file = _ZeroFile.model_validate(content)
@@ -206,8 +196,8 @@ def _parse_zero(content: Any, path: Path) -> MachineZero:
         raise StateError(
             [
                 Problem(
-                    where=": ".join([str(path), *map(str, detail["loc"])]),
-                    what=f"is not a machine zero: {detail['msg']}",
+                    ": ".join([str(path), *map(str, detail["loc"])]),
+                    f"is not a machine zero: {detail['msg']}",
                     next_step=_TAKE_ONE,
                 )
                 for detail in error.errors(include_url=False)
@@ -217,13 +207,11 @@ def _parse_zero(content: Any, path: Path) -> MachineZero:
     if file.format == 1:
         log.warning("machine zero has no checksum: what was changed in it cannot be seen", path=str(path))
     elif file.checksum != (checksum := checksum_of(zero._kept)):
-        raise StateError(
-            Problem(
-                where=str(path),
-                what="was changed after it was written: its checksum does not fit",
-                value=file.checksum or "no checksum",
-                allowed=checksum,
-                next_step=f"{_TAKE_ONE}; the one before it is in {OLD_FILE_NAME}",
-            )
+        raise StateError.of(
+            str(path),
+            "was changed after it was written: its checksum does not fit",
+            value=file.checksum or "no checksum",
+            allowed=checksum,
+            next_step=f"{_TAKE_ONE}; the one before it is in {OLD_FILE_NAME}",
         )
     return zero

@@ -46,12 +46,10 @@ class ModelText(NamedTuple):
         try:
             return cls(str(path), read_small_file(path, MAX_BYTES))
         except OSError as error:
-            raise StateError(
-                Problem(
-                    where=str(path),
-                    what=f"cannot be read: {error.strerror or error}",
-                    next_step="give the absolute path of a model file that the daemon's user may read",
-                )
+            raise StateError.of(
+                str(path),
+                f"cannot be read: {error.strerror or error}",
+                next_step="give the absolute path of a model file that the daemon's user may read",
             ) from error
 
     @property
@@ -265,8 +263,8 @@ class ModelLoader:
         problems = [problem for fitted in live for problem in unmet_needs(fitted.effect, available, model.links)]
         return problems + [
             Problem(
-                where=f"effect {fitted.effect.id}",
-                what="reads time_s, which counts from the start of a recording",
+                f"effect {fitted.effect.id}",
+                "reads time_s, which counts from the start of a recording",
                 next_step="write it with what changes in that time, a temperature for instance",
             )
             for fitted in live
@@ -278,14 +276,14 @@ def _id_and_value_problems(effects: tuple[FittedEffect, ...]) -> list[Problem]:
     """Ids that cannot be told apart in `sources_mm` of a setpoint, and parameters that are not finite."""
     ids = [fitted.effect.id for fitted in effects]
     problems = [
-        Problem(where=f"effect {name}", what="is in the model twice", next_step="remove one of them")
+        Problem(f"effect {name}", "is in the model twice", next_step="remove one of them")
         for name in dict.fromkeys(ids)
         if ids.count(name) > 1
     ]
     problems += [
         Problem(
-            where=f"effect {name}",
-            what="has the name of a part of the correction",
+            f"effect {name}",
+            "has the name of a part of the correction",
             value=name,
             allowed="another id",
             next_step="rename it",
@@ -295,8 +293,8 @@ def _id_and_value_problems(effects: tuple[FittedEffect, ...]) -> list[Problem]:
     ]
     return problems + [
         Problem(
-            where=f"effect {fitted.effect.id}",
-            what="has a parameter or constant that is not a finite number",
+            f"effect {fitted.effect.id}",
+            "has a parameter or constant that is not a finite number",
             next_step="fit it again with `compd effect fit`",
         )
         for fitted in effects
@@ -310,8 +308,8 @@ def _implausible_numbers(file: ModelFile) -> list[Problem]:
     determined = {number.effect for number in numbers if not (number.undetermined or number.searched)}
     return [
         Problem(
-            where=f"effect {number.effect}, {number.parameter}",
-            what="is not plausible",
+            f"effect {number.effect}, {number.parameter}",
+            "is not plausible",
             value=f"{number.value:g} {number.unit}, standard error {number.standard_error:g}",
             allowed=f"{number.plausible_low:g} to {number.plausible_high:g} {number.unit}, with a smaller error",
             next_step="fit it again with `compd effect fit`; where it is meant, write the range under the effect: "
@@ -327,8 +325,8 @@ def _implausible_ranges(file: ModelFile) -> list[Problem]:
     limits = {name: limit for name in file.fitted_range if (limit := limit_of(name)) is not None}
     return [
         Problem(
-            where=f"fitted_range, {name}",
-            what="was not plausible in the recording that the effects were fitted on",
+            f"fitted_range, {name}",
+            "was not plausible in the recording that the effects were fitted on",
             value=f"{file.fitted_range[name][0]:g} to {file.fitted_range[name][1]:g}",
             allowed=f"{limit.low:g} to {limit.high:g}: {limit.why}",
             next_step="leave these rows out of the recording, and fit it again with `compd effect fit`",
@@ -362,8 +360,6 @@ def try_model(machine: MachineModel, names: tuple[str, ...], where: str) -> None
         _, warm = compensate_cmm(machine, values, WarmStart.at_zero(machine))
         compensate_machine_tool(machine, target_mm, None, values._replace(time_s=1.0), warm)
     except (Exception, SystemExit) as error:  # an effect of a user's own code may do anything
-        raise StateError(
-            Problem(
-                where=where, what=f"an effect fails: {type(error).__name__}: {error}", next_step="mend it, or remove it"
-            )
+        raise StateError.of(
+            where, f"an effect fails: {type(error).__name__}: {error}", next_step="mend it, or remove it"
         ) from error

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import structlog
 
 from compd.clock import Clock
-from compd.errors import CompdError, Problem, StateError
+from compd.errors import CompdError, StateError
 from compd.live.loop import (
     AdoptedModels,
     Commands,
@@ -149,7 +149,7 @@ class LoopProcess:
         """Raise StateError where machine zero lacks a quantity from which an effect of the model counts."""
         zero = self.commands.zero
         if model is not None and isinstance(zero, MachineZero) and (missing := model.missing_at_zero(zero)):
-            raise StateError(Problem(where=model.file, what=missing))
+            raise StateError.of(model.file, missing)
 
     def _loop(self) -> Loop:
         packer = CyclePacker(Directions(self.settings.wires.scale.wires))
@@ -222,13 +222,11 @@ def _shadow_applied(models: Models, hash_: str) -> Models:
     """The shadow in the place of the applied model. Raises StateError where none of this hash runs as the shadow."""
     shadow = models.shadow
     if shadow is None or shadow.hash != hash_:
-        raise StateError(
-            Problem(
-                where="shadow",
-                what="no model of this hash runs as the shadow",
-                value=hash_,
-                allowed="none runs" if shadow is None else shadow.hash,
-                next_step="let the model run as the shadow, and look at it, before it is applied",
-            )
+        raise StateError.of(
+            "shadow",
+            "no model of this hash runs as the shadow",
+            value=hash_,
+            allowed="none runs" if shadow is None else shadow.hash,
+            next_step="let the model run as the shadow, and look at it, before it is applied",
         )
     return Models(shadow)

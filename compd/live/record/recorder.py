@@ -31,7 +31,7 @@ from pathlib import Path
 
 from compd.clock import Clock
 from compd.configuration import Configuration
-from compd.errors import CompdError, Problem, RecordingError, StateError
+from compd.errors import CompdError, RecordingError, StateError
 from compd.live.record.part_table import close_left_parts
 from compd.live.record.readings_feed import FeedItem
 from compd.live.record.recording_part import ORDER, RecordingPart
@@ -60,14 +60,12 @@ class RecordingLimits:
 
     def __post_init__(self) -> None:
         if self.drop_oldest and self.part_bytes > self.limit_bytes // 2:
-            raise RecordingError(
-                Problem(
-                    where="the size of a part",
-                    what="leaves nothing when the oldest is dropped",
-                    value=f"{self.part_bytes} bytes",
-                    allowed=f"half of the limit at most, {self.limit_bytes // 2} bytes",
-                    next_step="make the parts smaller, or the limit larger",
-                )
+            raise RecordingError.of(
+                "the size of a part",
+                "leaves nothing when the oldest is dropped",
+                value=f"{self.part_bytes} bytes",
+                allowed=f"half of the limit at most, {self.limit_bytes // 2} bytes",
+                next_step="make the parts smaller, or the limit larger",
             )
 
 
@@ -101,10 +99,8 @@ class Recorder:
         if table_format is TableFormat.PARQUET:
             arrow_modules(name.with_name(f"{name.name}{PARQUET}"))
         if existing := sorted(name.parent.glob(f"{name.name}-[0-9][0-9][0-9][0-9]*.*")):
-            raise RecordingError(
-                Problem(
-                    where=str(existing[0]), what="is there already", next_step="choose another name, or move it away"
-                )
+            raise RecordingError.of(
+                str(existing[0]), "is there already", next_step="choose another name, or move it away"
             )
         self.dropped = 0
         self.missing = 0
@@ -194,13 +190,11 @@ class Recorder:
         except CompdError as failure:
             self._failure = failure
         except OSError as error:
-            self._failure = RecordingError(
-                Problem(
-                    where=str(self._name.parent),
-                    what=f"cannot be written to: {error.strerror}",
-                    next_step="what was written before is whole, every row with its cycle; make room, and record "
-                    "under another name",
-                )
+            self._failure = RecordingError.of(
+                str(self._name.parent),
+                f"cannot be written to: {error.strerror}",
+                next_step="what was written before is whole, every row with its cycle; make room, and record "
+                "under another name",
             )
 
     def _write_until_stopped(self) -> None:
@@ -246,12 +240,10 @@ class Recorder:
         """
         message = item.message
         if "zero" not in message:
-            raise StateError(
-                Problem(
-                    where="the daemon",
-                    what="has no machine zero, from which a recording's columns count",
-                    next_step="take it with `compd zero`, then record",
-                )
+            raise StateError.of(
+                "the daemon",
+                "has no machine zero, from which a recording's columns count",
+                next_step="take it with `compd zero`, then record",
             )
         if not self._parts:
             self._origin_s = message["time_s"]
@@ -297,13 +289,11 @@ class Recorder:
         """Delete the oldest parts, or raise RecordingError to end the recording."""
         limit = f"{self._limits.limit_bytes / 1e6:g} MB"
         if not self._limits.drop_oldest:
-            raise RecordingError(
-                Problem(
-                    where=str(self._name),
-                    what="the recording has reached its limit on disk and ends here",
-                    value=limit,
-                    next_step="give a larger limit, or let the oldest part be dropped",
-                )
+            raise RecordingError.of(
+                str(self._name),
+                "the recording has reached its limit on disk and ends here",
+                value=limit,
+                next_step="give a larger limit, or let the oldest part be dropped",
             )
         while self._total_bytes() > self._limits.limit_bytes and len(self._parts) > 1:
             oldest = self._parts.pop(0)

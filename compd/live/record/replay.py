@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from compd.columns import SKEW_COLUMN
 from compd.configuration import Configuration
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.kernel_versions import versions_text, versions_text_here
 from compd.link_count import scale_count
 from compd.live.loop import (
@@ -85,13 +85,11 @@ class RecordedCycles:
         self.version: Message = {}
         self.orders: list[Message] = []
         if not self.paths:
-            raise RecordingError(
-                Problem(
-                    where=str(path),
-                    what="is not there, nor parts of it",
-                    allowed=f"a recording by `compd record` (NAME-0001{CYCLES_SUFFIX} beside NAME-0001.csv)",
-                    next_step="give its name",
-                )
+            raise RecordingError.of(
+                str(path),
+                "is not there, nor parts of it",
+                allowed=f"a recording by `compd record` (NAME-0001{CYCLES_SUFFIX} beside NAME-0001.csv)",
+                next_step="give its name",
             )
 
     def config_hashes(self) -> set[str]:
@@ -215,12 +213,10 @@ def _recorded_cycle(where: str, message: Message, channels: Sequence[str], links
     """The cycle in a READINGS message. Raises RecordingError for a damaged message, or one of another machine."""
     try:
         if missing := [channel for channel in channels if channel not in message["readings"]]:
-            raise RecordingError(
-                Problem(
-                    where=where,
-                    what=f"has no reading of {', '.join(missing)}",
-                    next_step="give the configuration with which it was recorded",
-                )
+            raise RecordingError.of(
+                where,
+                f"has no reading of {', '.join(missing)}",
+                next_step="give the configuration with which it was recorded",
             )
         recorded = parse_readings(message, channels)
         if links and len(recorded.state.correction_mm) != links:
@@ -232,14 +228,12 @@ def _recorded_cycle(where: str, message: Message, channels: Sequence[str], links
 
 def _model(where: str, hash_: str, models: Mapping[str, LiveModel]) -> LiveModel:
     if hash_ not in models:
-        raise RecordingError(
-            Problem(
-                where=where,
-                what="was computed with a model file that is not given",
-                value=hash_,
-                allowed=", ".join(filter(None, models)) or "none is given",
-                next_step="give it with `--model`",
-            )
+        raise RecordingError.of(
+            where,
+            "was computed with a model file that is not given",
+            value=hash_,
+            allowed=", ".join(filter(None, models)) or "none is given",
+            next_step="give it with `--model`",
         )
     return models[hash_]
 
@@ -258,8 +252,6 @@ def _whole_lines(path: Path, but_for: bytes | None = None) -> int:
 
 
 def _damaged(where: str, what: str) -> RecordingError:
-    return RecordingError(
-        Problem(
-            where=where, what=f"is no READINGS message as the daemon sends it: {what}", next_step="restore the file"
-        )
+    return RecordingError.of(
+        where, f"is no READINGS message as the daemon sends it: {what}", next_step="restore the file"
     )

@@ -72,12 +72,10 @@ def listen_tcp(host: str, port: int) -> socket.socket:
             (host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET, backlog=_BACKLOG
         )
     except OSError as error:
-        raise DaemonError(
-            Problem(
-                where=f"sockets.tcp {host}:{port}",
-                what=f"cannot listen: {error.strerror}",
-                next_step="is another compd running? choose another port, or an address of this computer",
-            )
+        raise DaemonError.of(
+            f"sockets.tcp {host}:{port}",
+            f"cannot listen: {error.strerror}",
+            next_step="is another compd running? choose another port, or an address of this computer",
         ) from error
 
 
@@ -95,11 +93,7 @@ def listen_unix(path: Path) -> socket.socket:
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         if _is_alive(path):
-            raise DaemonError(
-                Problem(
-                    where=f"sockets.unix {path}", what="another daemon is listening here", next_step="stop it first"
-                )
-            )
+            raise DaemonError.of(f"sockets.unix {path}", "another daemon is listening here", next_step="stop it first")
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished.unlink(missing_ok=True)
         listener.bind(str(unfinished))
@@ -108,12 +102,10 @@ def listen_unix(path: Path) -> socket.socket:
         unfinished.rename(path)
     except OSError as error:
         listener.close()
-        raise DaemonError(
-            Problem(
-                where=f"sockets.unix {path}",
-                what=f"cannot listen: {error.strerror or error}",
-                next_step="give a path in a directory that the daemon's user may write",
-            )
+        raise DaemonError.of(
+            f"sockets.unix {path}",
+            f"cannot listen: {error.strerror or error}",
+            next_step="give a path in a directory that the daemon's user may write",
         ) from error
     except DaemonError:
         listener.close()
@@ -128,11 +120,11 @@ def unix_path_problem(path: Path) -> Problem | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        return Problem(where=f"sockets.unix {path}", what=f"cannot be used: {error.strerror}", next_step=_OTHER_PATH)
+        return Problem(f"sockets.unix {path}", f"cannot be used: {error.strerror}", next_step=_OTHER_PATH)
     if is_socket:
         return None
     what = "there is a file of another kind, which is not replaced"
-    return Problem(where=f"sockets.unix {path}", what=what, allowed="no file, or a socket", next_step=_OTHER_PATH)
+    return Problem(f"sockets.unix {path}", what, allowed="no file, or a socket", next_step=_OTHER_PATH)
 
 
 def _identity(path: Path) -> tuple[int, int]:

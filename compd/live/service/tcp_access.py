@@ -8,7 +8,7 @@ import os
 import stat
 from pathlib import Path
 
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 from compd.files import read_small_file
 from compd.operation_settings import TcpSocket
 
@@ -57,7 +57,7 @@ def read_token(path: Path) -> bytes:
     def refused(what: str, value: str = "", allowed: str = "") -> DaemonError:
         next_step = _MAKE_ONE.format(path=path)
         where = f"sockets.tcp.token_file {path}"
-        return DaemonError(Problem(where=where, what=what, value=value, allowed=allowed, next_step=next_step))
+        return DaemonError.of(where, what, value=value, allowed=allowed, next_step=next_step)
 
     try:
         status = path.stat()

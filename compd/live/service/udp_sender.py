@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 from typing import Any
 
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 from compd.live.loop import Setpoint
 from compd.operation_settings import UdpTarget
 
@@ -21,13 +21,11 @@ class UdpSender:
         try:
             family, kind, protocol, _, address = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_DGRAM)[0]
         except OSError as error:
-            raise DaemonError(
-                Problem(
-                    where="sockets.udp.host",
-                    what=f"has no address: {error.strerror}",
-                    value=target.host,
-                    next_step="write the controller's IP address",
-                )
+            raise DaemonError.of(
+                "sockets.udp.host",
+                f"has no address: {error.strerror}",
+                value=target.host,
+                next_step="write the controller's IP address",
             ) from error
         self._address: Any = address
         self._socket = socket.socket(family, kind, protocol)

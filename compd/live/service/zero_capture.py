@@ -13,7 +13,7 @@ import numpy as np
 import structlog
 
 from compd.clock import Clock
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.gauge import Quality
 from compd.live.loop import Commands
 from compd.live.machine import MachineWires, MachineZero
@@ -163,13 +163,11 @@ class ZeroCapture:
                 )
             # They are believed again before it is known whether zero can be taken: with the one until now their
             # readings would be wrong by whatever they have lost.
-            self._commands.zero = StateError(
-                Problem(
-                    where="machine zero",
-                    what="gauges were accepted in order to take it",
-                    value=", ".join(text.partition(" ")[0] for text in distrusted),
-                    next_step="where it was refused, take it again: `compd zero`",
-                )
+            self._commands.zero = StateError.of(
+                "machine zero",
+                "gauges were accepted in order to take it",
+                value=", ".join(text.partition(" ")[0] for text in distrusted),
+                next_step="where it was refused, take it again: `compd zero`",
             )
             self._accept_lengths()
             self._wait_until_believed()
@@ -223,12 +221,10 @@ class ZeroCapture:
         while True:
             snapshot = self._latest.snapshot(self._clock.monotonic())
             if lost := self._wires.lost(snapshot):
-                raise StateError(
-                    Problem(
-                        where="machine zero",
-                        what=f"not every gauge can be read: {lost}",
-                        next_step="mend the gauge, then take zero again",
-                    )
+                raise StateError.of(
+                    "machine zero",
+                    f"not every gauge can be read: {lost}",
+                    next_step="mend the gauge, then take zero again",
                 )
             for wire in self._wires.length_wires:
                 reading = snapshot.readings[wire.slot]
@@ -242,20 +238,16 @@ class ZeroCapture:
             if snapshot.time_s - start_s >= _WINDOW_S:
                 break
             if self._clock.wait(self._stop, _LOOK_EVERY_S):
-                raise StateError(
-                    Problem(where="machine zero", what="the daemon is stopping", next_step="take zero again")
-                )
+                raise StateError.of("machine zero", "the daemon is stopping", next_step="take zero again")
         for channel, readings in values_mm.items():
             spread_mm = max(readings.values()) - min(readings.values())
             if spread_mm > REST_TOLERANCE_MM:
-                raise StateError(
-                    Problem(
-                        where="machine zero",
-                        what=f"{channel} moved while zero was taken",
-                        value=f"{spread_mm:.4f} mm",
-                        allowed=f"{REST_TOLERANCE_MM:g} mm",
-                        next_step="let the machine stand still, then take zero again",
-                    )
+                raise StateError.of(
+                    "machine zero",
+                    f"{channel} moved while zero was taken",
+                    value=f"{spread_mm:.4f} mm",
+                    allowed=f"{REST_TOLERANCE_MM:g} mm",
+                    next_step="let the machine stand still, then take zero again",
                 )
         return _means(values_mm), {name: mean for name, mean in _means(quantities).items() if name not in not_good}
 

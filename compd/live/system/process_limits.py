@@ -53,8 +53,8 @@ def _require(*limits: _Limit) -> None:
         if allowed != resource.RLIM_INFINITY and allowed < limit.needed:
             problems.append(
                 Problem(
-                    where="limits of this process",
-                    what=f"the daemon needs more {limit.what} than it may have",
+                    "limits of this process",
+                    f"the daemon needs more {limit.what} than it may have",
                     value=str(allowed),
                     allowed=f"{limit.needed} or more",
                     next_step=f"`{limit.shell}` before the command, or {limit.unit} in the unit's [Service] section",
@@ -73,11 +73,9 @@ def exhaustion_named() -> Iterator[None]:
         used_up = isinstance(error, MemoryError) or _THREAD in str(error)
         if not used_up and getattr(error, "errno", None) not in (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EFBIG):
             raise
-        raise DaemonError(
-            Problem(
-                where="limits of this process",
-                what="memory, files or threads are used up",
-                value=str(error) or type(error).__name__,
-                next_step="`ulimit -a` shows the limits; raise the one that is low, or end what takes the rest",
-            )
+        raise DaemonError.of(
+            "limits of this process",
+            "memory, files or threads are used up",
+            value=str(error) or type(error).__name__,
+            next_step="`ulimit -a` shows the limits; raise the one that is low, or end what takes the rest",
         ) from error

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import BoolArray, FloatArray
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.link_count import scale_count
 from compd.model.effects.effect import Basis, BasisProgram, ConstantValues, Effect, Memory, Port
 from compd.model.effects.effect_needs import is_measured, needed_quantities
@@ -183,14 +183,12 @@ def unpack_memory(states: Sequence[int], packed: FloatArray) -> Memory:
 def row_structures(rows: Observations, chunk: slice) -> NDArray[np.void]:
     """These rows as kernels read them. Raises CompdError for a machine with more links than there is room for."""
     if rows.links > MAX_LINKS:
-        raise CompdError(
-            Problem(
-                where="rows for effects",
-                what="has too many links",
-                value=str(rows.links),
-                allowed=f"{MAX_LINKS} at most",
-                next_step="record the tip instead of the links' lengths",
-            )
+        raise CompdError.of(
+            "rows for effects",
+            "has too many links",
+            value=str(rows.links),
+            allowed=f"{MAX_LINKS} at most",
+            next_step="record the tip instead of the links' lengths",
         )
     structures = np.zeros(len(rows.time_s[chunk]), dtype=ROW)
     structures["links"], structures["scales"] = rows.links, scale_count(rows.links)

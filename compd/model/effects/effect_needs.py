@@ -112,8 +112,8 @@ def unmet_needs(
     """
     problems = [
         Problem(
-            where=f"effect {effect.id}",
-            what=f"needs {name}, which no gauge measures",
+            f"effect {effect.id}",
+            f"needs {name}, which no gauge measures",
             next_step=(name in effect.needs and _similar(name, available))
             or _gauge_to_add(name, "kinematics" in available),
         )
@@ -122,12 +122,12 @@ def unmet_needs(
     for need in effect.needs:
         if need in _NO_QUANTITIES and need not in available:
             missing, next_step = _NO_QUANTITIES[need]
-            problems.append(Problem(where=f"effect {effect.id}", what=f"needs {missing}", next_step=next_step))
+            problems.append(Problem(f"effect {effect.id}", f"needs {missing}", next_step=next_step))
     if at_zero is not None:
         problems += [
             Problem(
-                where=f"effect {effect.id}",
-                what=f"needs {name} as it was at machine zero, where it was not measured",
+                f"effect {effect.id}",
+                f"needs {name} as it was at machine zero, where it was not measured",
                 allowed=", ".join(sorted(at_zero)) or "nothing was measured there",
                 next_step="take machine zero again: `compd zero`; in a recording write it into its sidecar, under "
                 "`quantities_at_zero:`",
@@ -143,16 +143,14 @@ def unmet_needs(
         if not already:
             problems.append(
                 Problem(
-                    where=f"effect {effect.id}",
-                    what=f"acts at the port {what}",
-                    next_step=f"write {key} where the machine has it",
+                    f"effect {effect.id}", f"acts at the port {what}", next_step=f"write {key} where the machine has it"
                 )
             )
     if not _reaches_prediction(effect, available, links):
         problems.append(
             Problem(
-                where=f"effect {effect.id}",
-                what=f"acts at the port {effect.port}, which an external model has not",
+                f"effect {effect.id}",
+                f"acts at the port {effect.port}, which an external model has not",
                 allowed="effects at the ports "
                 + ", ".join(dict.fromkeys([*(["reference"] if OWN_POSE in available else []), *external_ports(links)])),
                 next_step="write a machine configuration",

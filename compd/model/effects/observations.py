@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compd.arrays import BoolArray, FloatArray, IntArray
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.link_count import LinkCount
 from compd.model.kinematics import Actuators, Arrangement, Contact, Mechanism, link_forces
 from compd.reference_conditions import standard_value, value_at_zero
@@ -154,14 +154,12 @@ class Observations:
     def __post_init__(self) -> None:
         refused = [name for name in self.quantities if name.startswith(ANSWER_PREFIXES)]
         if refused:
-            raise CompdError(
-                Problem(
-                    where="rows for effects",
-                    what="an effect must never see the answer",
-                    value=", ".join(refused),
-                    allowed="measured quantities only",
-                    next_step="leave these columns out",
-                )
+            raise CompdError.of(
+                "rows for effects",
+                "an effect must never see the answer",
+                value=", ".join(refused),
+                allowed="measured quantities only",
+                next_step="leave these columns out",
             )
 
     def __len__(self) -> int:
@@ -212,14 +210,12 @@ class Observations:
     def quantity(self, name: str) -> FloatArray:
         """(N,). Raises CompdError where it was not measured."""
         if name not in self.quantities:
-            raise CompdError(
-                Problem(
-                    where="rows for effects",
-                    what="this quantity is not measured",
-                    value=name,
-                    allowed=", ".join(sorted(self.quantities)) or "nothing is",
-                    next_step="add a gauge or a column of this name",
-                )
+            raise CompdError.of(
+                "rows for effects",
+                "this quantity is not measured",
+                value=name,
+                allowed=", ".join(sorted(self.quantities)) or "nothing is",
+                next_step="add a gauge or a column of this name",
             )
         return self.quantities[name]
 

@@ -10,7 +10,6 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.errors import Problem
 from compd.model import EffectMemory, MachineModel, observe_external
 from compd.model.effects import (
     AtZero,
@@ -201,12 +200,10 @@ def _pose(model: ExternalModel, scale_mm: FloatArray, settings: Mapping[str, flo
     if model.given is not None:
         return model.given
     if model.own is None:
-        raise OwnKinematicsError(
-            Problem(
-                where="kinematics: client",
-                what="no client has given the pose yet",
-                next_step="send `TARGET` with the pose, and with its derivatives where the machine has scales",
-            )
+        raise OwnKinematicsError.of(
+            "kinematics: client",
+            "no client has given the pose yet",
+            next_step="send `TARGET` with the pose, and with its derivatives where the machine has scales",
         )
     return own_pose(model.own, scale_mm, settings)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 
 # Step of the central differences, mm: their error is a third derivative times its square, some 1e-8 of a derivative on
 # a machine of some 100 mm, and rounding adds as little.
@@ -116,22 +116,18 @@ def given_pose(numbers: ArrayLike, rotation_rad: ArrayLike | None, by_scale: Arr
     tip_mm = np.asarray(numbers, dtype=float)
     rotation = np.full(3, np.nan) if rotation_rad is None else np.asarray(rotation_rad, dtype=float)
     if by_scale is None and links:
-        raise OwnKinematicsError(
-            Problem(
-                where="TARGET",
-                what="has no derivatives, by which effects of links are carried to the tip",
-                next_step=f"send `tip_by_scale`, 3 or 6 rows of {links} numbers",
-            )
+        raise OwnKinematicsError.of(
+            "TARGET",
+            "has no derivatives, by which effects of links are carried to the tip",
+            next_step=f"send `tip_by_scale`, 3 or 6 rows of {links} numbers",
         )
     rows = np.zeros((_TIP_AND_ROTATION, 0)) if by_scale is None else np.asarray(by_scale, dtype=float)
     if rows.shape not in {(_TIP, links), (_TIP_AND_ROTATION, links)}:
-        raise OwnKinematicsError(
-            Problem(
-                where="TARGET",
-                what="`tip_by_scale` has another shape than the machine",
-                value=str(rows.shape),
-                allowed=f"(3, {links}) or (6, {links})",
-            )
+        raise OwnKinematicsError.of(
+            "TARGET",
+            "`tip_by_scale` has another shape than the machine",
+            value=str(rows.shape),
+            allowed=f"(3, {links}) or (6, {links})",
         )
     return OwnPose(tip_mm, rotation, _completed(rows))
 
@@ -161,19 +157,17 @@ def _asked(
 
 
 def _failed(kinematics: Kinematics, what: str, error: BaseException) -> OwnKinematicsError:
-    return OwnKinematicsError(
-        Problem(where=_name(kinematics, what), what=f"fails: {type(error).__name__}: {error}", next_step="mend it")
+    return OwnKinematicsError.of(
+        _name(kinematics, what), f"fails: {type(error).__name__}: {error}", next_step="mend it"
     )
 
 
 def _wrong(kinematics: Kinematics, what: str, found: FloatArray, allowed: str) -> OwnKinematicsError:
-    return OwnKinematicsError(
-        Problem(
-            where=_name(kinematics, what),
-            what="gives no such numbers for these scales",
-            value=str(found.tolist()) if found.size <= _TIP_AND_ROTATION else f"shape {found.shape}",
-            allowed=allowed,
-        )
+    return OwnKinematicsError.of(
+        _name(kinematics, what),
+        "gives no such numbers for these scales",
+        value=str(found.tolist()) if found.size <= _TIP_AND_ROTATION else f"shape {found.shape}",
+        allowed=allowed,
     )
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.model import EffectMemory, deltas_by_effect, sum_deltas
 from compd.model.effects import needed_quantities
 from compd.model.external.external_model import ExternalModel, carried_to_pose, external_rows, moved_pose
@@ -44,14 +44,12 @@ def predict_external(model: ExternalModel, columns: Mapping[str, FloatArray]) ->
     needed = [name for name in effects if name not in model.columns and not name.startswith("d_")]
     required = dict.fromkeys([*scales, *model.settings, *given, *needed])
     if missing := [name for name in required if name not in columns]:
-        raise CompdError(
-            Problem(
-                where="rows",
-                what="lack columns",
-                value=", ".join(missing),
-                allowed=", ".join(required),
-                next_step="give them; without `kinematics` the pose stands in model_x_mm, model_y_mm, model_z_mm",
-            )
+        raise CompdError.of(
+            "rows",
+            "lack columns",
+            value=", ".join(missing),
+            allowed=", ".join(required),
+            next_step="give them; without `kinematics` the pose stands in model_x_mm, model_y_mm, model_z_mm",
         )
     count = len(next(iter(columns.values())))
     scale_mm = np.stack([columns[name] for name in scales], axis=1) if scales else np.zeros((count, 0))

@@ -55,15 +55,13 @@ def column_needs(name: str, port: Port) -> tuple[str, ...] | Problem:
         return ("scale",) if port == "scale" else ()
     per_link = name in OF_LINK or _PER_LINK_COLUMN.match(name) is not None
     if per_link and port not in PER_LINK:
-        return Problem(where="", what=f"is one per link, and the port {port} has no links", allowed=", ".join(ANYWHERE))
+        return Problem("", f"is one per link, and the port {port} has no links", allowed=", ".join(ANYWHERE))
     if per_link:
         needs = _NEEDS_OF_LINK.get(name, (name.replace("_link_", "_link_{link}_", 1),))
         return tuple(need.replace("{link}", "{scale}") for need in needs) if port == "scale" else needs
     if not _QUANTITY.match(name):
         columns = ", ".join((*ANYWHERE, *(OF_LINK if port in PER_LINK else ())))
-        return Problem(
-            where="", what="is no column", allowed=f"a measured quantity with its unit (humidity_pct), {columns}"
-        )
+        return Problem("", "is no column", allowed=f"a measured quantity with its unit (humidity_pct), {columns}")
     return (name,)
 
 

@@ -208,7 +208,7 @@ def _form_problems(declaration: FormulaDeclaration, where: str) -> list[Problem]
     """Of the keys that depend on one another: formula or sensitivity, port and axis."""
     if (declaration.formula is None) == (declaration.sensitivity is None):
         what = "is missing" if declaration.formula is None else "has a formula and a sensitivity"
-        return [Problem(where=f"{where}, formula", what=what, allowed="`formula:` or `sensitivity:`, one of them")]
+        return [Problem(f"{where}, formula", what, allowed="`formula:` or `sensitivity:`, one of them")]
     if declaration.sensitivity is not None:
         return []
     if isinstance(declaration.formula, str):
@@ -218,14 +218,14 @@ def _form_problems(declaration: FormulaDeclaration, where: str) -> list[Problem]
         if declaration.port in VECTORS:
             allowed = "x, y or z; or a formula for each axis, `formula: {x: ..., y: ...}`"
         what, value = f"does not fit the port {declaration.port}", str(declaration.axis or "")
-        return [Problem(where=f"{where}, axis", what=what, value=value, allowed=allowed)]
+        return [Problem(f"{where}, axis", what, value=value, allowed=allowed)]
     problems = []
     if declaration.axis is not None:
         what, step = "is said twice: the formulas name their axes", "remove `axis:`"
-        problems.append(Problem(where=f"{where}, axis", what=what, value=declaration.axis, next_step=step))
+        problems.append(Problem(f"{where}, axis", what, value=declaration.axis, next_step=step))
     if declaration.port not in VECTORS:
         what, allowed = f"the port {declaration.port} has no axes", "one formula, or the ports " + ", ".join(VECTORS)
-        problems.append(Problem(where=f"{where}, formula", what=what, allowed=allowed))
+        problems.append(Problem(f"{where}, formula", what, allowed=allowed))
     return problems
 
 
@@ -233,20 +233,20 @@ def _sensitivity_problems(declaration: FormulaDeclaration, where: str) -> list[P
     problems = []
     if declaration.port not in SENSITIVITY_PORTS:
         what, allowed = "has no sensitivity", ", ".join(SENSITIVITY_PORTS)
-        problems.append(Problem(where=f"{where}, port", what=what, value=declaration.port, allowed=allowed))
+        problems.append(Problem(f"{where}, port", what, value=declaration.port, allowed=allowed))
     for key in ("axis", "gives"):
         if key in declaration.model_fields_set:
             what, step = "does not belong to a sensitivity, whose columns are in mm along their axes", "remove it"
-            problems.append(Problem(where=f"{where}, {key}", what=what, next_step=step))
+            problems.append(Problem(f"{where}, {key}", what, next_step=step))
     parameters = declaration.parameters
     if len(parameters) != 1:
         what, allowed = "a sensitivity has one parameter", "one; write an effect for each"
-        problems.append(Problem(where=f"{where}, parameters", what=what, value=", ".join(parameters), allowed=allowed))
+        problems.append(Problem(f"{where}, parameters", what, value=", ".join(parameters), allowed=allowed))
     problems += [problem for name in parameters if (problem := _range_problem(declaration, name, where))]
     for name, parameter in parameters.items():
         if parameter.per == "link":
             place = f"{where}, parameters.{name}.per"
-            problems.append(Problem(where=place, what="a sensitivity has one value", value="link", allowed="machine"))
+            problems.append(Problem(place, "a sensitivity has one value", value="link", allowed="machine"))
     return problems
 
 
@@ -255,8 +255,8 @@ def _range_problem(declaration: FormulaDeclaration, name: str, where: str) -> Pr
     if low < high:
         return None
     return Problem(
-        where=f"{where}, parameters.{name}",
-        what="the plausible range is empty",
+        f"{where}, parameters.{name}",
+        "the plausible range is empty",
         value=f"[{low:g}, {high:g}]",
         allowed="[low, high], low < high",
     )
@@ -273,20 +273,20 @@ def _parameter_problems(declaration: FormulaDeclaration, formulas: tuple[Formula
             problems.append(problem)
         if name in (*OF_LINK, *OF_READING, *ANYWHERE, *NUMBERS):
             what = "this name is a number's" if name in NUMBERS else "this name is a column's"
-            problems.append(Problem(where=place, what=what, value=name, next_step="call the parameter otherwise"))
+            problems.append(Problem(place, what, value=name, next_step="call the parameter otherwise"))
         if parameter.per == "link" and (name in constants or declaration.port not in PER_LINK):
             allowed = f"a parameter that the formula is proportional to, at {', '.join(PER_LINK)}"
-            problems.append(Problem(where=place, what="cannot be one per link", value=name, allowed=allowed))
+            problems.append(Problem(place, "cannot be one per link", value=name, allowed=allowed))
         is_exponent = any(re.search(rf"\*\*\s*{name}\b", text) for text in texts)
         if is_exponent and max(abs(low), abs(high)) > MAX_EXPONENT:
             allowed = f"within +-{MAX_EXPONENT:g}"
-            problems.append(Problem(where=place, what="is an exponent", value=f"[{low:g}, {high:g}]", allowed=allowed))
+            problems.append(Problem(place, "is an exponent", value=f"[{low:g}, {high:g}]", allowed=allowed))
         is_time_constant = name in constants and any(
             formula.lags and re.search(rf",\s*{name}\s*\)", formula.text) for formula in formulas
         )
         if is_time_constant and low <= 0:
             value, allowed = f"[{low:g}, {high:g}]", "a range above 0 s"
-            problems.append(Problem(where=place, what="is a time constant", value=value, allowed=allowed))
+            problems.append(Problem(place, "is a time constant", value=value, allowed=allowed))
     return problems
 
 

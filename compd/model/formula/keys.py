@@ -112,4 +112,4 @@ def _problem(detail: ErrorDetails, where: str) -> Problem:
         what, allowed = "is none of the choices", str(detail.get("ctx", {}).get("expected", ""))
     elif detail["type"] == "string_pattern_mismatch":
         what, allowed = "is no name", f"the pattern {detail.get('ctx', {}).get('pattern')}"
-    return Problem(where=f"{where}, {place}", what=what, value=value, allowed=allowed, next_step=next_step)
+    return Problem(f"{where}, {place}", what, value=value, allowed=allowed, next_step=next_step)

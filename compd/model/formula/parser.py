@@ -50,20 +50,15 @@ def parse_together(texts: Mapping[str, str], parameters: tuple[str, ...], where:
         raise ConfigurationError(problems)
     unused = [name for name in parameters if not any(name in checker.names for checker in checkers.values())]
     if unused:
-        raise ConfigurationError(
-            Problem(
-                where=where,
-                what="a parameter is not in the formula",
-                value=", ".join(unused),
-                next_step="use it, or remove it",
-            )
+        raise ConfigurationError.of(
+            where, "a parameter is not in the formula", value=", ".join(unused), next_step="use it, or remove it"
         )
     nonlinear = _nonlinear_parameters([checker.tree for checker in checkers.values()], set(parameters))
     linear = tuple(name for name in parameters if name not in nonlinear)
     problems = [
         Problem(
-            where=place,
-            what="a term of the formula holds no parameter that could be fitted",
+            place,
+            "a term of the formula holds no parameter that could be fitted",
             value=texts[place],
             allowed="every term is a parameter times something",
             next_step="multiply it by a parameter with a plausible range",
@@ -92,9 +87,7 @@ def _check(text: str, parameters: tuple[str, ...], where: str) -> _Checker:
 
 
 def _formula_error(where: str, text: str, column: int, what: str, allowed: str) -> ConfigurationError:
-    return ConfigurationError(
-        Problem(where=f"{where}, character {column}", what=what, value=text[:LONGEST], allowed=allowed)
-    )
+    return ConfigurationError.of(f"{where}, character {column}", what, value=text[:LONGEST], allowed=allowed)
 
 
 def _check_text(text: str, where: str) -> None:

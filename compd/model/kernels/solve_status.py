@@ -70,12 +70,12 @@ def require(reason: NDArray[np.int64] | np.int64 | int, what: str, next_step: st
     failed: list[tuple[Any, ...]] = [tuple(index) for index in np.argwhere(codes)]
     problems = [
         Problem(
-            where=what if single else f"{what}, row {', '.join(str(i) for i in index)}",
-            what=f"{Reason(int(codes[index])).name}: {Reason(int(codes[index])).meaning}",
+            what if single else f"{what}, row {', '.join(str(i) for i in index)}",
+            f"{Reason(int(codes[index])).name}: {Reason(int(codes[index])).meaning}",
             next_step=next_step,
         )
         for index in failed[:10]
     ]
     if len(failed) > len(problems):
-        problems.append(Problem(where=what, what=f"and {len(failed) - len(problems)} more rows"))
+        problems.append(Problem(what, f"and {len(failed) - len(problems)} more rows"))
     raise KinematicsError(problems)

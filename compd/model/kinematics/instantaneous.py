@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray
-from compd.errors import KinematicsError, Problem
+from compd.errors import KinematicsError
 from compd.model.kernels import AMPLIFICATION_LIMIT
 from compd.model.kinematics.frame import Frame, FrameGeometry, distances_mm
 
@@ -68,14 +68,12 @@ def inverse_frame_jacobian(geometry: FrameGeometry) -> FloatArray:
     _, J = distances_mm(geometry.zero_supports_M_mm, geometry.plate_points_M_mm)
     smallest = float(np.linalg.svd(J, compute_uv=False)[-1])
     if not smallest * AMPLIFICATION_LIMIT > 1.0:
-        raise KinematicsError(
-            Problem(
-                where="frame at machine zero",
-                what="the nine distances do not fix the supports",
-                value=f"smallest singular value {smallest:.3g}",
-                allowed=f"more than {1.0 / AMPLIFICATION_LIMIT:g}",
-                next_step="check supports and plate points",
-            )
+        raise KinematicsError.of(
+            "frame at machine zero",
+            "the nine distances do not fix the supports",
+            value=f"smallest singular value {smallest:.3g}",
+            allowed=f"more than {1.0 / AMPLIFICATION_LIMIT:g}",
+            next_step="check supports and plate points",
         )
     return np.asarray(np.linalg.inv(J), dtype=np.float64)
 

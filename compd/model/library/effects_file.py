@@ -107,14 +107,12 @@ def named_effect(name: str, where: str, given: Mapping[str, Effect] | None = Non
     if not chosen and len(effects) == 1:
         return next(iter(effects.values()))
     if chosen not in effects:
-        raise PluginError(
-            Problem(
-                where=where,
-                what="no such effect in this file" if chosen else "holds several effects: which one?",
-                value=name,
-                allowed=", ".join(effects),
-                next_step=f"write {source}:{next(iter(effects))}",
-            )
+        raise PluginError.of(
+            where,
+            "no such effect in this file" if chosen else "holds several effects: which one?",
+            value=name,
+            allowed=", ".join(effects),
+            next_step=f"write {source}:{next(iter(effects))}",
         )
     return effects[chosen]
 
@@ -131,14 +129,12 @@ def _source_path(source: str | Path) -> Path:
         return path
     shipped = shipped_effects()
     if source not in shipped:
-        raise ConfigurationError(
-            Problem(
-                where="effects",
-                what="no file of effects of this name comes with compd",
-                value=source,
-                allowed=", ".join(shipped) or "none are installed",
-                next_step="choose one of these, or give a file (NAME.yaml, NAME.py) or a directory",
-            )
+        raise ConfigurationError.of(
+            "effects",
+            "no file of effects of this name comes with compd",
+            value=source,
+            allowed=", ".join(shipped) or "none are installed",
+            next_step="choose one of these, or give a file (NAME.yaml, NAME.py) or a directory",
         )
     return shipped[source]
 
@@ -146,9 +142,7 @@ def _source_path(source: str | Path) -> Path:
 def _files_in(directory: Path) -> list[Path]:
     files = sorted(path for path in directory.iterdir() if path.suffix in SUFFIXES)
     if not files:
-        raise ConfigurationError(
-            Problem(where=str(directory), what="holds no file of effects", allowed="NAME.yaml or NAME.py")
-        )
+        raise ConfigurationError.of(str(directory), "holds no file of effects", allowed="NAME.yaml or NAME.py")
     return files
 
 
@@ -157,22 +151,14 @@ def _read_file(path: Path) -> list[Effect]:
     if path.suffix == ".py":
         return _python_effects(path)
     if path.suffix not in YAML_SUFFIXES:
-        raise ConfigurationError(
-            Problem(where=str(path), what="is no file of effects", value=path.suffix, allowed=", ".join(SUFFIXES))
-        )
+        raise ConfigurationError.of(str(path), "is no file of effects", value=path.suffix, allowed=", ".join(SUFFIXES))
     document = read_entries(path, EFFECTS_FILE)
     problems = [unknown_key(document, (key,), [_KEY]) for key in document.data if key != _KEY]
     entries = document.data[_KEY]
     if isinstance(entries, dict):
         return [formula_effect(entries, str(path))]
     if not isinstance(entries, list | None):
-        problems.append(
-            Problem(
-                where=document.where((_KEY,)),
-                what="is no list of effects",
-                allowed="- id: ...",
-            )
-        )
+        problems.append(Problem(document.where((_KEY,)), "is no list of effects", allowed="- id: ..."))
         raise ConfigurationError(problems)
     effects: list[Effect] = []
     for number, entry in enumerate(entries or ()):
@@ -181,7 +167,7 @@ def _read_file(path: Path) -> list[Effect]:
         except ConfigurationError as error:
             problems += error.problems
     if not effects and not problems:
-        problems.append(Problem(where=str(path), what="holds no effects", next_step="write one, or delete the file"))
+        problems.append(Problem(str(path), "holds no effects", next_step="write one, or delete the file"))
     if problems:
         raise ConfigurationError(problems)
     return effects
@@ -190,7 +176,7 @@ def _read_file(path: Path) -> list[Effect]:
 def _entry_effect(document: Document, number: int, entry: object) -> Effect:
     where = document.where((_KEY, number))
     if not isinstance(entry, Mapping):
-        raise ConfigurationError(Problem(where=where, what="is no effect", allowed="a mapping: id, port, formula ..."))
+        raise ConfigurationError.of(where, "is no effect", allowed="a mapping: id, port, formula ...")
     return formula_effect(entry, where)
 
 
@@ -202,13 +188,11 @@ def _python_effects(path: Path) -> list[Effect]:
         if isinstance(value, Effect) and id(value) not in effects:
             effects[id(value)] = value if value.declared else replace(value, declared=f"{file}:{name}")
     if not effects:
-        raise PluginError(
-            Problem(
-                where=str(path),
-                what="holds no effect",
-                allowed="objects of compd.Effect, each under a name of its own",
-                next_step="see `An effect in Python` in the guide `Add an effect`",
-            )
+        raise PluginError.of(
+            str(path),
+            "holds no effect",
+            allowed="objects of compd.Effect, each under a name of its own",
+            next_step="see `An effect in Python` in the guide `Add an effect`",
         )
     return list(effects.values())
 
@@ -227,7 +211,7 @@ def _by_id(found: Iterable[tuple[Effect, str]]) -> dict[str, Effect]:
         if effect.id in places:
             what = f"this id is taken, by {places[effect.id]}"
             step = "rename one of them"
-            problems.append(Problem(where=place, what=what, value=effect.id, next_step=step))
+            problems.append(Problem(place, what, value=effect.id, next_step=step))
         effects[effect.id] = effect
         places.setdefault(effect.id, place)
     if problems:

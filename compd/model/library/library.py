@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from compd.errors import PluginError, Problem
+from compd.errors import PluginError
 from compd.model.effects import PORTS, Effect
 from compd.model.formula import formula_effect
 from compd.model.library.drawing import DRAWN
@@ -39,14 +39,12 @@ def load_library() -> dict[str, Effect]:
         where = f"entry point {name} in {EFFECTS}"
         effect = _require_effect(load(EFFECTS, name, where), where)
         if effect.id in effects:
-            raise PluginError(
-                Problem(
-                    where=where,
-                    what="this id is taken",
-                    value=effect.id,
-                    allowed="an id of its own",
-                    next_step="rename it, or remove the package",
-                )
+            raise PluginError.of(
+                where,
+                "this id is taken",
+                value=effect.id,
+                allowed="an id of its own",
+                next_step="rename it, or remove the package",
             )
         effects[effect.id] = effect
     return effects
@@ -71,14 +69,12 @@ def find_effect(
         return effect if effect.declared else replace(effect, declared=declaration)
     effects = {**{effect.id: effect for effect in DRAWN}, **load_library(), **(given or {})}
     if declaration not in effects:
-        raise PluginError(
-            Problem(
-                where=where,
-                what="no such effect",
-                value=declaration,
-                allowed=", ".join(effects),
-                next_step="choose one of these, name a file of your own (FILE.yaml:ID), or write a formula",
-            )
+        raise PluginError.of(
+            where,
+            "no such effect",
+            value=declaration,
+            allowed=", ".join(effects),
+            next_step="choose one of these, name a file of your own (FILE.yaml:ID), or write a formula",
         )
     return effects[declaration]
 
@@ -86,12 +82,10 @@ def find_effect(
 def _require_effect(thing: Any, where: str) -> Effect:
     """The loaded object, if it is an Effect; else PluginError."""
     if not isinstance(thing, Effect):
-        raise PluginError(
-            Problem(
-                where=where,
-                what="is not an effect",
-                value=type(thing).__name__,
-                allowed="an object of compd.model.effects.effect.Effect",
-            )
+        raise PluginError.of(
+            where,
+            "is not an effect",
+            value=type(thing).__name__,
+            allowed="an object of compd.model.effects.effect.Effect",
         )
     return thing

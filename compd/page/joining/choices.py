@@ -102,7 +102,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
             return None
         if (among and value in among) or (not among and _is(value, kind)):
             return kind(value)
-        problems.append(Problem(where=name, what="is not understood", value=ascii(value)[:80], allowed=allowed))
+        problems.append(Problem(name, "is not understood", value=ascii(value)[:80], allowed=allowed))
         return None
 
     def text(name: str, among: tuple[str, ...] = ()) -> str | None:
@@ -115,7 +115,7 @@ def read_choices(keys: Mapping[str, Any], machine: Path | None, plan: Path | Non
             or len(columns) > _MAX_COLUMNS
             or not all(_is(role, str) and "," not in role for role in columns)
         ):
-            problems.append(Problem(where=name, what="is not understood", allowed="a role for each column"))
+            problems.append(Problem(name, "is not understood", allowed="a role for each column"))
             return ()
         return tuple(columns)
 
@@ -185,5 +185,5 @@ def _is(value: Any, kind: type) -> bool:
 
 def _positive(name: str, number: int | None, problems: list[Problem]) -> int | None:
     if number is not None and number < 1:
-        problems.append(Problem(where=name, what="is not understood", value=str(number), allowed="1 or more"))
+        problems.append(Problem(name, "is not understood", value=str(number), allowed="1 or more"))
     return number

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 
 SUFFIX = ".export"
 # NAME or NAME.ext, with SUFFIX for an upload of this release: a valid file name on every system, never a path.
@@ -224,4 +224,4 @@ def _full(files: int, total: int) -> RecordingError:
 
 
 def _refused(where: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> RecordingError:
-    return RecordingError(Problem(where=where, what=what, value=value, allowed=allowed, next_step=next_step))
+    return RecordingError.of(where, what, value=value, allowed=allowed, next_step=next_step)

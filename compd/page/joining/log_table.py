@@ -15,7 +15,7 @@ from compd.columns import (
     scale_columns,
 )
 from compd.configuration import Configuration, load_machine
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.instruments import ExportPreview, NumberColumns, ReadOptions, preview_table
 from compd.joining import column_roles, named_columns, problems_of_log, read_machine_log
 from compd.page.joining.choices import Choices
@@ -85,13 +85,11 @@ def log_contents(log: LogPreview, choices: Choices, machine: Path | None) -> dic
 
 def without_machine() -> RecordingError:
     """A log does not say of which machine it is."""
-    return RecordingError(
-        Problem(
-            where="log",
-            what="the page knows no machine that the log could be of",
-            allowed="the machine's configuration",
-            next_step="start the page with it: compd page MACHINE.yaml",
-        )
+    return RecordingError.of(
+        "log",
+        "the page knows no machine that the log could be of",
+        allowed="the machine's configuration",
+        next_step="start the page with it: compd page MACHINE.yaml",
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.page.recordings import NAME, recording_tables
 from compd.recording import read_sidecar
 from compd.table_file import CSV
@@ -36,4 +36,4 @@ def named(directory: Path, keys: Mapping[str, Any], key: str) -> Path | None:
 
 def missing(where: str, what: str, next_step: str = "") -> RecordingError:
     """The required name in a request."""
-    return RecordingError(Problem(where=where, what=what, next_step=next_step))
+    return RecordingError.of(where, what, next_step=next_step)

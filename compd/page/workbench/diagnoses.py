@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.page.shares import ASKER, shares_of
 from compd.page.workbench.diagnosis_job import DiagnosisJob
 from compd.page.workers.workers import Workers
@@ -37,14 +37,12 @@ class Diagnoses:
             for share in shares_of(ASKER.get(), MAX_RUNNING):
                 held = [job.path.stem for job in self._running if share.holds(job.token)]
                 if len(held) >= share.most:
-                    raise StateError(
-                        Problem(
-                            where="diagnosis",
-                            what=f"{len(held)} run already on this server, of other recordings or models",
-                            value=", ".join(held),
-                            allowed=f"{share.most} at once {share.whose}".rstrip(),
-                            next_step="wait for one of them to end, or cancel it where it was begun",
-                        )
+                    raise StateError.of(
+                        "diagnosis",
+                        f"{len(held)} run already on this server, of other recordings or models",
+                        value=", ".join(held),
+                        allowed=f"{share.most} at once {share.whose}".rstrip(),
+                        next_step="wait for one of them to end, or cancel it where it was begun",
                     )
             job = DiagnosisJob(path, model_path, machine, revision=revision, effects=effects, workers=self._workers)
             self._running.append(job)

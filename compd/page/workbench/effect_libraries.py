@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from compd.configuration import shipped_effects
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 
 # Name of the file of one's own effects, beside the model files.
 OWN_NAME = "own.effects.yaml"
@@ -35,7 +35,5 @@ class EffectLibraries:
         chosen = list(dict.fromkeys(names))
         for name in chosen:
             if name not in known:
-                raise StateError(
-                    Problem(where="library of effects", what="is not there", value=name, allowed=", ".join(known))
-                )
+                raise StateError.of("library of effects", "is not there", value=name, allowed=", ".join(known))
         return [name if name in shipped_effects() else str(self._directory / name) for name in chosen]

@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from compd.documents import parse_yaml
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.model.library import EFFECTS_FILE
 
 _KEY = "effects"
@@ -75,7 +75,7 @@ def without_entry(text: str, effect: str, path: Path) -> str:
     entries = entries_of(text, path)
     ids = [str(entry.get("id")) for entry in entries]
     if effect not in ids:
-        raise StateError(Problem(where=str(path), what="has no such effect", value=effect, allowed=", ".join(ids)))
+        raise StateError.of(str(path), "has no such effect", value=effect, allowed=", ".join(ids))
     index = ids.index(effect)
     begin, end, _ = _span(text, index, path)
     return _checked(text[:begin] + text[end + 1 :], [*entries[:index], *entries[index + 1 :]], path)
@@ -130,11 +130,9 @@ def _comments(entry: str, indent: str) -> str:
 
 
 def _by_hand(path: Path) -> StateError:
-    return StateError(
-        Problem(
-            where=str(path),
-            what="is written so that the page cannot change one entry alone",
-            allowed="a list, `- id: ...` for each effect, without anchors",
-            next_step="write it so, or change it in an editor",
-        )
+    return StateError.of(
+        str(path),
+        "is written so that the page cannot change one entry alone",
+        allowed="a list, `- id: ...` for each effect, without anchors",
+        next_step="write it so, or change it in an editor",
     )

@@ -66,7 +66,7 @@ def check(declaration: Mapping[str, Any], rows: Observations, present: Sequence[
     problems = _reasons_not_to_try(effect, rows)
     if effect.id in present:
         step = "give it another id, or take that one out of the model"
-        problems.append(Problem(where=f"{_WHERE}, id", what="is in the model already", value=effect.id, next_step=step))
+        problems.append(Problem(f"{_WHERE}, id", "is in the model already", value=effect.id, next_step=step))
     return Checked(effect, _field_problems(problems, declaration), missing)
 
 

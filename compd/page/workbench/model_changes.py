@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from compd.api import add_effect
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.model.effects import Effect
 from compd.model_changes import refit_model, remove_effect, undo_step
 from compd.model_file import EffectNumber, ModelFile, read_stored, write_stored
@@ -25,14 +25,14 @@ def proposed(opened: OpenedRecording, kind: str, effect: str, library: Mapping[s
     match kind:
         case "add":
             if effect not in library:  # never a path, from which code would be loaded
-                raise StateError(Problem(where="step", what="no such effect", value=effect))
+                raise StateError.of("step", "no such effect", value=effect)
             changed = add_effect(model, library[effect], aligned)
         case "remove":
             changed = remove_effect(model, effect, aligned)
         case "fit":
             changed = refit_model(model, aligned)
         case _:
-            raise StateError(Problem(where="step", what="is not known", value=kind, allowed="add, remove, fit"))
+            raise StateError.of("step", "is not known", value=kind, allowed="add, remove, fit")
     return replace(opened, model=changed)
 
 
@@ -45,7 +45,7 @@ def undone(opened: OpenedRecording) -> OpenedRecording:
     """Undo the last step in the file. Raises StateError if there is none."""
     path = opened.model_path
     if not path.exists():
-        raise StateError(Problem(where=str(path), what="has no step to undo"))
+        raise StateError.of(str(path), "has no step to undo")
     write_stored(path, undo_step(read_stored(path), str(path)))
     return replace(opened, model=model_of(path, opened.aligned))
 

@@ -73,7 +73,7 @@ class OwnEffects:
             self._refuse_faulty()
             if effect.id in self.declarations and not replace:
                 what, step = "has an effect of this id", "replace it, or give this one another id"
-                raise StateError(Problem(where=str(self.path), what=what, value=effect.id, next_step=step))
+                raise StateError.of(str(self.path), what, value=effect.id, next_step=step)
             self._write(with_entry(self._text(), declaration, self.path))
 
     def delete(self, effect: str) -> None:
@@ -95,7 +95,7 @@ class OwnEffects:
             else:
                 self.path.unlink()
         except OSError as error:
-            raise StateError(Problem(where=str(self.path), what=f"cannot be written: {error.strerror}")) from error
+            raise StateError.of(str(self.path), f"cannot be written: {error.strerror}") from error
         self.reload()
 
     def _text(self) -> str:
@@ -109,8 +109,8 @@ def too_large(effect: Effect, where: str) -> list[Problem]:
     if combinations > MAX_COMBINATIONS:
         problems.append(
             Problem(
-                where=where,
-                what=f"{', '.join(constant.name for constant in effect.constants)} are searched together",
+                where,
+                f"{', '.join(constant.name for constant in effect.constants)} are searched together",
                 value=f"{combinations} combinations",
                 allowed=f"{MAX_COMBINATIONS} in the page",
                 next_step="let the formula be proportional to some of them, or write numbers for them",
@@ -119,8 +119,8 @@ def too_large(effect: Effect, where: str) -> list[Problem]:
     if len(effect.parameters) > MAX_NUMBERS:
         problems.append(
             Problem(
-                where=where,
-                what="has more parameters than a person can judge",
+                where,
+                "has more parameters than a person can judge",
                 value=str(len(effect.parameters)),
                 allowed=f"{MAX_NUMBERS} in the page",
             )

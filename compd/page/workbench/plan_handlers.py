@@ -7,7 +7,7 @@ import math
 from starlette.requests import Request
 from starlette.responses import Response
 
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.page.requests import keys_of, refused
 from compd.page.workbench.handlers import Handler, plain
 from compd.page.workbench.open_workbench import PLAN_S, OpenWorkbench
@@ -54,7 +54,7 @@ def _query_number(request: Request, name: str, least: float) -> float | None:
     except ValueError:
         value = math.nan
     if not least <= value < math.inf:
-        raise CompdError(Problem(where=name, what="is not understood", value=text[:80], allowed=f"{least:g} or more"))
+        raise CompdError.of(name, "is not understood", value=text[:80], allowed=f"{least:g} or more")
     return value
 
 

@@ -137,7 +137,7 @@ class _Reader:
         return {name: pair for name, pair in pairs.items() if pair is not None}
 
     def _add(self, where: str, value: str, allowed: str) -> None:
-        self.problems.append(Problem(where=where, what="is not understood", value=value, allowed=allowed))
+        self.problems.append(Problem(where, "is not understood", value=value, allowed=allowed))
 
 
 def _text(*values: float) -> str:

@@ -14,7 +14,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
-from compd.errors import CompdError, Problem, StateError
+from compd.errors import CompdError, StateError
 from compd.page.downloads import Downloads, in_pieces
 from compd.page.recordings import NAME, Recordings, is_own, recording_tables
 from compd.page.requests import LOOKS_ONLY, keys_of, may_change, refused
@@ -60,7 +60,7 @@ def _declaration(keys: Mapping[str, Any]) -> dict[str, Any]:
         json.dumps(declaration, ensure_ascii=False).encode()
     except UnicodeEncodeError as error:
         what = "an invalid character, which no file can hold"
-        raise StateError(Problem(where="formula", what=what, next_step="type it anew")) from error
+        raise StateError.of("formula", what, next_step="type it anew") from error
     return declaration
 
 

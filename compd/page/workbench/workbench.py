@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from compd.configuration import Machine
 from compd.diagnosis import Diagnosis, diagnose
-from compd.errors import CompdError, Problem, RecordingError, StateError
+from compd.errors import CompdError, RecordingError, StateError
 from compd.files import file_stamp, write_files
 from compd.live.machine import ModelText
 from compd.model.effects import can_concern
@@ -295,8 +295,8 @@ class Workbench:
         self._check(revision)
         known = set(self.opened.aligned.recording.row.tolist())
         if unknown_rows := [row for row in rows if row not in known]:
-            raise RecordingError(
-                Problem(where=f"row {unknown_rows[0]}", what="is not in the recording", allowed="rows of the recording")
+            raise RecordingError.of(
+                f"row {unknown_rows[0]}", "is not in the recording", allowed="rows of the recording"
             )
         return self._with_other_rows(lambda: exclude_rows(self._path, rows, reason))
 
@@ -320,10 +320,8 @@ class Workbench:
 
     def _check(self, revision: int) -> None:
         if revision != self.revision:
-            raise StateError(
-                Problem(
-                    where="workbench",
-                    what="the model or the rows were changed elsewhere meanwhile",
-                    next_step="check the present state, then repeat it",
-                )
+            raise StateError.of(
+                "workbench",
+                "the model or the rows were changed elsewhere meanwhile",
+                next_step="check the present state, then repeat it",
             )

@@ -41,14 +41,12 @@ def read_plan(path: Path, mechanism: Mechanism, measured: Collection[str] | None
     Raises CompdError with everything that is wrong with the file.
     """
     if mechanism.tip_frame != "M":
-        raise CompdError(
-            Problem(
-                where=str(path),
-                what="is for a tool on the platform; this one stands on the plate",
-                value="plate",
-                allowed="tool on: platform",
-                next_step="plan by hand, and drive there",
-            )
+        raise CompdError.of(
+            str(path),
+            "is for a tool on the platform; this one stands on the plate",
+            value="plate",
+            allowed="tool on: platform",
+            next_step="plan by hand, and drive there",
         )
     names = holdable_quantities(mechanism.links)
     limits = {name: _LIMITS_BY_UNIT[name.rpartition("_")[2]] for name in names}
@@ -65,8 +63,8 @@ def _unmeasured(file: PlanFile, names: Collection[str], measured: Collection[str
     """A problem for every held quantity that no gauge measures."""
     return [
         Problem(
-            where=f"{file.path}:1 column {name}",
-            what="no gauge of this machine measures it: no recording will tell",
+            f"{file.path}:1 column {name}",
+            "no gauge of this machine measures it: no recording will tell",
             value=name,
             allowed=", ".join(measured) or "nothing beside lengths",
             next_step="wire one to it in the configuration, or delete the column",
@@ -125,8 +123,8 @@ def _scale_mm(
         return scale_mm
     problems.append(
         Problem(
-            where=f"{file.path}:{line.line} column {', '.join(TIP_COLUMNS)}",
-            what="this machine cannot reach the place",
+            f"{file.path}:{line.line} column {', '.join(TIP_COLUMNS)}",
+            "this machine cannot reach the place",
             value=", ".join(f"{value:g}" for value in tip_M_mm),
             allowed=_stroke_text(mechanism),
             next_step="plan with a narrower --workspace",
@@ -141,8 +139,8 @@ def _approach_problems(file: PlanFile, line: PlanLine, row: PlannedRow, mechanis
     if row.on_the_move and not row.approach.any():
         problems.append(
             Problem(
-                where=where,
-                what="a row on the move needs a direction",
+                where,
+                "a row on the move needs a direction",
                 value="0",
                 allowed="-1 or 1 for the links that move",
                 next_step=f"write it, or {SPEED_COLUMN} 0",
@@ -153,8 +151,8 @@ def _approach_problems(file: PlanFile, line: PlanLine, row: PlannedRow, mechanis
     if known and not all(_within_stroke(end_mm, mechanism) for end_mm in ends):
         problems.append(
             Problem(
-                where=where,
-                what="there is no room to come from this side",
+                where,
+                "there is no room to come from this side",
                 value=", ".join(f"{value:g}" for value in row.approach),
                 allowed=_stroke_text(mechanism),
                 next_step="plan with a narrower --workspace",

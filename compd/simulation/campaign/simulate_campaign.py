@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from compd.configuration import Machine, load_machine
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.recording import write_plate, write_recording
 from compd.simulation.campaign.plan_reader import read_plan
 from compd.simulation.campaign.simulated_recording import FIXED, simulate_recording
@@ -116,16 +116,14 @@ def simulate_campaign(
     configuration = load_machine(machine)
     mechanism = Mechanism(configuration.geometry)
     if plan is not None and reference in ("ball_plate", *FIXED):
-        raise CompdError(
-            Problem(
-                where="reference",
-                what="a ball plate's balls are not where the plan goes"
-                if reference == "ball_plate"
-                else "fixed balls and pins are not where the plan goes",
-                value=reference,
-                allowed="tracker, interferometer, pose",
-                next_step="leave the plan or the reference out",
-            )
+        raise CompdError.of(
+            "reference",
+            "a ball plate's balls are not where the plan goes"
+            if reference == "ball_plate"
+            else "fixed balls and pins are not where the plan goes",
+            value=reference,
+            allowed="tracker, interferometer, pose",
+            next_step="leave the plan or the reference out",
         )
     planned = () if plan is None else read_plan(Path(plan), mechanism)
     causes = parse_hidden(effects)
@@ -149,11 +147,9 @@ def _check_apart(path: Path, machine: Machine) -> None:
     """Raise CompdError if the recording's sidecar would replace the machine's own configuration."""
     sidecar = path.with_suffix(".yaml")
     if isinstance(machine, str | Path) and sidecar.resolve() == Path(machine).resolve():
-        raise CompdError(
-            Problem(
-                where=str(path),
-                what="its sidecar would replace the machine's configuration",
-                value=str(sidecar),
-                next_step="give the recording another name or place",
-            )
+        raise CompdError.of(
+            str(path),
+            "its sidecar would replace the machine's configuration",
+            value=str(sidecar),
+            next_step="give the recording another name or place",
         )

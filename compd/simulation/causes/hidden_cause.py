@@ -48,15 +48,10 @@ def parse_hidden(texts: Sequence[str]) -> list[HiddenCause]:
         except ValueError:
             strength = float("nan")
         if name not in CAUSES:
-            problems.append(Problem(where="--effect", what="no such cause", value=name, allowed=", ".join(CAUSES)))
+            problems.append(Problem("--effect", "no such cause", value=name, allowed=", ".join(CAUSES)))
         elif strength is not None and (not np.isfinite(strength) or strength == 0):
             problems.append(
-                Problem(
-                    where=f"--effect {name}",
-                    what="is no strength",
-                    value=number,
-                    allowed=f"a number in {CAUSES[name].unit}",
-                )
+                Problem(f"--effect {name}", "is no strength", value=number, allowed=f"a number in {CAUSES[name].unit}")
             )
         elif strength is not None and CAUSES[name].stated_as_reciprocal:
             strength = 1 / strength

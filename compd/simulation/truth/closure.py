@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
-from compd.errors import KinematicsError, Problem
+from compd.errors import KinematicsError
 
 # (4, 3): the platform's origin in {M}, mm, and its x, y, z axes in {M}.
 Posture = NDArray[np.float64]
@@ -259,12 +259,10 @@ def _newton(equations: Callable[[Posture], Equations], guess: Posture, what: str
 
 
 def _out_of_reach(what: str, wanted: FloatArray) -> KinematicsError:
-    return KinematicsError(
-        Problem(
-            where="simulated machine",
-            what=f"the links cannot meet at these {what}",
-            value=", ".join(f"{value:.6g}" for value in wanted),
-            allowed="a place within reach",
-            next_step="ask for a place nearer to machine zero",
-        )
+    return KinematicsError.of(
+        "simulated machine",
+        f"the links cannot meet at these {what}",
+        value=", ".join(f"{value:.6g}" for value in wanted),
+        allowed="a place within reach",
+        next_step="ask for a place nearer to machine zero",
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.errors import KinematicsError, Problem
+from compd.errors import KinematicsError
 from compd.simulation.truth.cause import Cause, CauseInputs
 from compd.simulation.truth.closure import Closure, Posture, homogeneous
 from compd.simulation.truth.frame import PPM, Frame
@@ -131,13 +131,11 @@ class Equilibrium:
             posture,
         )
         if np.sum(posture[3] * machine.posture0[3]) < MIN_UPRIGHT:
-            raise KinematicsError(
-                Problem(
-                    where="simulated machine",
-                    what="the platform would tip over at these scale values",
-                    value=np.array2string(scale_mm, precision=3),
-                    next_step="ask for a place nearer to machine zero",
-                )
+            raise KinematicsError.of(
+                "simulated machine",
+                "the platform would tip over at these scale values",
+                value=np.array2string(scale_mm, precision=3),
+                next_step="ask for a place nearer to machine zero",
             )
         tip_M, tip_P = self._tip(posture, _sum((cause.tool_shift(inputs) for cause in causes), 3))
         shown = (tip_M if machine.tip_frame == "M" else tip_P) + _sum(

@@ -10,7 +10,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.configuration import Geometry
-from compd.errors import CompdError, KinematicsError, Problem
+from compd.errors import CompdError, KinematicsError
 from compd.operation_settings import Wiring
 from compd.simulation.truth.cause import Cause, Interval
 from compd.simulation.truth.closure import Posture
@@ -169,9 +169,7 @@ class World:
         no rows are planned.
         """
         if not self._rows:
-            raise CompdError(
-                Problem(where="simulated machine", what="nothing is planned", next_step="start it with --plan")
-            )
+            raise CompdError.of("simulated machine", "nothing is planned", next_step="start it with --plan")
         self._motion = PlanMotion(self._rows, self._braking(), self.hold, self._speedup, [*self._points_mm])
         self.mode, self.zero_hold_s = "plan", 0.0
 
@@ -306,14 +304,12 @@ class World:
         try:
             return self._readings[name]
         except KeyError:
-            raise CompdError(
-                Problem(
-                    where="simulated machine",
-                    what="has nothing to measure under this name",
-                    value=name,
-                    allowed=", ".join(self._readings),
-                    next_step="wire a gauge to one of these",
-                )
+            raise CompdError.of(
+                "simulated machine",
+                "has nothing to measure under this name",
+                value=name,
+                allowed=", ".join(self._readings),
+                next_step="wire a gauge to one of these",
             ) from None
 
     def sense_scale(self, name: str) -> float:
@@ -388,22 +384,18 @@ class World:
     def _checked(self, scale_mm: Sequence[float]) -> FloatArray:
         values = np.array(scale_mm, dtype=float)
         if values.shape != (self._mechanism.scales,):
-            raise CompdError(
-                Problem(
-                    where="scale_mm",
-                    what="one value per scale is needed",
-                    value=str(list(scale_mm)),
-                    allowed=f"{self._mechanism.scales} numbers, mm",
-                )
+            raise CompdError.of(
+                "scale_mm",
+                "one value per scale is needed",
+                value=str(list(scale_mm)),
+                allowed=f"{self._mechanism.scales} numbers, mm",
             )
         if not np.all(np.abs(values) <= self._stroke_mm):
             stroke = f"{self._stroke_mm.min():.1f}"
-            raise CompdError(
-                Problem(
-                    where="scale_mm",
-                    what="beyond the stroke of a link",
-                    value=str(list(scale_mm)),
-                    allowed=f"-{stroke} to {stroke} mm",
-                )
+            raise CompdError.of(
+                "scale_mm",
+                "beyond the stroke of a link",
+                value=str(list(scale_mm)),
+                allowed=f"-{stroke} to {stroke} mm",
             )
         return values

@@ -7,7 +7,7 @@ import socket
 from pathlib import Path
 from typing import Any, Self
 
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 
 
 class ControlClient:
@@ -21,12 +21,10 @@ class ControlClient:
             self._socket.connect(str(path))
         except OSError as error:
             self._socket.close()
-            raise DaemonError(
-                Problem(
-                    where=str(path),
-                    what=f"no simulated machine answers: {error.strerror}",
-                    next_step="start it with `compd simulate CONFIG --directory`, and give that directory",
-                )
+            raise DaemonError.of(
+                str(path),
+                f"no simulated machine answers: {error.strerror}",
+                next_step="start it with `compd simulate CONFIG --directory`, and give that directory",
             ) from error
         self._lines = self._socket.makefile("rb")
 
@@ -45,8 +43,8 @@ class ControlClient:
         except OSError:
             line = b""
         if not line.endswith(b"\n"):
-            raise DaemonError(Problem(where=str(self._path), what="the simulated machine is gone"))
+            raise DaemonError.of(str(self._path), "the simulated machine is gone")
         answer: dict[str, Any] = json.loads(line)
         if answer.get("class") == "ERROR":
-            raise DaemonError(Problem(where="simulated machine", what=str(answer.get("text")), value=message_class))
+            raise DaemonError.of("simulated machine", str(answer.get("text")), value=message_class)
         return answer

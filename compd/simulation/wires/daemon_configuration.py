@@ -10,7 +10,7 @@ import yaml
 
 from compd.configuration import Configuration, load
 from compd.documents import read_document
-from compd.errors import ConfigurationError, Problem
+from compd.errors import ConfigurationError
 from compd.files import check_replaceable, write_files
 from compd.simulation.wires.simulation_directory import DAEMON_SOCKET, STATE, WRITTEN_BY
 from compd.simulation.wires.tcp_port import ANY, LOOPBACK
@@ -26,13 +26,11 @@ def daemon_path(configuration: Configuration, directory: Path) -> Path:
     """Path of the daemon's configuration in `directory`. ConfigurationError if that is the machine's own file."""
     path = directory / configuration.path.name
     if path.resolve() == configuration.path.resolve():
-        raise ConfigurationError(
-            Problem(
-                where="--directory",
-                what="would overwrite the machine's own configuration",
-                value=str(path),
-                next_step="choose another directory",
-            )
+        raise ConfigurationError.of(
+            "--directory",
+            "would overwrite the machine's own configuration",
+            value=str(path),
+            next_step="choose another directory",
         )
     return path
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.instruments import LENGTH_AXES, POSITION_AXES, Samples
 
 # Fewest samples of a dwell that gives a point: an instrument takes the mean of some readings.
@@ -49,10 +49,8 @@ class Looks:
     def check_links(self, links: int) -> None:
         """Raise CompdError if the machine has no such link. links : number of its links."""
         if self._link is not None and self._link > links:
-            raise CompdError(
-                Problem(
-                    where="--link", what="this machine has no such link", value=str(self._link), allowed=f"1 to {links}"
-                )
+            raise CompdError.of(
+                "--link", "this machine has no such link", value=str(self._link), allowed=f"1 to {links}"
             )
 
     def add(self, measured: Mapping[str, Any]) -> None:

@@ -7,7 +7,7 @@ import os
 import socket
 from pathlib import Path
 
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 
 CONTROL_SOCKET = "control.sock"
 DAEMON_SOCKET = "compd.sock"
@@ -56,28 +56,22 @@ class SimulationDirectory:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise CompdError(
-                Problem(
-                    where=str(self.path),
-                    what="another simulator runs in this directory",
-                    next_step="end it (Ctrl-C in its terminal), or give another --directory",
-                )
+            raise CompdError.of(
+                str(self.path),
+                "another simulator runs in this directory",
+                next_step="end it (Ctrl-C in its terminal), or give another --directory",
             ) from None
         if is_served(self.path / DAEMON_SOCKET):
-            raise CompdError(
-                Problem(
-                    where=str(self.path / DAEMON_SOCKET),
-                    what="a daemon still runs for the machine that was simulated here",
-                    next_step="end it (Ctrl-C in its terminal), or give another --directory",
-                )
+            raise CompdError.of(
+                str(self.path / DAEMON_SOCKET),
+                "a daemon still runs for the machine that was simulated here",
+                next_step="end it (Ctrl-C in its terminal), or give another --directory",
             )
         if self._configuration.exists() and not self._is_ours():
-            raise CompdError(
-                Problem(
-                    where=str(self._configuration),
-                    what="would be replaced, and was not written by `compd simulate`",
-                    next_step="give another --directory",
-                )
+            raise CompdError.of(
+                str(self._configuration),
+                "would be replaced, and was not written by `compd simulate`",
+                next_step="give another --directory",
             )
 
     def _is_ours(self) -> bool:

@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from compd.cli.live.watch import NewestSetpoint
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 
 STATUS = {"time_s": 0.0, "loop": {"rate_hz": 200, "missed_cycles": 0}, "gauges": []}
 SETPOINT = {
@@ -44,7 +44,7 @@ class Daemon:
         yield SETPOINT
         self.sent.set()
         assert self.dies.wait(TIMEOUT_S)
-        raise DaemonError(Problem(where="here", what="the daemon is gone"))
+        raise DaemonError.of("here", "the daemon is gone")
 
 
 @pytest.fixture(params=[False, True], ids=["other computer", "same computer"])

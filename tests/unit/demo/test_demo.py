@@ -17,7 +17,7 @@ from compd.demo import session as session_module
 from compd.demo.machine_zero import GAUGES_TIMEOUT_S, take_zero
 from compd.demo.session import DemoSession, DemoVisit, run_demo
 from compd.demo.summary import verdict
-from compd.errors import CompdError, DaemonError, Problem
+from compd.errors import CompdError, DaemonError
 from compd.gauge import Quality
 from tests.support.paths import CONFIG
 
@@ -115,7 +115,7 @@ class Refusing:
         self.orders.append(replace)
         if len(self.orders) <= self.times:
             text = "machine zero: not every gauge can be read: scale 1: stale\n    next: mend the gauge, then take zero"
-            raise DaemonError(Problem(where="compd.sock", what=text, value="zero_refused"))
+            raise DaemonError.of("compd.sock", text, value="zero_refused")
 
 
 @pytest.mark.parametrize("quality", [Quality.OK, Quality.DISTRUSTED])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compd.configuration import load
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.gauge import Quality
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
@@ -47,9 +47,7 @@ def test_before_any_reading_it_is_starting_and_names_what_is_missing(tripod):
 
 def test_without_a_zero_every_setpoint_is_invalid_and_says_why_until_one_is_taken(tripod):
     zero = tripod.commands.zero
-    tripod.commands.zero = StateError(
-        Problem(where="here", what="machine zero has never been taken", next_step="run `compd zero`")
-    )
+    tripod.commands.zero = StateError.of("here", "machine zero has never been taken", next_step="run `compd zero`")
     for _ in range(3):
         setpoint = tripod.step()
         assert setpoint.state is State.NO_ZERO

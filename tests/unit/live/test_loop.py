@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import pytest
 
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.live.loop.commands import Commands
 from compd.live.loop.loop import Loop
 from compd.live.loop.timing import Histogram, LoopTiming
@@ -21,7 +21,7 @@ from tests.support.live_machine import machine
 
 PERIOD_S = 1 / 128  # exact in binary: tick times compare with ==
 LOOP = LoopSettings(rate_hz=128, stale_after_s=0.5, on_stale="hold", hold_s=1, lock_memory=False)
-NO_ZERO = Commands(StateError(Problem(where="zero", what="none")))
+NO_ZERO = Commands(StateError.of("zero", "none"))
 TRIPOD = machine()
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from compd.configuration import load
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.files import checksum_of
 from compd.gauge import Quality, bad, good
 from compd.live.loop.commands import Commands
@@ -112,7 +112,7 @@ class Taking:
         gauges = configuration.gauge_objects()
         self.latest = Latest([f"{name}.{c.name}" for name, gauge in gauges.items() for c in gauge.channels])
         self.wires = MachineWires(configuration, self.latest)
-        self.commands = Commands(StateError(Problem(where="zero", what="none")))
+        self.commands = Commands(StateError.of("zero", "none"))
         self.now_s = 50.0
         self.reads = 0
         self.value_mm = lambda channel, read: 3.0 + 0.001 * (-1) ** read

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from compd.clock import MonotonicClock
-from compd.errors import Problem, RecordingError, StateError
+from compd.errors import RecordingError, StateError
 from compd.gauge import Quality
 from compd.live.record.recorder import Recorder, RecordingLimits
 from compd.live.record.replay import RecordedCycles, replay_cycles
@@ -211,7 +211,7 @@ def test_nothing_is_overwritten(tmp_path):
 
 def test_without_machine_zero_nothing_is_recorded_and_it_says_what_to_do(tmp_path):
     run = Run(machine())
-    run.machine.commands.zero = StateError(Problem(where="here", what="machine zero has never been taken"))
+    run.machine.commands.zero = StateError.of("here", "machine zero has never been taken")
     with pytest.raises(StateError, match="compd zero"):
         recorded(run, tmp_path / "run", 3)
     assert list(tmp_path.iterdir()) == []

@@ -7,7 +7,7 @@ from contextlib import suppress
 import pytest
 
 from compd.clock import MonotonicClock
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 from compd.live.record.readings_feed import ReadingsFeed
 from compd.live.record.recorder import Recorder
 from compd.live.record.replay import RecordedCycles, replay_cycles
@@ -30,7 +30,7 @@ class Turned:
 
 
 def gone(what="the daemon is gone: it closed the connection"):
-    return DaemonError(Problem(where="socket", what=what))
+    return DaemonError.of("socket", what)
 
 
 class NobodyLeft(Exception):

@@ -14,7 +14,7 @@ import typer
 
 from compd.cli.live.replay import replay as replay_command
 from compd.configuration import load
-from compd.errors import Problem, RecordingError, StateError
+from compd.errors import RecordingError, StateError
 from compd.kernel_versions import versions_text_here
 from compd.live.loop.cycle import step
 from compd.live.machine.model_loader import Models
@@ -184,9 +184,7 @@ def test_the_names_in_a_recording_stay_whatever_the_classes_are_called():
 
 def test_a_cycle_without_zero_reads_back_as_it_was():
     run = Run(machine())
-    run.machine.commands.zero = StateError(
-        Problem(where="here", what="machine zero has never been taken", next_step="take it")
-    )
+    run.machine.commands.zero = StateError.of("here", "machine zero has never been taken", next_step="take it")
     _, message, setpoint = run.recorded(run.machine.step())
     assert setpoint.state is State.NO_ZERO
     recorded = parse_readings(message, run.machine.latest.channels)

@@ -12,7 +12,7 @@ import pytest
 
 from compd.compensation import Compensation
 from compd.compensation.values import Contributions
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle_state import CycleInputs
 from compd.live.loop.packet_layout import PACKET_SIZE
@@ -157,7 +157,7 @@ def test_packet_of_an_invalid_setpoint_is_all_nan():
 @pytest.mark.parametrize(("id_", "packed"), [(0, 0), (2**53, 2**53), (None, -1)])
 def test_packet_names_the_target_as_the_json_does(state, id_, packed):
     target = Target((0.0, 0.0, -500.0), time_s=1234.5, id=id_)
-    inputs = CycleInputs(42, Snapshot(1234.5678901, ()), StateError(Problem(where="zero", what="is not there")), target)
+    inputs = CycleInputs(42, Snapshot(1234.5678901, ()), StateError.of("zero", "is not there"), target)
     answer = setpoint(numbers() if state.valid else None, state, Mode.MACHINE_TOOL)._replace(inputs=inputs)
     message = json.loads(answer.to_json())
     assert (message["target_time_s"], message.get("target_id")) == (1234.5, id_)

@@ -8,7 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 from structlog.testing import capture_logs
 
-from compd.errors import DaemonError, Problem
+from compd.errors import DaemonError
 from compd.page.guard import COOKIE, Guard, Token, hashed
 from compd.page.orders import Orders
 from compd.page.recordings import Recordings
@@ -50,7 +50,7 @@ def test_an_order_is_given_and_logged_by_who_armed_and_nobody_else(guarded, monk
     async def do(self, name, subject, by):
         given.append((name, subject, by))
         if subject == "replace":
-            raise DaemonError(Problem(where="zero", what="the machine moves"))
+            raise DaemonError.of("zero", "the machine moves")
         return {}
 
     monkeypatch.setattr(Orders, "do", do)

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from compd.configuration import Configuration, load
-from compd.errors import CompdError, ConfigurationError, Problem
+from compd.errors import CompdError, ConfigurationError
 from compd.simulation.truth.world import World
 from compd.simulation.wires.control import MAX_REQUEST, Answer, ControlSocket
 from compd.simulation.wires.daemon_configuration import Port, daemon_configuration
@@ -31,7 +31,7 @@ def directory() -> Iterator[Path]:
 @pytest.fixture
 def client(directory: Path) -> Iterator[socket.socket]:
     def refuse(_: Mapping[str, Any]) -> Answer:
-        raise CompdError(Problem(where="scale_mm", what="beyond the stroke"))
+        raise CompdError.of("scale_mm", "beyond the stroke")
 
     handlers = {
         "ECHO": lambda message: {"class": "ECHO", "value": float(message["value"])},

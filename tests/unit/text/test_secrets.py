@@ -55,7 +55,7 @@ def test_what_stands_under_a_key_may_be_a_secret(key: str) -> None:
 )
 def test_no_user_of_a_url_is_in_a_problem(user: str) -> None:
     text = f"mqtt://{user}:{SECRET}@host:1883/x"
-    problem = Problem(where=text, what=f"{text} is not there", value=text)
+    problem = Problem(text, f"{text} is not there", value=text)
     assert SECRET not in str(problem)
     assert without_users(text) == f"mqtt://{HIDDEN}@host:1883/x"
 

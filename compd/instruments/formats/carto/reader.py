@@ -56,8 +56,8 @@ def read_carto(path: Path, options: ReadOptions) -> InstrumentExport:
     try:
         content = read_small_file(path, _MAX_FILE)
     except OSError as error:
-        raise RecordingError(
-            Problem(where=str(path), what=f"cannot be read: {error.strerror or error}", next_step="check the path")
+        raise RecordingError.of(
+            str(path), f"cannot be read: {error.strerror or error}", next_step="check the path"
         ) from error
     reader = _CartoReader(path, options)
     export = reader.read(content)
@@ -195,6 +195,4 @@ class _CartoReader:
             self._add(f": sample {shown}", "is not finite", value, "a length", "measure again: the beam was cut")
 
     def _add(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
-        self.problems.append(
-            Problem(where=f"{self._path}{place}", what=what, value=value, allowed=allowed, next_step=next_step)
-        )
+        self.problems.append(Problem(f"{self._path}{place}", what, value=value, allowed=allowed, next_step=next_step))

@@ -102,8 +102,8 @@ class SheetReader:
         }
         return [
             Problem(
-                where=f"{self.place}, {', '.join(cell.split()[0] for cell in cells[:_SHOWN])}",
-                what=f"{len(cells)} cells with {what[kind][0]}" if len(cells) > 1 else what[kind][0],
+                f"{self.place}, {', '.join(cell.split()[0] for cell in cells[:_SHOWN])}",
+                f"{len(cells)} cells with {what[kind][0]}" if len(cells) > 1 else what[kind][0],
                 value=", ".join(" ".join(cell.split()[1:]) for cell in cells[:_SHOWN] if " " in cell),
                 next_step=what[kind][1],
             )
@@ -117,14 +117,12 @@ class SheetReader:
         sheet.reset_dimensions()
         for number, cells in enumerate(cast(Any, sheet).iter_rows(), start=1):
             if number > MAX_ROWS or len(cells) > MAX_COLUMNS:
-                raise RecordingError(
-                    Problem(
-                        where=f"{self.place}, row {number}",
-                        what="is beyond what a list can have",
-                        value=f"{len(cells)} columns",
-                        allowed=f"{MAX_ROWS} rows, {MAX_COLUMNS} columns",
-                        next_step="delete what stands far to the right or below, or save the list as CSV",
-                    )
+                raise RecordingError.of(
+                    f"{self.place}, row {number}",
+                    "is beyond what a list can have",
+                    value=f"{len(cells)} columns",
+                    allowed=f"{MAX_ROWS} rows, {MAX_COLUMNS} columns",
+                    next_step="delete what stands far to the right or below, or save the list as CSV",
                 )
             yield number, cells
 

@@ -63,12 +63,12 @@ def check_workbook_file(path: Path, limits: ReadLimits) -> None:
             begin = file.read(8)
         size = path.stat().st_size
     except OSError as error:
-        raise RecordingError(Problem(where=str(path), what=f"cannot be read: {error.strerror}")) from error
+        raise RecordingError.of(str(path), f"cannot be read: {error.strerror}") from error
     if begin == _OLD:
         what = "is of an Excel before 2007 (.xls), or has a password"
-        raise RecordingError(Problem(where=str(path), what=what, allowed=".xlsx", next_step=_SAVE_AS))
+        raise RecordingError.of(str(path), what, allowed=".xlsx", next_step=_SAVE_AS)
     if not begin.startswith(_ZIP):
-        raise RecordingError(Problem(where=str(path), what="is no .xlsx file", allowed=".xlsx", next_step="check --as"))
+        raise RecordingError.of(str(path), "is no .xlsx file", allowed=".xlsx", next_step="check --as")
     try:
         with zipfile.ZipFile(path) as archive:
             unpacked = sum(part.file_size for part in archive.infolist())
@@ -76,21 +76,17 @@ def check_workbook_file(path: Path, limits: ReadLimits) -> None:
     except BROKEN as error:
         raise RecordingError(unreadable(path, why_broken(error))) from error
     if size > MAX_BYTES or unpacked > limits.unpacked_bytes:
-        raise RecordingError(
-            Problem(
-                where=str(path),
-                what="is too large for a list of measurements",
-                value=f"{size} bytes, unpacked {unpacked}",
-                allowed=f"{MAX_BYTES} bytes, unpacked {limits.unpacked_bytes}",
-                next_step="save the sheet as CSV",
-            )
+        raise RecordingError.of(
+            str(path),
+            "is too large for a list of measurements",
+            value=f"{size} bytes, unpacked {unpacked}",
+            allowed=f"{MAX_BYTES} bytes, unpacked {limits.unpacked_bytes}",
+            next_step="save the sheet as CSV",
         )
     if not any(name.endswith(("workbook.xml", "workbook.bin")) for name in names):
         raise RecordingError(unreadable(path, "it is an archive, and no workbook"))
     if any(name.endswith("workbook.bin") for name in names):
-        raise RecordingError(
-            Problem(where=str(path), what="is a binary workbook (.xlsb)", allowed=".xlsx", next_step=_SAVE_AS)
-        )
+        raise RecordingError.of(str(path), "is a binary workbook (.xlsb)", allowed=".xlsx", next_step=_SAVE_AS)
     try:
         for name in names:
             if name.lower().endswith(".xml"):  # a sheet may have any name
@@ -110,14 +106,12 @@ def _check_cells(path: Path, name: str, limits: ReadLimits) -> None:
             count += len(_CELL.findall(text, 0, end))
             rest = text[end:][:_OVERLAP]
             if count > limits.sheet_cells:
-                raise RecordingError(
-                    Problem(
-                        where=str(path),
-                        what="has too many cells for a list of measurements in a workbook",
-                        value=f"{name}: more than {limits.sheet_cells}",
-                        allowed=f"{limits.sheet_cells} cells in a sheet, and as many texts",
-                        next_step="save the sheet as CSV, which is read much faster",
-                    )
+                raise RecordingError.of(
+                    str(path),
+                    "has too many cells for a list of measurements in a workbook",
+                    value=f"{name}: more than {limits.sheet_cells}",
+                    allowed=f"{limits.sheet_cells} cells in a sheet, and as many texts",
+                    next_step="save the sheet as CSV, which is read much faster",
                 )
 
 
@@ -130,9 +124,7 @@ def why_broken(error: Exception) -> str:
 def unreadable(path: Path, reason: str) -> Problem:
     """The problem of a workbook that is damaged."""
     return Problem(
-        where=str(path),
-        what=f"cannot be read as .xlsx: {reason}",
-        next_step="save it again in a spreadsheet, or as CSV",
+        str(path), f"cannot be read as .xlsx: {reason}", next_step="save it again in a spreadsheet, or as CSV"
     )
 
 

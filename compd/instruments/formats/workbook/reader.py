@@ -101,22 +101,18 @@ def _choose_sheet(path: Path, book: Workbook, wanted: str | None) -> ReadOnlyWor
     sheets = {sheet.title: sheet for sheet in book.worksheets}
     if wanted is not None:
         if wanted not in sheets:
-            raise RecordingError(
-                Problem(where=str(path), what="has no such sheet", value=wanted, allowed=", ".join(sheets))
-            )
+            raise RecordingError.of(str(path), "has no such sheet", value=wanted, allowed=", ".join(sheets))
         return sheets[wanted]
     with_numbers = [title for title, sheet in sheets.items() if SheetReader(path, title).has_number(sheet, _LOOKED_AT)]
     if len(with_numbers) == 1:
         return sheets[with_numbers[0]]
     what = f"{len(with_numbers)} sheets hold numbers" if with_numbers else "no sheet holds a number"
-    raise RecordingError(
-        Problem(
-            where=str(path),
-            what=what,
-            value=", ".join(with_numbers or sheets),
-            allowed="one",
-            next_step="say which with --sheet" if with_numbers else "export the list again",
-        )
+    raise RecordingError.of(
+        str(path),
+        what,
+        value=", ".join(with_numbers or sheets),
+        allowed="one",
+        next_step="say which with --sheet" if with_numbers else "export the list again",
     )
 
 
@@ -128,8 +124,8 @@ def _merged(place: str, part: SheetPart, table: SheetTable) -> list[Problem]:
         return []
     return [
         Problem(
-            where=f"{place}, {', '.join(area.name for area in inside[:5])}",
-            what=f"{len(inside)} merged cells in the list",
+            f"{place}, {', '.join(area.name for area in inside[:5])}",
+            f"{len(inside)} merged cells in the list",
             allowed="a value in each cell",
             next_step="undo the merging, and fill the cells",
         )

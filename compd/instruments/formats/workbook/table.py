@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from compd.errors import Problem, RecordingError
+from compd.errors import RecordingError
 from compd.instruments.formats.workbook.cells import TEXT, VALUES, Row
 from compd.units import KNOWN_UNITS
 
@@ -43,7 +43,7 @@ def find_table(place: str, rows: Sequence[Row]) -> SheetTable:
     """
     columns = _columns_of_numbers(rows)
     if not columns:
-        raise RecordingError(Problem(where=place, what="holds no number", next_step="choose another with --sheet"))
+        raise RecordingError.of(place, "holds no number", next_step="choose another with --sheet")
     heads = [k for k, row in enumerate(rows) if _is_head(row, columns)]
     if not heads:
         begin = next(k for k, row in enumerate(rows) if any(kind in VALUES for kind in row.kinds))
@@ -64,13 +64,11 @@ def find_table(place: str, rows: Sequence[Row]) -> SheetTable:
     repeated = {k for k in heads if k > first and _names(rows[k]) in again}
     others = [rows[k].number for k in heads if k > first and k not in repeated]
     if others:
-        raise RecordingError(
-            Problem(
-                where=f"{place}, row {', '.join(map(str, others[:5]))}",
-                what="another header in the middle of the list",
-                allowed="one list in a sheet",
-                next_step="put the second list into a sheet of its own",
-            )
+        raise RecordingError.of(
+            f"{place}, row {', '.join(map(str, others[:5]))}",
+            "another header in the middle of the list",
+            allowed="one list in a sheet",
+            next_step="put the second list into a sheet of its own",
         )
     below = [row for k, row in enumerate(rows) if k > first and k not in repeated]
     left_out = {AGAIN: len(repeated)} if repeated else {}

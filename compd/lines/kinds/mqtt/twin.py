@@ -10,7 +10,7 @@ from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
 from compd.clock import Clock
-from compd.errors import CompdError, Problem
+from compd.errors import CompdError
 from compd.twins import WRONG_TYPE, SimulatedPushedDevice, SimulatedPushedLine
 
 NOT_A_NUMBER = "not a number"
@@ -34,12 +34,10 @@ class MqttPublisher(SimulatedPushedLine):
         """`broker`: host and port. Raises CompdError if there is none."""
         super().__init__(name, devices, clock)
         if broker is None:
-            raise CompdError(
-                Problem(
-                    where=f"lines.{name}",
-                    what="the simulated machine does not publish to the real machine's broker",
-                    next_step="start one, for instance `mosquitto -p 1884`, and name it: --broker 127.0.0.1:1884",
-                )
+            raise CompdError.of(
+                f"lines.{name}",
+                "the simulated machine does not publish to the real machine's broker",
+                next_step="start one, for instance `mosquitto -p 1884`, and name it: --broker 127.0.0.1:1884",
             )
         self._broker = broker
         self._client: Client
@@ -54,8 +52,8 @@ class MqttPublisher(SimulatedPushedLine):
             self._client.connect(*self._broker)
         except OSError as error:
             where = f"--broker {self._broker[0]}:{self._broker[1]}"
-            raise CompdError(
-                Problem(where=where, what=f"no MQTT broker answers: {error}", next_step="start it, or name another")
+            raise CompdError.of(
+                where, f"no MQTT broker answers: {error}", next_step="start it, or name another"
             ) from error
         self._client.loop_start()  # which connects again by itself
 

@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 
-from compd.errors import Problem, StateError
+from compd.errors import StateError
 
 
 class Counter:
@@ -36,7 +36,7 @@ class Counter:
         return len(bytearray(4_000_000))
 
     def refuse(self):
-        raise StateError(Problem(where="here", what="cannot be done"))
+        raise StateError.of("here", "cannot be done")
 
     def miss(self):
         raise KeyError("name")
@@ -52,4 +52,4 @@ class Faulty:
     """Cannot be opened."""
 
     def __init__(self, kept=None):
-        raise StateError(Problem(where="file", what="cannot be opened"))
+        raise StateError.of("file", "cannot be opened")
