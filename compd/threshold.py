@@ -1,30 +1,47 @@
-"""Thresholds: the numbers of a verdict, each a field of a frozen class, with its unit, its meaning and its reason."""
+"""Thresholds: the numbers of a verdict. Each is a field of a frozen class, with "unit | meaning | reason" under it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import Field, field, fields, is_dataclass, replace
-from typing import Any, TypeVar
+import ast
+import inspect
+from dataclasses import fields, is_dataclass, replace
+from itertools import pairwise
+from textwrap import dedent
+from typing import Any, NamedTuple, TypeVar
 
 T = TypeVar("T")
 
 
-def threshold(value: float | tuple[float, ...], *, unit: str, meaning: str, reason: str) -> Any:
-    """A field of a frozen dataclass of thresholds; unit, meaning and reason are its metadata, "1" is no unit."""
-    return field(default=value, metadata={"unit": unit, "meaning": meaning, "reason": reason})
+class Threshold(NamedTuple):
+    """One number of a verdict. Unit "1" is no unit."""
+
+    default: Any
+    unit: str
+    meaning: str
+    reason: str
 
 
-def thresholds(kind: type[Any]) -> dict[str, Field[Any]]:
+def thresholds(kind: type[Any]) -> dict[str, Threshold]:
     """Every threshold of a class of criteria by its name, of a section with the section's: "search.max_members"."""
-    return dict(_thresholds(kind, ""))
-
-
-def _thresholds(kind: type[Any], section: str) -> Iterator[tuple[str, Field[Any]]]:
-    for member in fields(kind):
-        if is_dataclass(member.default):
-            yield from _thresholds(type(member.default), f"{member.name}.")
+    found: dict[str, Threshold] = {}
+    texts = _texts(kind)
+    for field in fields(kind):
+        if is_dataclass(section := field.default):
+            found |= {f"{field.name}.{name}": each for name, each in thresholds(type(section)).items()}
         else:
-            yield f"{section}{member.name}", member
+            found[field.name] = Threshold(field.default, *texts[field.name].split(" | "))
+    return found
+
+
+def _texts(kind: type[Any]) -> dict[str, str]:
+    """The string under each field, in the source of the class."""
+    declared = ast.parse(dedent(inspect.getsource(kind))).body[0]
+    texts: dict[str, str] = {}
+    for pair in pairwise(declared.body if isinstance(declared, ast.ClassDef) else ()):
+        match pair:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                texts[name] = " ".join(text.split())
+    return texts
 
 
 def value_of(criteria: object, name: str) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import Field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from compd.comparison import ComparisonCriteria
 from compd.diagnosis import Criteria
 from compd.fleet.criteria import FleetCriteria
 from compd.recording.fault_criteria import FaultCriteria
-from compd.threshold import thresholds
+from compd.threshold import Threshold, thresholds
 from docs.generate.markdown import code, escape, heading, join, sentence, table, target, term
 
 # Written by `python -m tests.scoreboard.sensitivity --figures`.
@@ -80,7 +79,7 @@ These hold wherever a recording is read, before any other criterion. Rows that a
 
 
 def page() -> str:
-    """Markdown, from the fields of the classes and their metadata."""
+    """Markdown, from the thresholds of the classes."""
     return join(
         "# Criteria",
         INTRODUCTION,
@@ -102,11 +101,11 @@ def _part(title: str, name: str, kind: type[Any]) -> str:
     return join(heading(2, title, target("criteria", name)), table(header, rows))
 
 
-def _row(name: str, criterion: Field[Any], tried: bool) -> list[str]:
-    unit = criterion.metadata["unit"]
+def _row(name: str, criterion: Threshold, tried: bool) -> list[str]:
+    unit = criterion.unit
     values = criterion.default if isinstance(criterion.default, tuple) else (criterion.default,)
     default = ", ".join(f"{value:g}" for value in values) + ("" if unit == "1" else f" {escape(unit)}")
-    meaning, reason = (escape(sentence(criterion.metadata[key])) for key in ("meaning", "reason"))
+    meaning, reason = (escape(sentence(text)) for text in (criterion.meaning, criterion.reason))
     cells = [f"{code(name)}<br>{default}", f"{meaning}<br>*Reason:* {reason}"]
     if not tried:
         return cells

@@ -41,8 +41,7 @@ def write_criteria(sheets: Sheets) -> None:
         for name, field in thresholds(kind).items():
             if isinstance(field.default, tuple):
                 continue  # a grid of values is in no formula of the sheets
-            texts = [field.metadata[key] for key in ("unit", "meaning", "reason")]
-            sheets.book.put("Criteria", row, 1, [name, float(field.default), *texts])
+            sheets.book.put("Criteria", row, 1, [name, float(field.default), *field[1:]])
             sheets.criteria[name] = Address("Criteria", row, 2)
             row += 1
 

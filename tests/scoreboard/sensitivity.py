@@ -11,14 +11,13 @@ import argparse
 import json
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import Field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from compd.diagnosis import Criteria
+from compd.threshold import Threshold, with_value
 from compd.threshold import thresholds as thresholds_of
-from compd.threshold import with_value
 from tests.scoreboard.parallel import append_results, read_results
 from tests.scoreboard.scoring import Result, score
 from tests.scoreboard.trial import prepared, read_answer, run
@@ -71,7 +70,7 @@ def main() -> None:
     raise SystemExit(bool(failed))
 
 
-def thresholds() -> dict[str, Field[Any]]:
+def thresholds() -> dict[str, Threshold]:
     """Every number of `Criteria` by its name; what holds several values has no half."""
     return {name: field for name, field in thresholds_of(Criteria).items() if not isinstance(field.default, tuple)}
 
@@ -131,7 +130,7 @@ def table(results: Sequence[Result]) -> Iterator[str]:
     yield "| number | default | half | twice |"
     yield "|---|---|---:|---:|"
     for name, threshold in thresholds().items():
-        unit = threshold.metadata["unit"]
+        unit = threshold.unit
         default = f"{threshold.default:g}" + ("" if unit == "1" else f" {unit}")
         cells = " | ".join(counts[Variant(name, change)] for change in FACTORS)
         yield f"| `{name}` | {default} | {cells} |"

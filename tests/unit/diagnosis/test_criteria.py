@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import Field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from compd.diagnosis.criteria import Criteria
 from compd.diagnosis.recording_diagnosis import diagnose
 from compd.diagnosis.verdict import Diagnosis
 from compd.fleet.criteria import FleetCriteria
-from compd.threshold import thresholds, with_value
+from compd.threshold import Threshold, thresholds, with_value
 from tests.support.external_recordings import along, record_external
 
 ROOMS = [Path(compd.__file__).parent / room for room in ("comparison", "diagnosis", "fleet", "planning", "statistics")]
@@ -32,9 +32,8 @@ DOCUMENTED = {**THRESHOLDS, **thresholds(CalibrationCriteria)}
 
 
 @pytest.mark.parametrize("threshold", DOCUMENTED.values(), ids=DOCUMENTED)
-def test_every_threshold_says_what_it_means_in_which_unit_and_why(threshold: Field[Any]) -> None:
-    assert set(threshold.metadata) == {"unit", "meaning", "reason"}
-    assert all(text.strip() for text in threshold.metadata.values())
+def test_every_threshold_says_what_it_means_in_which_unit_and_why(threshold: Threshold) -> None:
+    assert all(text.strip() for text in (threshold.unit, threshold.meaning, threshold.reason))
 
 
 def test_every_threshold_is_used() -> None:
@@ -45,8 +44,8 @@ def test_every_threshold_is_used() -> None:
     }
     unused = [
         name
-        for name, field in THRESHOLDS.items()
-        if not {(part, field.name) for part in ("criteria", "_criteria", name.partition(".")[0])} & used
+        for name in THRESHOLDS
+        if not {(part, name.rpartition(".")[2]) for part in ("criteria", "_criteria", name.partition(".")[0])} & used
     ]
     assert unused == []
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import doctest
 import re
 import struct
-from dataclasses import Field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -35,7 +34,7 @@ from compd.recording.checks import LIMITS
 from compd.recording.reference import Reference
 from compd.recording.sidecar import Exclusion
 from compd.setpoint_states import Mode, State
-from compd.threshold import thresholds
+from compd.threshold import Threshold, thresholds
 from docs.generate import __main__ as generate
 from docs.generate.command_entries import CommandEntry, entries
 from docs.generate.live_examples import Exchange
@@ -237,7 +236,7 @@ def test_every_command_with_its_options(entry: CommandEntry) -> None:
 
 
 @pytest.mark.parametrize(("name", "threshold"), THRESHOLDS, ids=[name for name, _ in THRESHOLDS])
-def test_every_criterion(name: str, threshold: Field[Any]) -> None:
+def test_every_criterion(name: str, threshold: Threshold) -> None:
     row = next(line for line in page("criteria").split("\n") if line.startswith(f"| `{name}`<br>"))
     values = threshold.default if isinstance(threshold.default, tuple) else (threshold.default,)
     assert "<br>" + ", ".join(f"{value:g}" for value in values) in row
