@@ -14,7 +14,7 @@ BUILD_PACKAGES := import tomllib; project = tomllib.load(open("pyproject.toml", 
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help gallery docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel deb bench bench-sample costs soak scoreboard sensitivity nightly clean
+.PHONY: help gallery docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel deb bench bench-sample costs budget soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -35,6 +35,7 @@ help:
 	@echo "make soak    a running daemon and random faults, held against the truth (4 min; OPTIONS=\"--minutes 60 --seed 7\")"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
 	@echo "make costs   the README's table of what compd costs (cyclictest; half an hour, less with OPTIONS="--rounds 2 --rows 2000000")"
+	@echo "make budget  lines, files, doors, commands and keys of the tree, beside their limits (1 min)"
 	@echo "make scoreboard  the diagnosis on 1600 simulated machines (hours; continues where it stopped)"
 	@echo "make sensitivity  the scoreboard with each threshold of the diagnosis halved and doubled (hours; continues, too)"
 	@echo "make nightly everything: lint, wheel, demo, test, the long tests, hidden, bench, faults, three hours of soak, the scoreboard"
@@ -178,6 +179,10 @@ bench: $(STAMP)
 # The README's table of costs, from one run of half an hour on a quiet machine.
 costs: $(STAMP)
 	@$(BIN)/python -m tests.benchmarks.costs $(OPTIONS)
+
+# What the tree weighs, beside its limits: tests/budget/numbers.yaml
+budget: $(STAMP)
+	@$(BIN)/python -m tests.budget
 
 # Without those that run in real time for minutes.
 bench-sample: $(STAMP)
