@@ -29,7 +29,7 @@ SPEEDUP = 60.0
 MAX_S = 120.0
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def machine() -> Iterator[LinuxCnc]:
     """LinuxCNC on, homed, and with a program, on a machine with every ordinary error."""
     with simulated_daemon(load(HEXAPOD), 3, SPEEDUP, 3600.0) as directory:
