@@ -73,7 +73,7 @@ live: $(COMPILED)
 
 # Needs Debian's linuxcnc-uspace.
 demo-linuxcnc: $(COMPILED)
-	@$(BIN)/compd demo --linuxcnc
+	@$(BIN)/python examples/linuxcnc/run.py
 
 # A hidden cause is found on wires, in real time: two minutes each, so they have a target of their own. Each takes a
 # third of a processor: four at a time leave two processors enough for everything to be in time.

@@ -44,12 +44,6 @@ def _texts(kind: type[Any]) -> dict[str, str]:
     return texts
 
 
-def value_of(criteria: object, name: str) -> Any:
-    """The value of a threshold, by its name in `thresholds`."""
-    section, _, own = name.rpartition(".")
-    return getattr(getattr(criteria, section) if section else criteria, own)
-
-
 def with_value(criteria: T, name: str, value: object) -> T:
     """The criteria with another value of one threshold, by its name in `thresholds`.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -291,11 +290,6 @@ class Calibration:
 
     def __repr__(self) -> str:
         return f"<Calibration: {self.verdict}>"
-
-
-def summary_rows(errors: Sequence[PoseErrors]) -> list[tuple[str, float, float]]:
-    """What, rms before and after in um, of each."""
-    return [(one.what, one.before_rms_um, one.after_rms_um) for one in errors]
 
 
 def _prediction_json(prediction: PredictionMap) -> dict[str, Any]:

@@ -8,8 +8,7 @@ from typing import Literal, NamedTuple
 
 from pymodbus.framer.rtu import FramerRTU
 
-# Garbage outside numbers, names and terminators: digits would pass on a wire without checksum.
-GARBAGE_BYTES = bytes([0x00, 0x04, 0x1F, 0x23, 0x7E, 0x80, 0xAA, 0xF8, 0xFE, 0xFF])
+# Outside numbers, names and terminators: digits would pass on a wire without checksum.
 GARBAGE = b"\xf8\x00\x23"
 MBAP_LENGTH = 7  # transaction, protocol, length, unit of a Modbus TCP frame
 

@@ -31,7 +31,6 @@ from compd.gauge import Quality
 # Modbus exceptions: all of a slave or gateway for a read, and one outside every table.
 EXCEPTIONS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 0x5A)
 SAMPLES = 48  # replies for learning the constant parts
-TRIES_FOR_A_BASE = 24
 FOREIGN = b"\x01\x84\x02\xc2\xc1\r\n"
 BY_REGISTERS = "a line of registers checks its frames itself"
 

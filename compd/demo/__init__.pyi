@@ -1,12 +1,10 @@
-from .linuxcnc.demonstration import LINUXCNC_SPEEDUP as LINUXCNC_SPEEDUP
-from .linuxcnc.demonstration import SHIPPED_PROGRAM as SHIPPED_PROGRAM
-from .linuxcnc.demonstration import run_linuxcnc_demo as run_linuxcnc_demo
-from .linuxcnc.page import linuxcnc_verdict as linuxcnc_verdict
-from .linuxcnc.page import summarise_linuxcnc as summarise_linuxcnc
-from .linuxcnc.page import write_linuxcnc_page as write_linuxcnc_page
 from .live import LIVE_SPEEDUP as LIVE_SPEEDUP
 from .live import run_live as run_live
+from .machine_zero import take_zero as take_zero
 from .page import write_demo_page as write_demo_page
+from .processes import Command as Command
+from .processes import run_commands as run_commands
+from .processes import simulated_daemon as simulated_daemon
 from .session import SPEEDUP as SPEEDUP
 from .session import DemoSession as DemoSession
 from .session import run_demo as run_demo

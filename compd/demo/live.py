@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from compd.configuration import Configuration
 from compd.demo.machine_zero import take_zero
-from compd.demo.simulated_daemon import simulated_daemon
+from compd.demo.processes import simulated_daemon
 
 # Speed-up of weather and warm-up: an hour in three minutes makes the motion visible.
 LIVE_SPEEDUP = 20.0

@@ -1,16 +1,21 @@
-"""`compd` commands that run as processes side by side: each ready before the next starts, all stopped at the end."""
+"""`compd` commands as processes side by side, such as a simulated machine and its daemon.
+
+Each is ready before the next starts, and all are stopped at the end.
+"""
 
 from __future__ import annotations
 
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from compd.configuration import Configuration
 from compd.errors import DaemonError
 
 # Longest wait (s) for a start: the first one compiles the kernels, up to two minutes on a slow computer.
@@ -53,6 +58,32 @@ def run_commands(commands: Sequence[Command], log: Path) -> Iterator[None]:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+
+@contextmanager
+def simulated_daemon(
+    configuration: Configuration, seed: int, speedup: float, zero_hold_s: float, effects: Sequence[str] = ()
+) -> Iterator[Path]:
+    """Both run during the block; the directory with their sockets, `control.sock` and `compd.sock`.
+
+    seed : of weather, joints and targets.  speedup : of the weather.  zero_hold_s : how long the machine stands at
+    machine zero, s.  effects : hidden in the machine, as for `compd simulate --effect`.
+
+    Raises DaemonError if one does not start.
+    """
+    with tempfile.TemporaryDirectory(prefix="compd-") as temporary:
+        directory = Path(temporary)
+        options = ["--seed", str(seed), "--speedup", str(speedup), "--zero-hold", str(zero_hold_s)]
+        options += [f"--effect={effect}" for effect in effects]
+        commands = [
+            Command(
+                ["simulate", str(configuration.path), "--directory", temporary, *options],
+                ready=directory / "control.sock",
+            ),
+            Command(["run", str(directory / configuration.path.name)], ready=directory / "compd.sock"),
+        ]
+        with run_commands(commands, log=directory / "output.log"):
+            yield directory
 
 
 def _wait_until_ready(command: Command, process: subprocess.Popen[bytes], log: Path) -> None:

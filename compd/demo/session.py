@@ -17,7 +17,7 @@ from compd.arrays import rms
 from compd.client import Client, connect
 from compd.configuration import Configuration, ToolOnPlatformSettings
 from compd.demo.machine_zero import ANSWER_TIMEOUT_S, take_zero
-from compd.demo.simulated_daemon import simulated_daemon
+from compd.demo.processes import simulated_daemon
 from compd.errors import CompdError, DaemonError
 from compd.simulation import ControlClient
 

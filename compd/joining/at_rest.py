@@ -25,7 +25,7 @@ from compd.joining.joined_rows import joined_columns, joined_sidecar
 from compd.joining.misplaced_names import lines_text, listed, name_problems
 from compd.joining.plan_points import dwell_of_plan_rows, read_plan_points
 from compd.joining.reflectors import SeenReflector, points_of, reflector_problems, seen_reflectors
-from compd.recording import Recording, write_recording
+from compd.recording import Recording
 from compd.units import UM_PER_MM
 
 By = Literal["order", "name", "distance"]
@@ -74,24 +74,6 @@ class _Assigned:
     rms_mm: float
     next_best: tuple[int, float] | None
     left_out: dict[str, str]
-
-
-def join_at_rest(
-    recording: Recording,
-    configuration: Configuration | None,
-    export: InstrumentExport,
-    out: Path,
-    instrument: Instrument,
-    by: By,
-    plan: Path | None = None,
-) -> RestJoin:
-    """Write `out` (NAME.csv or NAME.parquet, and NAME.yaml): what `match_at_rest` puts together.
-
-    Raises RecordingError as it does, and where the files cannot be written.
-    """
-    joined = match_at_rest(recording, configuration, export, instrument, by, plan)
-    write_recording(out, joined.columns, joined.sidecar)
-    return joined
 
 
 def match_at_rest(

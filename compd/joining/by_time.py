@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from compd.errors import Problem, RecordingError
 from compd.instruments import LENGTH, Track
 from compd.joining.clock_offset import ClockOffset, estimate_offset, evaluate_offset
 from compd.joining.reflectors import Place
-from compd.recording import Frame, Recording, sidecar_contents, write_recording
+from compd.recording import Frame, Recording, sidecar_contents
 
 # Largest motion (mm) in the instrument's data of a machine at rest, unless its own noise imitates more.
 STILL_MM = 0.001
@@ -67,23 +66,6 @@ class Instrument:
     sigma_urad: float | None = None
     ball: int | None = None
     reflectors: Mapping[str, Place] = field(default_factory=dict)
-
-
-def join_reference(
-    recording: Recording,
-    track: Track,
-    out: Path,
-    instrument: Instrument,
-    offset_s: float | None = None,
-    moving: bool = False,
-) -> JoinResult:
-    """Write `out` (NAME.csv or NAME.parquet, and NAME.yaml): what `match_by_time` puts together.
-
-    Raises RecordingError as it does, and where the files cannot be written.
-    """
-    joined = match_by_time(recording, track, instrument, offset_s, moving)
-    write_recording(out, joined.columns, joined.sidecar)
-    return joined
 
 
 def match_by_time(

@@ -1,30 +1,23 @@
 """Limits on the connections of the page's server, and which one is closed for a new one.
 
 Every host that reaches the port may connect. Connections without a token are therefore few, and a new one replaces the
-oldest, so that no host can lock a person out. Each token has a share of the others.
+oldest, so that no host can lock a person out. Each token has a share of the others. Uvicorn's `limit_concurrency` does
+neither: it is one number for all, beyond which a newcomer is refused.
 """
 
 from __future__ import annotations
 
 import resource
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from compd.page.counted_log import CountedLog
 
+if TYPE_CHECKING:
+    from compd.page.limited_protocol import LimitedProtocol
+
 # Descriptors that the process asks the system for: more than its connections, files and pipes need.
 WANTED_DESCRIPTORS = 4096
-
-
-class Connection(Protocol):
-    """The part of a connection that this module uses."""
-
-    @property
-    def idle(self) -> bool:
-        """Whether the connection is idle: no request is being answered."""
-
-    def drop(self) -> None:
-        """Close the connection at once."""
 
 
 @dataclass(frozen=True)
@@ -47,71 +40,60 @@ class Connections:
     """All open connections; used by the event loop's thread alone."""
 
     def __init__(self, limits: ConnectionLimits, log: CountedLog) -> None:
+        self.log = log
         self._limits = limits
-        self._log = log
-        # in order of arrival
-        self._unknown: dict[Connection, None] = {}
-        self._known: dict[str, dict[Connection, None]] = {}
+        # name of the token that each has shown, in order of arrival
+        self._token_of: dict[LimitedProtocol, str | None] = {}
 
     def count(self) -> tuple[int, int]:
         """Number of connections without a token, and with one."""
-        return len(self._unknown), sum(map(len, self._known.values()))
+        unknown = len(self._of(None))
+        return unknown, len(self._token_of) - unknown
 
-    def came(self, connection: Connection) -> None:
+    def came(self, connection: LimitedProtocol) -> None:
         """Add a new connection; close the oldest one without a token if there are too many."""
-        self._unknown[connection] = None
-        if len(self._unknown) > self._limits.unknown:
-            oldest = next(iter(self._unknown))
-            self.went(oldest)
-            self.closed(oldest, "closed_for_a_newcomer")
+        self._token_of[connection] = None
+        if len(unknown := self._of(None)) > self._limits.unknown:
+            self.went(unknown[0])
+            self.closed(unknown[0], "closed_for_a_newcomer")
 
-    def admit(self, connection: Connection, name: str) -> bool:
+    def admit(self, connection: LimitedProtocol, name: str) -> bool:
         """The connection has shown the token of this name. False if the limit is reached.
 
         A place is made by closing the oldest that is idle: of the same token where it has its share already, else of
         the token that has most, which loses one that is not idle, too.
         """
-        own = self._known.get(name, {})
-        if connection in own:
+        if self._token_of.get(connection) == name:
             return True
-        self.went(connection)
-        if len(own) >= self._limits.of_token:
-            leaving = _oldest_idle(own)
-        elif self.count()[1] >= self._limits.known:
-            most = max(self._known.values(), key=len)
-            leaving = _oldest_idle(most) or (None if most is own else next(iter(most)))
-        else:
-            self._known.setdefault(name, {})[connection] = None
-            return True
-        if leaving is None:
-            self._unknown[connection] = None
-            self._log.note("no_place_for_a_token")
-            return False
-        self.went(leaving)
-        leaving.drop()
-        self._known.setdefault(name, {})[connection] = None
+        if connection not in self._token_of:
+            return False  # it has gone meanwhile
+        self._token_of[connection] = None
+        own = self._of(name)
+        has_share = len(own) >= self._limits.of_token
+        if has_share or self.count()[1] >= self._limits.known:
+            names = dict.fromkeys(filter(None, self._token_of.values()))
+            most = own if has_share else max(map(self._of, names), key=len)
+            leaving = [one for one in most if one.idle] or (most if most != own else [])
+            if not leaving:
+                self.log.note("no_place_for_a_token")
+                return False
+            self.went(leaving[0])
+            leaving[0].drop()
+        self._token_of[connection] = name
         return True
 
-    def went(self, connection: Connection) -> None:
+    def went(self, connection: LimitedProtocol) -> None:
         """Note that a connection is closed."""
-        self._unknown.pop(connection, None)
-        for name, own in list(self._known.items()):
-            own.pop(connection, None)
-            if not own:
-                del self._known[name]
+        self._token_of.pop(connection, None)
 
-    def closed(self, connection: Connection, why: str) -> None:
+    def closed(self, connection: LimitedProtocol, why: str) -> None:
         """Close a connection, and count it in the log."""
-        self._log.note(why)
+        self.log.note(why)
         connection.drop()
 
-    def note(self, what: str) -> None:
-        """Count in the log what a connection did."""
-        self._log.note(what)
-
-
-def _oldest_idle(connections: dict[Connection, None]) -> Connection | None:
-    return next((connection for connection in connections if connection.idle), None)
+    def _of(self, name: str | None) -> list[LimitedProtocol]:
+        """Connections that have shown the token of this name, or none, the oldest first."""
+        return [connection for connection, token in self._token_of.items() if token == name]
 
 
 def raised_descriptor_limit() -> int:

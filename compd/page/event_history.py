@@ -58,8 +58,3 @@ class Moments:
         """The stored event nearest to `time_s`; None before the first."""
         moments = [moment for moment in (kept.nearest(time_s) for kept in self._kept) if moment is not None]
         return zlib.decompress(min(moments, key=lambda moment: abs(moment[0] - time_s))[1]) if moments else None
-
-    @property
-    def size_bytes(self) -> int:
-        """Size of all stored events."""
-        return sum(len(event) for kept in self._kept for event in kept.events)

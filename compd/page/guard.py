@@ -108,7 +108,7 @@ _HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
 }
 LEAVE_PATH = "/leave"
-# Most headers of a request; browsers send some twenty.
+# Most headers of a request; browsers send some twenty. h11 limits the size of an incomplete head alone.
 MAX_HEADERS = 64
 _OWN_PATH = re.compile(r"(/[A-Za-z0-9_.-]+)*/?")
 _NEEDS_TOKEN = "This page needs the address that `compd page` printed, with its token, or a token of your own."

@@ -1,7 +1,8 @@
 """HTTP over one connection by uvicorn, with limits of time and size before and after a token is shown.
 
 Each stage of a request has its time, however many bytes come meanwhile: the head, the body, the answer. A connection
-that has shown no token is closed at the end of it, and after its answer.
+that has shown no token is closed at the end of it, and after its answer. Uvicorn's setting of a time,
+`timeout_keep_alive`, limits none of these: it ends with the first byte of a head.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import socket
 import struct
-from enum import Enum, auto
 from typing import Any
 
 import h11
@@ -22,7 +22,7 @@ from compd.page.connections import Connections
 
 # Time limit (s) for a request's head, from the connection's start or the end of the previous answer.
 HEAD_WITHIN_S = 5.0
-# Time limit (s) for a body or an answer without a token, and for an ignored body.
+# Time limit (s) for each stage without a token, and for an ignored body.
 UNKNOWN_WITHIN_S = 5.0
 # Time limit (s) for a body with a token: an instrument's export over a slow wireless network.
 BODY_WITHIN_S = 600.0
@@ -41,16 +41,6 @@ EVENTS_BUFFER_BYTES = 32 * 1024
 _STATE_KEY = "connection"
 # struct linger of socket(7): on, 0 s.
 _NO_LINGER = struct.pack("ii", 1, 0)
-
-
-class Stage(Enum):
-    """Stage of a connection: the event that it waits for."""
-
-    HEAD = auto()
-    BODY = auto()
-    UNWANTED_BODY = auto()
-    ANSWER = auto()
-    END = auto()
 
 
 class LimitedProtocol(H11Protocol):
@@ -88,7 +78,7 @@ class LimitedProtocol(H11Protocol):
 
     def note(self, what: str) -> None:
         """Count an event of a request in the log."""
-        self._all.note(what)
+        self._all.log.note(what)
 
     @property
     def idle(self) -> bool:
@@ -132,39 +122,35 @@ class LimitedProtocol(H11Protocol):
 
     def send_400_response(self, msg: str) -> None:
         """The received data is no HTTP, or its head is too large. The connection just ends if an answer has begun."""
-        self._all.note("no_http")
+        self._all.log.note("no_http")
         if self.idle and self.conn.our_state is h11.IDLE:
             super().send_400_response(msg)
         else:
             self.drop()
 
-    def _stage(self) -> Stage:
-        if self.transport.is_closing():
-            return Stage.END
-        if self.conn.their_state is h11.SEND_BODY:
-            return Stage.UNWANTED_BODY if self.idle else Stage.BODY
-        return Stage.HEAD if self.conn.their_state is h11.IDLE else Stage.ANSWER
-
     def _watch(self) -> None:
         """Start the time limit of a stage; bytes received in the stage do not extend it."""
-        watched = (self._stage(), self._known, id(self.cycle))
+        watched = (self.transport.is_closing(), self.idle, self.conn.their_state, self._known, id(self.cycle))
         if watched == self._watched:
             return
         self._watched = watched
         if self._deadline is not None:
             self._deadline.cancel()
-        within_s = self._within_s(watched[0])
+        within_s = self._within_s()
         self._deadline = None if within_s is None else self.loop.call_later(within_s, self._late)
 
-    def _within_s(self, stage: Stage) -> float | None:
-        if stage is Stage.HEAD:
-            return HEAD_WITHIN_S
-        if not self._known or stage is Stage.UNWANTED_BODY:
+    def _within_s(self) -> float | None:
+        """Time limit (s) of this stage; None for an answer to a token."""
+        if not self._known:
             return UNKNOWN_WITHIN_S
-        return {Stage.BODY: BODY_WITHIN_S, Stage.END: FLUSH_WITHIN_S}.get(stage)
+        if self.transport.is_closing():
+            return FLUSH_WITHIN_S
+        if self.conn.their_state is h11.SEND_BODY:
+            return UNKNOWN_WITHIN_S if self.idle else BODY_WITHIN_S
+        return HEAD_WITHIN_S if self.conn.their_state is h11.IDLE else None
 
     def _late(self) -> None:
-        if self._known and self._stage() is Stage.HEAD:
+        if self._known and self.conn.their_state is h11.IDLE and not self.transport.is_closing():
             self.transport.close()  # the end of an answer may still be in transit
             self._watch()
         elif self._received:

@@ -34,7 +34,7 @@ from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders, explained
 from compd.page.qr_code import svg_qr_code
 from compd.page.recordings import Recordings
-from compd.page.requests import LOOKS_ONLY, answer, asked_by, keys_of, may_change, note_change, refused
+from compd.page.requests import LOOKS_ONLY, MAX_BODY_BYTES, answer, asked_by, keys_of, may_change, note_change, refused
 from compd.page.workbench.routes import WorkbenchRoutes
 from compd.page.workers.workers import Workers
 from compd.report import AXES_CSS
@@ -100,7 +100,8 @@ class Server:
             Route("/static/axes.css", self._axes),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
-        return Starlette(routes=routes, lifespan=self._lifespan, middleware=[Middleware(Logbook)])
+        logbook = [Middleware(Logbook)]
+        return Starlette(routes=routes, lifespan=self._lifespan, middleware=logbook, max_body_size=MAX_BODY_BYTES)
 
     def end(self) -> None:
         """Let the browsers' streams end."""

@@ -12,7 +12,8 @@ from .truth.instruments import INTERFEROMETER as INTERFEROMETER
 from .truth.instruments import TRACKER as TRACKER
 from .truth.instruments import ball_plate_mm as ball_plate_mm
 from .truth.mechanism import Mechanism as Mechanism
-from .truth.probing import probe_ball as probe_ball
+from .truth.probing import PROBING_STEP_S as PROBING_STEP_S
+from .truth.probing import probing_steps_mm as probing_steps_mm
 from .truth.strengths import FULLY_MEASURED as FULLY_MEASURED
 from .truth.strengths import Strengths as Strengths
 from .truth.strengths import seen_by as seen_by

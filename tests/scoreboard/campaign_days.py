@@ -75,16 +75,23 @@ def days(case: Case, mechanism: Mechanism, number: int, places: FixedPlaces | No
     )
     match case.family:
         case "short" if number == 0:
-            return usual.single_visits(SHORT_ROWS)
+            return single_visits(usual, SHORT_ROWS)
         case hard.ONE_WARM_UP if number == 0:
             return one_warm_up(case, mechanism, usual, air)
         case hard.PLACE_BY_PLACE if number == 0:
             return place_by_place(case, mechanism, usual, air)
         case hard.WRONG_NOISE if number == 0 and case.rng("repeats").uniform() < 0.5:
-            return usual.single_visits(UNREPEATED_ROWS)
+            return single_visits(usual, UNREPEATED_ROWS)
         case hard.ZERO_ELSEWHERE:
             return since_a_zero_elsewhere(case, usual, number, air)
     return usual
+
+
+def single_visits(plan: CampaignPlan, count: int) -> CampaignPlan:
+    """The same campaign with `count` of its visits, evenly spread, one row at each, and without passes."""
+    visits = [replace(item, repeated=False) for item in plan.items if item.kind == "visit"]
+    kept = np.round(np.linspace(0, len(visits) - 1, count)).astype(int)
+    return replace(plan, items=tuple(visits[k] for k in kept))
 
 
 def one_warm_up(case: Case, mechanism: Mechanism, usual: CampaignPlan, air: AirAtZero) -> CampaignPlan:

@@ -18,7 +18,6 @@ from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import CampaignPlan
 from compd.simulation.campaign.simulated_recording import OUTLIER_SHARE
 from compd.simulation.causes.hidden_cause import HiddenCause, answer
-from compd.simulation.causes.sudden_change import NoCause, SuddenChange
 from compd.simulation.truth.instruments import PIN
 from tests.scoreboard import recording_faults as faults
 from tests.scoreboard.campaign_days import SIZED_ON_USUAL_DAYS, air_at_zero, days, touched_plane
@@ -28,6 +27,7 @@ from tests.scoreboard.expectation import ALWAYS_THERE, LEFT_UM, expectation
 from tests.scoreboard.external_machine import ExternalMachine
 from tests.scoreboard.external_machines import machine_of
 from tests.scoreboard.hard_cases import PLANE, RE_MOUNTED, ROUNDED, WRONG_NOISE, ZERO_ELSEWHERE
+from tests.scoreboard.sudden_change import NoCause, SuddenChange
 
 # What is there of a play before it grows.
 PLAY_BEFORE = 0.4

@@ -13,11 +13,10 @@ from typing import Self
 import numpy as np
 import yaml
 
-from compd.demo.linuxcnc.controller import LinuxCnc
-from compd.demo.linuxcnc.motion_log import MotionSample, read_motion_log
-from compd.demo.machine_zero import take_zero
-from compd.demo.processes import Command, run_commands
+from compd.demo import Command, run_commands, take_zero
 from compd.errors import DaemonError
+from controller import LinuxCnc
+from motion_log import MotionSample, read_motion_log
 from tests.injection.injector import Injector
 from tests.support.daemon_process import Daemon
 from tests.support.paths import CONFIG

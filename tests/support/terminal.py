@@ -91,7 +91,7 @@ def check_printed(shown: Shown, output: str) -> None:
 
 
 class Terminal:
-    """One directory with the checkout's `drivers` and its `config` made patient, and the processes that run there."""
+    """A directory with the checkout's `drivers`, `examples` and patient `config`, and the processes that run there."""
 
     def __init__(self, directory: Path, installs: bool = False) -> None:
         """installs : the page installs into the system; a stage stands in for it."""
@@ -99,7 +99,8 @@ class Terminal:
         self._stage = make_stage(directory) if installs else None
         self._beside: list[tuple[str, subprocess.Popen[bytes], bool]] = []
         self._logs: list[Path] = []
-        (directory / "drivers").symlink_to(ROOT / "drivers")
+        for folder in ("drivers", "examples"):
+            (directory / folder).symlink_to(ROOT / folder)
         shutil.copytree(CONFIG, directory / "config")
         for machine in (TRIPOD, HEXAPOD):
             (directory / "config" / machine.name).write_text(made_patient(machine.read_text()))

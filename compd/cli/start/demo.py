@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from compd.errors import CompdError
+
 if TYPE_CHECKING:
     from compd.demo import DemoSession
 
@@ -24,21 +26,11 @@ def demo(
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="With --live: TCP port of the page; 0: any free port.")
     ] = 7760,
-    linuxcnc: Annotated[
-        bool,
-        typer.Option("--linuxcnc", help="Correct LinuxCNC on the shipped hexapod instead, and find a hidden effect."),
-    ] = False,
-    program: Annotated[
-        Path | None, typer.Option(help="With --linuxcnc: the G-code to run; default: a shipped one.")
-    ] = None,
-    effect: Annotated[
-        str, typer.Option(metavar="ID=STRENGTH", help="With --linuxcnc: the effect hidden in the machine.")
-    ] = "link_expansion=8",
+    linuxcnc: Annotated[bool, typer.Option("--linuxcnc", hidden=True)] = False,
 ) -> None:
     """Run a simulated machine, the daemon and a controller; show the gain by compensation."""
     if linuxcnc:
-        _show_linuxcnc(seed, program, effect)
-        return
+        raise CompdError.of("--linuxcnc", "is a script", next_step="run examples/linuxcnc/run.py of a checkout")
     if live:
         _show_live(config, seed, port)
         return
@@ -117,40 +109,3 @@ def _show_live(config: Path | None, seed: int, port: int) -> None:
         )
 
     run_live(configuration, seed, serve)
-
-
-def _show_linuxcnc(seed: int, program: Path | None, effect: str) -> None:
-    from rich.console import Console
-
-    from compd.configuration import load, shipped_configuration
-    from compd.demo import (
-        LINUXCNC_SPEEDUP,
-        SHIPPED_PROGRAM,
-        linuxcnc_verdict,
-        run_linuxcnc_demo,
-        summarise_linuxcnc,
-        write_linuxcnc_page,
-    )
-    from compd.report import check_page_path
-
-    page = Path("out/linuxcnc/program.html")
-    page.parent.mkdir(parents=True, exist_ok=True)
-    check_page_path(page)
-    console = Console(highlight=False)
-    console.print(
-        f"LinuxCNC, headless, on a simulated hexapod with gauges on real ptys; weather {LINUXCNC_SPEEDUP:g} times "
-        f"faster than real. {effect.partition('=')[0]} is hidden in the machine. About ten minutes."
-    )
-    _load_daemon()
-    demo = run_linuxcnc_demo(
-        load(shipped_configuration("hexapod.yaml")),
-        page.parent,
-        seed,
-        [effect],
-        console.print,
-        program or SHIPPED_PROGRAM,
-    )
-    console.print(summarise_linuxcnc(demo))
-    console.print(linuxcnc_verdict(demo))
-    write_linuxcnc_page(page, demo)
-    console.print(f"The same as a picture: {page}")

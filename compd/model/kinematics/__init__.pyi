@@ -8,9 +8,6 @@ from .frame import FrameGeometry as FrameGeometry
 from .frame import base_pose as base_pose
 from .frame import distances_mm as distances_mm
 from .frame import solve_frame as solve_frame
-from .instantaneous import frame_difference as frame_difference
-from .instantaneous import frame_jacobians as frame_jacobians
-from .instantaneous import instantaneous_frame as instantaneous_frame
 from .link_kinematics import Mechanism as Mechanism
 from .link_kinematics import Pose as Pose
 from .link_kinematics import closure_at as closure_at

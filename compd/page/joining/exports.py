@@ -95,9 +95,8 @@ class Exports:
 
         file_name : the file's name on the person's computer; what cannot stand in a name here becomes "-".
 
-        Raises RecordingError for a name that is none, for a file that is empty, larger than MAX_BYTES, or another than
-        the one that has its name already; where all files would be more than MAX_FILES or MAX_BYTES_OF_ALL; and where
-        the disk refuses.
+        Raises RecordingError for a name that is none, for a file that is empty, or another than the one that has its
+        name already; where all files would be more than MAX_FILES or MAX_BYTES_OF_ALL; and where the disk refuses.
         """
         name = kept_name(file_name)
         self.directory.mkdir(parents=True, exist_ok=True)
@@ -125,10 +124,7 @@ class Exports:
         with os.fdopen(os.open(temporary, _NEW_FILE, _MODE, dir_fd=directory), "wb") as file:
             os.fchmod(file.fileno(), _MODE)  # independent of the umask
             async for piece in pieces:
-                count = self._arriving[temporary] + len(piece)
-                if count > MAX_BYTES:
-                    raise _refused("export", "is too large", allowed=f"{MAX_BYTES >> 20} MB", next_step="split it")
-                self._arriving[temporary] = count
+                self._arriving[temporary] += len(piece)
                 # a file completed meanwhile is in the directory and no longer arriving: looked up again near the end
                 self._require_room(kept)
                 await asyncio.to_thread(file.write, piece)  # the disk may lag

@@ -78,7 +78,7 @@ class JoinRoutes:
         return [
             Route("/join", self._index),
             Route("/join/sources", self._sources),
-            Route("/join/exports", self._bring, methods=["POST"]),
+            Route("/join/exports", self._bring, methods=["POST"], max_body_size=MAX_BYTES),
             *export_routes(self._exports),
             Route("/join/table", self._table, methods=["POST"]),
             Route("/join/log", self._log, methods=["POST"]),

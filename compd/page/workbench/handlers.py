@@ -22,6 +22,7 @@ class Handler(NamedTuple):
     path: str
     answer: Callable[[Request, OpenWorkbench], Awaitable[Response]]
     method: str = "GET"
+    max_body_size: int | None = None
 
 
 async def _summary(request: Request, workbench: OpenWorkbench) -> Response:
@@ -65,7 +66,7 @@ async def _step(request: Request, workbench: OpenWorkbench) -> Response:
 
 async def _exclude(request: Request, workbench: OpenWorkbench) -> Response:
     """`rows` with a `reason` are left out; without one they count again."""
-    keys: Any = await keys_of(request, MAX_ROWS_BYTES)
+    keys: Any = await keys_of(request)
     rows, reason, revision = keys.get("rows"), keys.get("reason"), keys.get("revision")
     if not may_change(request):
         return refused(LOOKS_ONLY, 403)
@@ -93,5 +94,5 @@ HANDLERS = (
     Handler("/effects/{effect}/{variant:int}", _trial),
     Handler("/effects/{effect}/doubt", _doubt),
     Handler("/step", _step, "POST"),
-    Handler("/exclusions", _exclude, "POST"),
+    Handler("/exclusions", _exclude, "POST", MAX_ROWS_BYTES),
 )

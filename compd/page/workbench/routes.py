@@ -154,8 +154,8 @@ class WorkbenchRoutes:
             Route("/workbench/libraries", self._list_libraries),
             Route("/workbench/open", self._open_one, methods=["POST"]),
             *(
-                Route(f"{_BASE}{handler.path}", self._of_open(handler), methods=[handler.method])
-                for handler in (*HANDLERS, *DIAGNOSIS_HANDLERS, *FORMULA_HANDLERS, *PLAN_HANDLERS, page)
+                Route(_BASE + of.path, self._of_open(of), methods=[of.method], max_body_size=of.max_body_size)
+                for of in (*HANDLERS, *DIAGNOSIS_HANDLERS, *FORMULA_HANDLERS, *PLAN_HANDLERS, page)
             ),
         ]
 

@@ -85,12 +85,6 @@ class CampaignPlan:
                 kept.append(item)
         return replace(self, items=tuple(kept))
 
-    def single_visits(self, count: int) -> CampaignPlan:
-        """The same campaign with `count` of its visits, evenly spread, one row at each, and without passes."""
-        visits = [replace(item, repeated=False) for item in self.items if item.kind == "visit"]
-        kept = np.round(np.linspace(0, len(visits) - 1, count)).astype(int)
-        return replace(self, items=tuple(visits[k] for k in kept))
-
 
 def draw_campaign_plan(
     mechanism: Mechanism,

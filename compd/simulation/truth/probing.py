@@ -35,17 +35,6 @@ def probing_steps_mm(world: World, ball: FloatArray, posture: Posture) -> Iterat
         yield world.scale_mm + mechanism.scales_at(mechanism.posture_at(ball - error_mm, turn_rad)) - drawn_mm
 
 
-def probe_ball(world: World, ball: FloatArray) -> Posture:
-    """Move to `ball` with the attitude of machine zero and probe it; returns the posture there, as drawn."""
-    mechanism = world.mechanism
-    posture = mechanism.posture_at(ball, np.zeros(3))
-    scale_mm = mechanism.scales_at(posture)
-    world.advance_to(scale_mm, posture, 4 * PROBING_STEP_S, 2 * PROBING_STEP_S)
-    for scale_mm in probing_steps_mm(world, ball, posture):
-        world.advance_to(scale_mm, posture, PROBING_STEP_S, PROBING_STEP_S / 2)
-    return posture
-
-
 def _turn_rad(mechanism: Mechanism, posture: Posture) -> FloatArray:
     """(3,) rotation vector in {M} from the attitude at machine zero to that of `posture`."""
     return np.asarray(Rotation.from_matrix((mechanism.posture0[1:].T @ posture[1:]).T).as_rotvec())

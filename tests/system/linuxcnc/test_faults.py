@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from compd.demo.linuxcnc.controller import obstacle
+from controller import obstacle
 from tests.injection.faults import Shows
 from tests.support.corrected_linuxcnc import SETTLED_MM, CorrectedLinuxCnc, check_corrections, moved_mm
 from tests.support.simulated import run_directory

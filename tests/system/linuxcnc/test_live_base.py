@@ -6,7 +6,7 @@ from contextlib import closing
 
 import pytest
 
-from compd.demo.linuxcnc.controller import LinuxCnc, edited, obstacle
+from controller import LinuxCnc, edited, obstacle
 from tests.support.setpoint_sender import SetpointSender
 from tests.support.simulated import run_directory
 from tests.support.watching import until

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.demo.linuxcnc.controller import LinuxCnc, obstacle
+from controller import LinuxCnc, obstacle
 from tests.support.setpoint_sender import SetpointSender
 from tests.support.simulated import run_directory
 from tests.support.watching import until

@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,13 +15,12 @@ import pytest
 
 from compd.arrays import rms
 from compd.configuration import load
-from compd.demo import SHIPPED_PROGRAM, run_linuxcnc_demo
-from compd.demo.linuxcnc.controller import LinuxCnc, obstacle
-from compd.demo.linuxcnc.demonstration import ADOPTED, OFF, ON
-from compd.demo.linuxcnc.motion_log import TipErrors, read_motion_log, tip_errors
-from compd.demo.machine_zero import take_zero
-from compd.demo.simulated_daemon import simulated_daemon
+from compd.demo import simulated_daemon, take_zero
 from compd.simulation import Mechanism
+from controller import LinuxCnc, obstacle
+from demonstration import SHIPPED_PROGRAM
+from motion_log import TipErrors, read_motion_log, tip_errors
+from tests.support.paths import ROOT
 from tests.support.simulated import HEXAPOD
 
 pytestmark = [pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
@@ -27,7 +29,7 @@ SPEEDUP = 60.0
 MAX_S = 120.0
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def machine() -> Iterator[LinuxCnc]:
     """LinuxCNC on, homed, and with a program, on a machine with every ordinary error."""
     with simulated_daemon(load(HEXAPOD), 3, SPEEDUP, 3600.0) as directory:
@@ -66,10 +68,14 @@ def test_the_tip_error_at_rest_is_ten_times_smaller_with_corrections(machine: Li
 
 @pytest.mark.long
 @pytest.mark.timeout(1200)
-def test_what_is_left_is_probed_diagnosed_and_adopted(tmp_path: Path) -> None:
-    demo = run_linuxcnc_demo(load(HEXAPOD), tmp_path, 3, ["link_expansion=8"], print)
-    for label, errors in demo.errors.items():
-        print(label, *errors.summary())
-    assert "link_expansion" in demo.adopted
-    assert rms(demo.errors[ON].at_rest_um) >= 3 * rms(demo.errors[ADOPTED].at_rest_um)
-    assert rms(demo.errors[OFF].at_rest_um) >= 3 * rms(demo.errors[ADOPTED].at_rest_um)
+def test_the_script_probes_diagnoses_and_adopts_what_is_left(tmp_path: Path) -> None:
+    command = [sys.executable, ROOT / "examples" / "linuxcnc" / "run.py", "--seed", "3"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=1190)
+    print(done.stdout)
+    assert done.returncode == 0, done.stderr
+    said = " ".join(done.stdout.split())
+    off_um, on_um, adopted_um = (float(um) for um in re.findall(r"([\d.]+) um with (?:corr|the)", said))
+    (effects,) = re.findall(r"; adopted: (.*?)\. The same", said)
+    assert "link_expansion" in effects
+    assert min(off_um, on_um) >= 3 * adopted_um
+    assert "Plotly.newPlot" in (tmp_path / "out" / "linuxcnc" / "program.html").read_text(encoding="utf-8")

@@ -95,7 +95,9 @@ def test_a_computer_may_be_late_by_chance_in_real_time_and_a_driver_wrong_never(
 
 # --- random interleavings ------------------------------------------------------------------------------------
 
-junk = st.lists(st.sampled_from(list(faults.GARBAGE_BYTES)), min_size=1, max_size=9).map(bytes)
+# outside numbers, names and terminators
+GARBAGE_BYTES = bytes([0x00, 0x04, 0x1F, 0x23, 0x7E, 0x80, 0xAA, 0xF8, 0xFE, 0xFF])
+junk = st.lists(st.sampled_from(list(GARBAGE_BYTES)), min_size=1, max_size=9).map(bytes)
 share = st.floats(0.0, 1.0)
 harmless_to_format = st.one_of(
     st.just(faults.NONE),

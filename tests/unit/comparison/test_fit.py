@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from compd.comparison.alignment.aligned_recording import AlignedRecording, effect_deltas
 from compd.comparison.effect_fit import fit, initial_effect
-from compd.comparison.prediction_uncertainty import first_order_uncertainty, gauge_noise, monte_carlo
+from compd.comparison.prediction_uncertainty import first_order_uncertainty, gauge_noise
 from compd.comparison.recording_comparison import compare
 from compd.comparison.shape_search import search_constants
 from compd.errors import CompdError
 from compd.model.effects import FittedEffect
 from compd.model.library import load_library
 from tests.support.measured import SIGMA_UM, aligned, gauges, hidden, record
+from tests.support.monte_carlo import monte_carlo
 
 Floats = NDArray[np.float64]
 LIBRARY = load_library()

@@ -14,9 +14,9 @@ from compd.comparison import compare, open_recording
 from compd.configuration import load_machine
 from compd.errors import RecordingError
 from compd.instruments import InstrumentExport
-from compd.joining.at_rest import By, RestJoin, join_at_rest
+from compd.joining.at_rest import By, RestJoin, match_at_rest
 from compd.joining.by_time import Instrument
-from compd.recording import read_recording
+from compd.recording import read_recording, write_recording
 from compd.simulation import Mechanism
 from tests.support.planned_measurements import plan_file
 from tests.support.points_at_rest import in_own_frame, points, write_gauges
@@ -39,8 +39,9 @@ class Measured(NamedTuple):
         self, export: InstrumentExport, by: By = "order", link: int | None = None, plan: Path | None = None
     ) -> RestJoin:
         recording = read_recording(self.gauges, needs_reference=False)
-        out = self.gauges.with_name("joined.csv")
-        return join_at_rest(recording, MACHINE, export, out, Instrument(sigma_um=0.5, link=link), by, plan)
+        joined = match_at_rest(recording, MACHINE, export, Instrument(sigma_um=0.5, link=link), by, plan)
+        write_recording(self.gauges.with_name("joined.csv"), joined.columns, joined.sidecar)
+        return joined
 
 
 def targets(rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:

@@ -15,9 +15,9 @@ from compd.cli.measurements.join import join as join_command
 from compd.errors import RecordingError
 from compd.instruments import ReadOptions, Track, read_export
 from compd.instruments import track_of as track_of_export
-from compd.joining.by_time import Instrument, join_reference
+from compd.joining.by_time import Instrument, JoinResult, match_by_time
 from compd.joining.clock_offset import agreement_curve, estimate_offset
-from compd.recording import read_recording, write_recording
+from compd.recording import Recording, read_recording, write_recording
 from tests.support.points_at_rest import write_gauges
 from tests.support.sampled import sampled
 from tests.support.two_clocks import TipPath, random_path, track_of
@@ -31,6 +31,20 @@ app.command()(join_command)
 @app.callback()
 def _several() -> None:
     """Keeps `join` a command of its own, as in `compd`."""
+
+
+def join_reference(
+    recording: Recording,
+    track: Track,
+    out: Path,
+    instrument: Instrument,
+    offset_s: float | None = None,
+    moving: bool = False,
+) -> JoinResult:
+    """Write `out`: what `match_by_time` puts together."""
+    joined = match_by_time(recording, track, instrument, offset_s, moving)
+    write_recording(out, joined.columns, joined.sidecar)
+    return joined
 
 
 def gauges(path: Path, motion: TipPath, time_s: FloatArray, rng: np.random.Generator, **extra: FloatArray) -> Path:

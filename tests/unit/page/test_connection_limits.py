@@ -106,6 +106,13 @@ def test_where_all_places_are_taken_the_token_that_has_most_loses_one(all_connec
     assert all_connections.count() == (0, 4)
 
 
+def test_one_that_has_gone_meanwhile_takes_no_place(all_connections):
+    (gone,) = come(all_connections, 1, idle=False)
+    all_connections.went(gone)
+    assert not all_connections.admit(gone, "Anna")
+    assert all_connections.count() == (0, 0)
+
+
 def test_a_connection_of_a_proxy_is_counted_for_the_token_that_it_carries_now(all_connections):
     (connection,) = come(all_connections, 1)
     assert all_connections.admit(connection, "Anna")

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+import frame_experiment
+import frame_page
+import frame_picture
 from compd.arrays import FloatArray
-from compd.cli.app import app
 from compd.configuration import Configuration, load, shipped_configuration
 from compd.gauge import DataSheetNoise
 from compd.machine_builder import build_model
 from compd.model import MachineModel
 from compd.model.kinematics import FrameGeometry, solve_frame
-from compd.paper import frame_experiment, frame_page
-from compd.paper.frame_experiment import SIZES_MM, FrameResult
 from compd.simulation import Strengths
-from docs.pictures import instantaneous_frame
+from frame_experiment import SIZES_MM, FrameResult
 
 # The ends of t1..t3, u1..u6 by equation (3) of the paper, counted from 0: supports 0..2, then plate points 3..5.
 ENDS = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (0, 5), (1, 3), (1, 4), (2, 4), (2, 5)])
@@ -152,22 +150,10 @@ def test_lengths_are_told_in_the_unit_that_suits_them(mm: float, text: str) -> N
 
 
 @pytest.mark.long
-def test_command_prints_table_and_sentences_and_draws_a_page(tmp_path: Path) -> None:
-    page = tmp_path / "pictures" / "page.html"
-    result = CliRunner().invoke(app, ["paper", "instantaneous", "--page", str(page)], terminal_width=160)
-    assert result.exit_code == 0, result.output
-    assert "power 2.00" in result.output.replace("\n", " ")
-    assert "warm-up" in result.output
-    text = page.read_text(encoding="utf-8")
-    assert text.count("Plotly.newPlot") >= 4
-    assert "power 2.00" in text
-
-
-@pytest.mark.long
-def test_the_committed_picture_is_what_the_command_finds() -> None:
+def test_the_committed_picture_is_what_the_experiment_finds() -> None:
     def numbers(svg: str) -> list[float]:
         return [float(number) for number in re.findall(r"\d+\.\d", svg)]
 
-    committed, drawn = instantaneous_frame.PICTURE.read_text(encoding="utf-8"), instantaneous_frame.picture()
+    committed, drawn = frame_picture.PICTURE.read_text(encoding="utf-8"), frame_picture.picture()
     assert re.sub(r"\d+\.\d", "#", committed) == re.sub(r"\d+\.\d", "#", drawn)
     np.testing.assert_allclose(numbers(committed), numbers(drawn), rtol=0, atol=1.0)  # a pixel

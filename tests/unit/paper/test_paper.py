@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+import drift_experiment
+import link_experiment
+import plate_experiment
 from compd.arrays import rms
-from compd.cli.app import app
 from compd.configuration import Configuration, load
-from compd.paper import drift_experiment, link_experiment, plate_experiment
-from compd.paper.reproduction import Reduction
 from compd.simulation.truth import strengths
+from reproduction import Reduction
+from tests.support.paths import ROOT
 from tests.support.sampled import sampled
-from tests.support.simulated import TRIPOD
+from tests.support.simulated import HEXAPOD, TRIPOD
 
 
 @pytest.fixture(scope="module")
@@ -66,18 +70,42 @@ def test_figure_21_the_ball_stands_still_once_the_frame_is_measured(tripod: Conf
     assert len(result.time_h) > 50
 
 
-@pytest.mark.parametrize("figure", sampled(["fig18", "fig20", "fig21"], 3))
-def test_command_prints_the_reduction_and_draws_a_page(tmp_path: Path, figure: str) -> None:
-    page = tmp_path / "pictures" / "page.html"
-    result = CliRunner().invoke(app, ["paper", figure, "--page", str(page)], terminal_width=160)
-    assert result.exit_code == 0, result.output
-    assert "reduction" in result.output
-    text = page.read_text(encoding="utf-8")
-    assert "The paper:" in text
+def run_script(directory: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, ROOT / "examples" / "paper" / "reproduce.py", *arguments]
+    environment = {**os.environ, "COLUMNS": "160"}
+    return subprocess.run(command, cwd=directory, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("experiment", "printed"),
+    sampled(
+        [
+            ("fig18", "reduction"),
+            ("fig20", "32 % by the joints"),
+            ("fig21", "reduction"),
+            ("instantaneous", "power 2.00"),
+        ],
+        3,
+    ),
+)
+def test_the_script_prints_a_table_and_draws_a_page(tmp_path: Path, experiment: str, printed: str) -> None:
+    done = run_script(tmp_path, experiment)
+    assert done.returncode == 0, done.stderr
+    assert printed in done.stdout
+    text = (tmp_path / "out" / f"{experiment}.html").read_text(encoding="utf-8")
+    assert printed.partition(" ")[0] in text
     assert text.count("Plotly.newPlot") >= 1
-    if figure == "fig20":
-        assert "32 %" in result.output
-        assert "32 %" in text
+
+
+def test_the_script_takes_a_machine_a_page_and_a_seed_and_says_what_is_wrong(tmp_path: Path) -> None:
+    page = tmp_path / "pictures" / "hexapod.html"
+    done = run_script(tmp_path, "fig20", str(HEXAPOD), "--seed", "2", "--page", str(page))
+    assert done.returncode == 0, done.stderr
+    assert "The paper: 32 % by the joints" in page.read_text(encoding="utf-8")
+    refused = run_script(tmp_path, "fig20", "nowhere.yaml")
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert "nowhere.yaml" in refused.stderr
+    assert "Traceback" not in refused.stderr
 
 
 def test_reduction_is_a_share_of_what_was_there() -> None:

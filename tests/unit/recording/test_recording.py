@@ -15,7 +15,7 @@ from compd.cli.measurements.recording import recording as recording_command
 from compd.columns import is_covariate
 from compd.configuration import load
 from compd.errors import RecordingError
-from compd.recording.reader import check_against, read_recording
+from compd.recording.reader import read_recording
 from compd.recording.sidecar import sidecar_contents
 from compd.recording.writer import write_recording
 from compd.travel_direction import row_directions
@@ -278,10 +278,10 @@ def test_unknown_unit_is_kept_and_warned_of(tmp_path: Path) -> None:
     assert "ends in no unit that is known" in str(recording.warnings[0])
 
 
-def test_check_against_counts_gauges(tmp_path: Path) -> None:
-    recording = read_recording(write_recording_files(tmp_path, drop_columns("joint_9_um")(csv_text())))
+def test_gauges_are_counted_against_the_machine(tmp_path: Path) -> None:
+    path = write_recording_files(tmp_path, drop_columns("joint_9_um")(csv_text()))
     with pytest.raises(RecordingError, match="8 joint comparator columns, tripod-cmm has 9"):
-        check_against(recording, load(TRIPOD))
+        read_recording(path, load(TRIPOD))
 
 
 def test_check_prints_what_there_is(tmp_path: Path) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+import operator
 
 import pytest
 import yaml
 
 from compd.diagnosis import Criteria
 from compd.model.library import load_effects
-from compd.threshold import value_of
 from tests.scoreboard.case import Case
 from tests.scoreboard.page import write_page
 from tests.scoreboard.prepare import prepare
@@ -85,7 +85,11 @@ def test_a_variant_changes_one_threshold():
     assert changed(Variant("", UNCHANGED)) == Criteria()
     assert len(variants()) == 1 + len(FACTORS) * len(thresholds())
     for variant in variants()[1:]:
-        different = [name for name in thresholds() if value_of(changed(variant), name) != value_of(Criteria(), name)]
+        different = [
+            name
+            for name in thresholds()
+            if operator.attrgetter(name)(changed(variant)) != operator.attrgetter(name)(Criteria())
+        ]
         assert different == [variant.name]
 
 

@@ -9,10 +9,11 @@ import numpy as np
 from compd.simulation.campaign.campaign import Campaign
 from compd.simulation.campaign.campaign_plan import draw_campaign_plan
 from compd.simulation.causes.catalogue import build_cause
-from compd.simulation.causes.sudden_change import NoCause, SuddenChange
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import FULLY_MEASURED_WITHOUT_NOISE, NOTHING
 from compd.simulation.truth.world import World
+from tests.scoreboard.campaign_days import single_visits
+from tests.scoreboard.sudden_change import NoCause, SuddenChange
 from tests.support.simulated import tripod, wiring
 
 MACHINE = Mechanism(tripod())
@@ -61,7 +62,7 @@ def test_a_play_grows_to_what_it_would_be_had_it_always_been_so():
 
 
 def test_visits_alone_have_one_row_each_in_all_sessions():
-    plan = draw_campaign_plan(MACHINE, 5).single_visits(90)
+    plan = single_visits(draw_campaign_plan(MACHINE, 5), 90)
     assert len(plan.items) == 90
     assert {item.kind for item in plan.items} == {"visit"}
     assert not any(item.repeated for item in plan.items)

@@ -288,12 +288,16 @@ def test_a_name_that_could_be_a_path_is_no_export(client, recordings, name):
     assert files(recordings.parent) == before
 
 
-def test_an_export_that_is_empty_or_too_large_leaves_nothing(client, recordings, monkeypatch):
+def test_an_export_that_is_empty_or_too_large_leaves_nothing(client, recordings):
     before = files(recordings)
-    monkeypatch.setattr(exports, "MAX_BYTES", 1000)
-    for content, reason in ((b"", "is empty"), (b"1 2 3\n" * 1000, "too large")):
-        answer = client.post("/join/exports", params={"name": "a.txt"}, content=content)
-        assert (answer.status_code, reason in answer.json()["reason"]) == (409, True)
+    empty = client.post("/join/exports", params={"name": "a.txt"}, content=b"")
+    assert (empty.status_code, "is empty" in empty.json()["reason"]) == (409, True)
+    piece = b"1 2 3\n" * 2**20
+    pieces = (piece for _ in range(exports.MAX_BYTES // len(piece) + 1))
+    declared = {"Content-Length": str(exports.MAX_BYTES + 1)}
+    for content, headers in ((piece, declared), (pieces, {})):
+        answer = client.post("/join/exports", params={"name": "a.txt"}, content=content, headers=headers)
+        assert answer.status_code == 413
     assert files(recordings) == before
 
 

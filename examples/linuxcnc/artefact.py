@@ -12,8 +12,8 @@ import numpy as np
 import yaml
 
 from compd.arrays import FloatArray
-from compd.demo.linuxcnc.motion_log import MotionSample
 from compd.recording import sidecar_contents, write_recording
+from motion_log import MotionSample
 
 # Calibrated corners in {M}, mm, each outermost in x, y and z: the three faces that meet there are probed.
 CORNERS_mm = (

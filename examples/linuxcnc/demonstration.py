@@ -9,25 +9,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from compd.client import connect
-from compd.configuration import Configuration
-from compd.demo.linuxcnc.artefact import (
+from artefact import (
     CORNERS_mm,
     probing_program,
     write_artefact,
     write_probed_recording,
 )
-from compd.demo.linuxcnc.controller import LinuxCnc, ProgramStopped
-from compd.demo.linuxcnc.motion_log import MotionSample, TipErrors, read_motion_log, tip_errors
-from compd.demo.machine_zero import take_zero
-from compd.demo.processes import Command, run_commands
-from compd.demo.simulated_daemon import simulated_daemon
+from compd.client import connect
+from compd.configuration import Configuration
+from compd.demo import Command, run_commands, simulated_daemon, take_zero
 from compd.errors import CompdError, DaemonError
 from compd.gauge import Quality
 from compd.simulation import ControlClient, Mechanism
+from controller import LinuxCnc, ProgramStopped
+from motion_log import MotionSample, TipErrors, read_motion_log, tip_errors
 
 # Speed-up of weather and warm-up: a minute of demonstration is half an hour.
-LINUXCNC_SPEEDUP = 30.0
+SPEEDUP = 30.0
 # Time (s) at machine zero, until the controller commands the machine.
 ZERO_HOLD_S = 600.0
 SHIPPED_PROGRAM = Path(__file__).parent / "program.ngc"
@@ -63,14 +61,14 @@ class LinuxCncDemo:
     adopted: list[str] = field(default_factory=list)
 
 
-def run_linuxcnc_demo(
+def run_demonstration(
     configuration: Configuration,
     out: Path,
     seed: int,
     effects: Sequence[str],
     tell: Callable[[str], None],
     program: Path = SHIPPED_PROGRAM,
-    speedup: float = LINUXCNC_SPEEDUP,
+    speedup: float = SPEEDUP,
 ) -> LinuxCncDemo:
     """Probe during the warm-up; run the program without and with corrections; adopt the diagnosis; run it again.
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.demo.linuxcnc import controller
-from compd.demo.linuxcnc.artefact import CORNERS_mm
+import controller
+from artefact import CORNERS_mm
 
 PERIOD_S = 0.001
 # The link looks so often, at a sample that is so old when the pins change.
@@ -26,7 +26,7 @@ PROBE_HAL = Path(controller.__file__).with_name("probe.hal")
 def link(monkeypatch: pytest.MonkeyPatch) -> Any:
     """The component's module, with a `hal` that it does not use here."""
     monkeypatch.setitem(sys.modules, "hal", ModuleType("hal"))
-    return importlib.import_module("compd.demo.linuxcnc.machine_link")
+    return importlib.import_module("machine_link")
 
 
 class ProbeHal:

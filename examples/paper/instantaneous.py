@@ -7,9 +7,8 @@ U (9,) are the changes of t1..t3, u1..u6 since machine zero and X (9,) the displ
 J is the unit vector along edge e, at its near support positive, at its far support negative: d|b - m| = (b - m) . db /
 |b - m|. J is constant, that of machine zero.
 
-The exact solution costs five microseconds, so the daemon uses that; this is the paper's other way, kept to compare:
-`compd paper instantaneous` shows both side by side. Example, on the tripod: u1 longer by 0.1 mm displaces {B} by
-0.0862 mm, and the two ways differ by 7 nm and 0.02 urad.
+The exact solution costs five microseconds, so the daemon uses that. Example, on the tripod: u1 longer by 0.1 mm
+displaces {B} by 0.0862 mm, and the two ways differ by 7 nm and 0.02 urad.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from numpy.typing import ArrayLike
 from compd.arrays import FloatArray
 from compd.errors import KinematicsError
 from compd.model.kernels import AMPLIFICATION_LIMIT
-from compd.model.kinematics.frame import Frame, FrameGeometry, distances_mm
+from compd.model.kinematics import Frame, FrameGeometry, distances_mm
 
 
 class FrameJacobians(NamedTuple):

@@ -10,11 +10,11 @@ from plotly.graph_objects import Figure
 
 from compd.arrays import FloatArray, rms
 from compd.configuration import Configuration
-from compd.paper.gauge_log import GaugeLog
-from compd.paper.reproduction import Reduction, Reproduction
 from compd.report import COLOURS, Panel, style_figure
-from compd.simulation import TRACKER, World, ball_plate_mm, probe_ball
+from compd.simulation import TRACKER, World, ball_plate_mm
 from compd.units import UM_PER_MM
+from gauge_log import GaugeLog, probe_ball
+from reproduction import Reduction, Reproduction
 
 # Time (s) that a person takes per ball, and rounds over the whole plate, there and back.
 PER_BALL_S = 30.0
@@ -61,7 +61,7 @@ def run(configuration: Configuration, seed: int) -> PlateResult:
     )
 
 
-def reproduce_plate(configuration: Configuration, seed: int) -> Reproduction:
+def reproduce(configuration: Configuration, seed: int) -> Reproduction:
     """Run and evaluate the experiment on this machine; seed : of joints, weather and noise."""
     result = run(configuration, seed)
     return Reproduction("Figure 20: distances between the balls of a 3D ball plate", reductions(result), panels(result))

@@ -9,11 +9,11 @@ from plotly.graph_objects import Figure
 
 from compd.arrays import FloatArray
 from compd.configuration import Configuration
-from compd.paper.gauge_log import GaugeLog
-from compd.paper.reproduction import Reduction, Reproduction
 from compd.report import COLOURS, Panel, style_figure
-from compd.simulation import TRACKER, World, probe_ball
+from compd.simulation import TRACKER, World
 from compd.units import UM_PER_MM
+from gauge_log import GaugeLog, probe_ball
+from reproduction import Reduction, Reproduction
 
 HOUR_S = 3600.0
 EVERY_S = 600.0
@@ -51,7 +51,7 @@ def run(configuration: Configuration, seed: int) -> DriftResult:
     return DriftResult(np.array(time_h), change_um, np.array(frame_degC))
 
 
-def reproduce_drift(configuration: Configuration, seed: int) -> Reproduction:
+def reproduce(configuration: Configuration, seed: int) -> Reproduction:
     """Run and evaluate the experiment on this machine; seed : of joints, weather and noise."""
     result = run(configuration, seed)
     return Reproduction("Figure 21: a ball on the surface plate during warm-up", reductions(result), panels(result))

@@ -14,11 +14,11 @@ from plotly.graph_objects import Figure
 from compd.arrays import FloatArray, rms
 from compd.configuration import Configuration
 from compd.machine_builder import joint_weights
-from compd.paper.gauge_log import GaugeLog
-from compd.paper.reproduction import Reduction, Reproduction
 from compd.report import COLOURS, Panel, style_figure
 from compd.simulation import INTERFEROMETER, Cause, Heat, Mechanism, World, build_cause
 from compd.units import UM_PER_MM
+from gauge_log import GaugeLog
+from reproduction import Reduction, Reproduction
 
 LINK = 0
 # Link without the device: expansion of steel (handbook), compliance of a screw drive of this size.
@@ -109,7 +109,7 @@ def _measure_link(
     return LinkDifferences(axial_N, cold_um, warm_um, np.array(link_degC), np.array(warming_um))
 
 
-def reproduce_link(configuration: Configuration, seed: int) -> Reproduction:
+def reproduce(configuration: Configuration, seed: int) -> Reproduction:
     """Run and evaluate the experiment on this machine; seed : of joints, weather and noise."""
     result = run(configuration, seed)
     return Reproduction("Figure 18: scale unit against laser interferometer", reductions(result), panels(result))

@@ -1,4 +1,4 @@
-"""Gauge readings of the simulated machine, logged row by row and evaluated by the model."""
+"""Balls probed by the simulated machine; its gauges logged row by row and evaluated by the model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from compd.arrays import FloatArray
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.configuration import Configuration
 from compd.machine_builder import build_model
-from compd.simulation import DISTANCES, World
+from compd.simulation import DISTANCES, PROBING_STEP_S, World, probing_steps_mm
 
 
 @dataclass
@@ -40,3 +40,12 @@ class GaugeLog:
         )
         result, _ = compensate_cmm(model, values, WarmStart.at_zero(model))
         return result.tip_M_mm if configuration.geometry.tool.on == "platform" else result.tip_P_mm
+
+
+def probe_ball(world: World, ball: FloatArray) -> None:
+    """Move to `ball` with the attitude of machine zero and probe it."""
+    mechanism = world.mechanism
+    posture = mechanism.posture_at(ball, np.zeros(3))
+    world.advance_to(mechanism.scales_at(posture), posture, 4 * PROBING_STEP_S, 2 * PROBING_STEP_S)
+    for scale_mm in probing_steps_mm(world, ball, posture):
+        world.advance_to(scale_mm, posture, PROBING_STEP_S, PROBING_STEP_S / 2)

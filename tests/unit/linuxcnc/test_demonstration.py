@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +12,19 @@ import numpy as np
 import pytest
 import yaml
 
-from compd.demo.linuxcnc.artefact import (
+from artefact import (
     CLEAR_mm,
     CORNERS_mm,
     probing_program,
     reading_times_s,
     write_probed_recording,
 )
-from compd.demo.linuxcnc.controller import LinuxCnc, ProgramStopped
-from compd.demo.linuxcnc.motion_log import read_motion_log, tip_errors, wanted_tips_mm
 from compd.errors import DaemonError
 from compd.recording import sidecar_contents, write_recording
 from compd.simulation import Mechanism
+from controller import LinuxCnc, ProgramStopped
+from motion_log import read_motion_log, tip_errors, wanted_tips_mm
+from tests.support.paths import ROOT
 from tests.support.simulated import hexapod
 
 PERIOD_S = 0.01
@@ -174,3 +177,16 @@ def test_the_probing_program_touches_three_faces_of_every_corner() -> None:
     assert program.count("o<corner> call") == len(CORNERS_mm)
     assert program.count("o<face> call") == 3
     assert program.count("G38.2") == 2
+
+
+def test_the_script_names_the_package_where_linuxcnc_is_missing(tmp_path: Path) -> None:
+    command = [sys.executable, ROOT / "examples" / "linuxcnc" / "run.py"]
+    done = subprocess.run(command, cwd=tmp_path, env={"PATH": ""}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "apt-get install linuxcnc-uspace" in done.stderr
+
+
+def test_the_old_option_names_the_script() -> None:
+    done = subprocess.run([sys.executable, "-m", "compd", "demo", "--linuxcnc"], capture_output=True, check=False)
+    assert done.returncode == 2
+    assert b"examples/linuxcnc/run.py" in done.stderr

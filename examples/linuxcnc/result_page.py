@@ -8,14 +8,14 @@ from plotly.graph_objects import Figure
 from rich.table import Table as TerminalTable
 
 from compd.arrays import rms
-from compd.demo.linuxcnc.demonstration import ADOPTED, OFF, ON, LinuxCncDemo
 from compd.report import COLOURS, PageTable, Panel, style_figure, write_page
+from demonstration import ADOPTED, OFF, ON, LinuxCncDemo
 
 COLUMNS = ("tip error, um", "at rest, rms", "largest", "moving, rms", "largest")
 RUN_COLOURS = {OFF: COLOURS["worst"], ON: COLOURS["middle"], ADOPTED: COLOURS["best"]}
 
 
-def summarise_linuxcnc(demo: LinuxCncDemo) -> TerminalTable:
+def summarise(demo: LinuxCncDemo) -> TerminalTable:
     table = TerminalTable(title="distance of the true tip from where the program wants it")
     for number, name in enumerate(COLUMNS):
         table.add_column(name, justify="right" if number else "left", no_wrap=True)
@@ -24,7 +24,7 @@ def summarise_linuxcnc(demo: LinuxCncDemo) -> TerminalTable:
     return table
 
 
-def linuxcnc_verdict(demo: LinuxCncDemo) -> str:
+def verdict(demo: LinuxCncDemo) -> str:
     """The result in one sentence, for the rests or, without rests, for the whole program."""
     errors = demo.errors.values()
     resting = all(len(run.at_rest_um) for run in errors)
@@ -35,7 +35,7 @@ def linuxcnc_verdict(demo: LinuxCncDemo) -> str:
     return f"{'At rest' if resting else 'Along the program'} the tip's error (rms) is {', '.join(parts)}{adopted}."
 
 
-def write_linuxcnc_page(path: Path, demo: LinuxCncDemo) -> None:
+def write_result_page(path: Path, demo: LinuxCncDemo) -> None:
     panels = [
         Panel(
             "The same program, each time as LinuxCNC ran it",
@@ -51,7 +51,7 @@ def write_linuxcnc_page(path: Path, demo: LinuxCncDemo) -> None:
         ),
     ]
     footer = "LinuxCNC on a simulated machine, gauges on real ptys; the truth shares no code with the model."
-    write_page(path, "compd demo: LinuxCNC", linuxcnc_verdict(demo), panels, footer)
+    write_page(path, "LinuxCNC, corrected by compd", verdict(demo), panels, footer)
 
 
 def _rows(demo: LinuxCncDemo) -> list[tuple[str, ...]]:

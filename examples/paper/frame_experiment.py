@@ -17,18 +17,13 @@ from compd.arrays import FloatArray
 from compd.configuration import Configuration
 from compd.machine_builder import build_model
 from compd.model import MachineModel
-from compd.model.kinematics import (
-    forward_kinematics,
-    frame_difference,
-    frame_jacobians,
-    instantaneous_frame,
-    solve_frame,
-)
+from compd.model.kinematics import forward_kinematics, solve_frame
 from compd.operation_settings import FRAME_DISTANCES
-from compd.paper.gauge_log import GaugeLog
 from compd.rotation import compose, rotation_matrix, to_outer
 from compd.simulation import Strengths, World
 from compd.units import UM_PER_MM
+from gauge_log import GaugeLog
+from instantaneous import frame_difference, frame_jacobians, instantaneous_frame
 
 # Largest of the nine changes (mm): from a hundredth, an ordinary day, to more than any frame survives.
 SIZES_MM = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])

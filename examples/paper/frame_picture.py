@@ -1,4 +1,4 @@
-"""Draw what `compd paper instantaneous` finds: `python -m docs.pictures.instantaneous_frame`."""
+"""Draw what `reproduce.py instantaneous` finds for the documentation: `python examples/paper/frame_picture.py`."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+import frame_experiment
 from compd.configuration import load, shipped_configuration
-from compd.paper import frame_experiment
-from compd.paper.frame_experiment import SIZES_MM, FrameResult
-from compd.paper.frame_page import length_text
 from compd.report import COLOURS
 from compd.units import UM_PER_MM
+from frame_experiment import SIZES_MM, FrameResult
+from frame_page import length_text
 
-PICTURE = Path(__file__).with_name("instantaneous-frame.svg")
+PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "instantaneous-frame.svg"
 WIDTH, HEIGHT = 720, 420
 LEFT, RIGHT, TOP, BOTTOM = 90, 690, 30, 350
 # Powers of ten at the ends of the axes: change in mm, difference in um.
@@ -90,7 +90,7 @@ def draw(result: FrameResult) -> str:
 
 def picture() -> str:
     """The picture of the shipped tripod, seed 1, as the command's default is."""
-    return draw(frame_experiment.run(load(shipped_configuration("tripod-cmm.yaml")), 1))
+    return draw(frame_experiment.run_frame_experiment(load(shipped_configuration("tripod-cmm.yaml")), 1))
 
 
 if __name__ == "__main__":

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from plotly.graph_objects import Figure
 
 from compd.arrays import FloatArray
-from compd.paper.frame_experiment import (
+from compd.report import COLOURS, PageTable, Panel, check_page_path, style_figure, write_page
+from compd.units import UM_PER_MM
+from frame_experiment import (
     DIRECTIONS,
     ROWS_PER_CALL,
     SIZES_MM,
@@ -20,40 +21,19 @@ from compd.paper.frame_experiment import (
     crossing_mm,
     order,
 )
-from compd.report import COLOURS, PageTable, Panel, check_page_path, style_figure, write_page
-from compd.units import UM_PER_MM
 
 # Each cell but the first holds the median and the largest, over directions or, for the warm-up, over time.
 HEAD = ("largest change", "{B} displaced", "{B} rotated", "tip")
+CAPTION = f"Instantaneous less exact: median and largest of {DIRECTIONS} directions; of the warm-up, over time."
 _FOOTER = (
     "Equations (4) and (5) of T. Oiwa, Accuracy improvement of parallel kinematic machine, against the exact solution "
     "of equations (2) and (3). The warm-up is that of the simulated machine, which shares no code with the model."
 )
 
 
-class FrameTable(NamedTuple):
-    """The result as a table: `rows` stand under `head`; `sentences` say what the numbers mean."""
-
-    title: str
-    caption: str
-    head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    sentences: list[str]
-
-
-def frame_table(result: FrameResult) -> FrameTable:
-    """The table of a terminal, and the same texts for the page."""
-    return FrameTable(title(result), table_caption(), HEAD, table_rows(result), sentences(result))
-
-
 def title(result: FrameResult) -> str:
     """Title of table and page."""
     return f"Equations (4) and (5) against the exact frame: {result.machine}"
-
-
-def table_caption() -> str:
-    """Explanation of the table's cells."""
-    return f"Instantaneous less exact: median and largest of {DIRECTIONS} directions; of the warm-up, over time."
 
 
 def table_rows(result: FrameResult) -> list[tuple[str, ...]]:
@@ -159,7 +139,7 @@ def panels(result: FrameResult) -> list[Panel]:
             _warm_up_text(result),
             style_figure(warm, "time since switch-on, h", "difference at the tip, nm", 300),
         ),
-        Panel("In numbers", _cost_text(result), PageTable(HEAD, table_rows(result), table_caption())),
+        Panel("In numbers", _cost_text(result), PageTable(HEAD, table_rows(result), CAPTION)),
     ]
 
 
