@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from compd.live.service.message_keys.message import Keys, SentMessage
+from compd.operation_settings import LimitSettings, LoopBasics
 
 
 class WiredChannelKeys(Keys):
@@ -20,33 +21,6 @@ class WiredChannelKeys(Keys):
     role: Literal["S", "Ra", "Rb", "B"] | None = Field(default=None, description="of a joint, as in the configuration")
     distance: str | None = Field(default=None, description="of the frame: t1 to t3, u1 to u6")
     name: str | None = Field(default=None, description="of a quantity, with its unit")
-
-
-class MachineLoopKeys(Keys):
-    """The loop, as in the section `loop` of the configuration."""
-
-    rate_hz: float = Field(description="cycles per second")
-    stale_after_s: float = Field(description="a reading older than this is stale, unless its gauge says otherwise, s")
-    on_stale: Literal["hold", "fade", "degrade", "stop"] = Field(description="what happens without a comparator")
-    hold_s: float = Field(description="for how long at most, s")
-
-
-class MachineLimitKeys(Keys):
-    """Of the correction of each link, as in the section `limits` of the configuration."""
-
-    correction_mm: float = Field(description="largest, to either side, mm")
-    slew_mm_per_s: float = Field(description="fastest change, mm/s")
-    on_limit: Literal["clamp", "refuse"] = Field(description="what happens beyond them")
-    tip_correction_mm: float | None = Field(
-        default=None, description="machines without scales: largest of the tip, mm; absent: `correction_mm`"
-    )
-    rotation_correction_rad: float | None = Field(
-        default=None,
-        description="machines without scales: largest of the attitude, rad; absent: as the tip's at 100 mm",
-    )
-    tip_error_um: float | None = Field(
-        default=None, description="largest bound of the tip's error that is valid, um; absent: none"
-    )
 
 
 class MachineKeys(SentMessage):
@@ -63,6 +37,6 @@ class MachineKeys(SentMessage):
         description="`actuators`, `rods`, `hinges` and `target_fixes` of the machine, also where `geometry` has the "
         "keys of `kinematics`; absent with own kinematics",
     )
-    limits: MachineLimitKeys = Field(description="what a correction may be")
-    loop: MachineLoopKeys = Field(description="how the loop runs")
+    limits: LimitSettings = Field(description="what a correction may be")
+    loop: LoopBasics = Field(description="how the loop runs")
     wiring: list[WiredChannelKeys] = Field(description="what each channel measures: scales, joints, frame, quantities")

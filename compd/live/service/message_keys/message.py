@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from compd.live.service.messages import ErrorCode
 
@@ -22,6 +23,13 @@ class SentMessage(Keys):
     """Base of all messages that the daemon sends. wire_name : the message's "class"."""
 
     wire_name: ClassVar[str]
+
+
+def keys_of(kind: type[Any]) -> type[Keys]:
+    """The keys of a NamedTuple, each as its docstring describes it; one that has a default may be absent."""
+    defaults: Mapping[str, Any] = kind._field_defaults
+    fields: dict[str, Any] = {name: (hint, defaults.get(name, ...)) for name, hint in get_type_hints(kind).items()}
+    return create_model(kind.__name__, __base__=Keys, __doc__=kind.__doc__, **fields)
 
 
 class VersionKeys(SentMessage):
