@@ -122,8 +122,8 @@ class Wiring(Section):
         return math.nan if self.frame_drift_um is None else self.frame_drift_um
 
 
-class LoopSettings(Section):
-    """The compute loop."""
+class LoopBasics(Section):
+    """What clients are told of the compute loop."""
 
     rate_hz: Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False)] = Field(description="cycles per second")
     stale_after_s: Positive = Field(description="a reading older than this is stale (a gauge may set its own)")
@@ -133,6 +133,11 @@ class LoopSettings(Section):
         "invalid at once"
     )
     hold_s: Positive = Field(description="duration of hold or fade before the setpoint becomes invalid")
+
+
+class LoopSettings(LoopBasics):
+    """The compute loop."""
+
     extrapolate: bool = Field(
         default=True,
         description="carry every length on to the time of the cycle, by the speed that its own last readings show, "

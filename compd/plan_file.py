@@ -23,7 +23,7 @@ import difflib
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -31,6 +31,7 @@ from typing import Any
 from compd.columns import approach_columns
 from compd.errors import CompdError, Problem, RecordingError
 from compd.files import write_files
+from compd.tables import ProblemList, Table, read_table
 
 PURPOSE_COLUMN = "purpose"
 TIP_COLUMNS = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
@@ -124,16 +125,14 @@ def read_plan_file(
     limits : column -> (lowest, highest) of each quantity that the machine can hold, and of SPEED_COLUMN; other
         columns are refused. Raises CompdError if there is no header that could be read.
     """
-    return _PlanFileReader(path, links, limits, problems).read()
+    return _PlanFileReader(path, links, limits).read(problems)
 
 
 class _PlanFileReader:
     """One pass over one file; every problem with its line and column."""
 
-    def __init__(
-        self, path: Path, links: int, limits: Mapping[str, tuple[float, float]], problems: list[Problem]
-    ) -> None:
-        self._path, self._problems = path, problems
+    def __init__(self, path: Path, links: int, limits: Mapping[str, tuple[float, float]]) -> None:
+        self._problems = ProblemList(path)
         self._approaches = approach_columns(links)
         self._limits: Mapping[str, tuple[float, float]] = {
             "time_s": (0.0, math.inf),
@@ -143,37 +142,28 @@ class _PlanFileReader:
             **dict.fromkeys(self._approaches, (-1.0, 1.0)),
         }
 
-    def read(self) -> PlanFile:
-        header, *rows = self._rows()
-        self._check_header(header[1])
-        if header[1] and not rows:
-            self._add("", "has no row", allowed="a header and at least one row", next_step=WRITTEN_BY)
-        lines = [self._plan_line(line, header[1], cells) for line, cells in rows]
-        return PlanFile(self._path, header[1], lines)
-
-    def _rows(self) -> list[tuple[int, list[str]]]:
-        """(line, stripped cells) of every row that is not empty; the header first."""
-        try:
-            with self._path.open(encoding="utf-8-sig", newline="") as stream:
-                reader = csv.reader(stream)
-                rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if any(cells)]
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            reason = error.strerror if isinstance(error, OSError) else str(error)
-            raise CompdError.of(str(self._path), f"cannot be read: {reason}", next_step=WRITTEN_BY) from error
-        if not rows:
-            raise CompdError.of(str(self._path), "is empty", allowed="a header and rows", next_step=WRITTEN_BY)
-        if not set(NEEDED_COLUMNS) & set(rows[0][1]):
-            # a file that is no plan is not quoted
-            raise CompdError.of(
-                f"{self._path}:1", "is no header of a plan", allowed=", ".join(NEEDED_COLUMNS), next_step=WRITTEN_BY
-            )
-        return rows
+    def read(self, problems: list[Problem]) -> PlanFile:
+        found = self._problems
+        table = read_table(
+            found.path, found, lambda names: not set(NEEDED_COLUMNS).isdisjoint(names), (PURPOSE_COLUMN,)
+        )
+        if table is None:
+            raise CompdError([replace(problem, next_step=WRITTEN_BY) for problem in found.problems])
+        self._check_header(list(table.columns))
+        if not len(table.row):
+            found.add("", "has no row", allowed="a header and at least one row", next_step=WRITTEN_BY)
+        values = {name: self._settings(table, name) for name in table.columns if name in self._limits}
+        purposes = table.texts(PURPOSE_COLUMN)
+        lines = [
+            PlanLine(row, purposes[i], {name: settings[i] for name, settings in values.items()})
+            for i, row in enumerate(table.row.tolist())
+        ]
+        problems += found.problems
+        return PlanFile(found.path, list(table.columns), lines)
 
     def _check_header(self, header: Sequence[str]) -> None:
         names = ("row", PURPOSE_COLUMN, *self._limits)
-        for name in dict.fromkeys(header):
-            if header.count(name) > 1:
-                self._add(f":1 column {name}", "is there twice", next_step="delete one")
+        for name in header:
             if name not in names:
                 close = difflib.get_close_matches(name, names, n=1)
                 next_step = f"did you mean {close[0]}?" if close else "delete the column, or plan for another pair"
@@ -183,40 +173,24 @@ class _PlanFileReader:
             if name not in header:
                 self._add(f":1 column {name}", "is missing", allowed=", ".join(NEEDED_COLUMNS), next_step=WRITTEN_BY)
 
-    def _plan_line(self, line: int, header: Sequence[str], cells: Sequence[str]) -> PlanLine:
-        if len(cells) != len(header):
-            self._add(
-                f":{line}",
-                "has not as many cells as the header",
-                str(len(cells)),
-                str(len(header)),
-                "write a number with `.`, and no comma in a purpose without quotes",
-            )
-        by_column = dict(zip(header, cells, strict=False))
-        values = {
-            name: self._number(f":{line} column {name}", name, cell)
-            for name, cell in by_column.items()
-            if name in self._limits
-        }
-        return PlanLine(line, by_column.get(PURPOSE_COLUMN, ""), values)
-
-    def _number(self, place: str, name: str, cell: str) -> float:
+    def _settings(self, table: Table, name: str) -> list[float]:
+        """The column's numbers; nan where one is not allowed, which is a problem."""
         low, high = self._limits[name]
         allowed = f"{low:g} to {high:g}" if math.isfinite(high) else "a number" if low < 0 else "0 or more"
         allowed = "-1, 0 or 1" if name in self._approaches else allowed
-        try:
-            value = float(cell)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            self._add(place, "is no number" if cell else "is empty", cell, allowed, "write a number")
-            return math.nan
-        if not low <= value <= high or (name in self._approaches and value not in (-1, 0, 1)):
-            too_fast = name == SPEED_COLUMN and value > high
-            what = "is faster than this machine's drives" if too_fast else "is out of range"
-            self._add(place, what, cell, allowed, "change the row, or give `compd plan` the limit")
-            return math.nan
-        return value
+        values: list[float] = table.columns[name].tolist()
+        for i, (row, value) in enumerate(zip(table.row.tolist(), values, strict=True)):
+            place = f":{row} column {name}"
+            if math.isnan(value):
+                if name not in table.wrong:
+                    self._add(place, "is empty", "", allowed, "write a number")
+            elif not low <= value <= high or (name in self._approaches and value not in (-1, 0, 1)):
+                too_fast = name == SPEED_COLUMN and value > high
+                what = "is faster than this machine's drives" if too_fast else "is out of range"
+                self._add(place, what, f"{value:g}", allowed, "change the row, or give `compd plan` the limit")
+                values[i] = math.nan
+        return values
 
     def _add(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
-        self._problems.append(Problem(f"{self._path}{place}", what, value=value, allowed=allowed, next_step=next_step))
+        where = f"{self._problems.path}{place}"
+        self._problems.problems.append(Problem(where, what, value=value, allowed=allowed, next_step=next_step))

@@ -76,8 +76,8 @@ class ReadingMotion(NamedTuple):
 
     speed_mm_per_s: float
     braking_mm_per_s2: float
-    u_mm_per_s: float
-    horizon_s: float
+    u_mm_per_s: float = math.nan
+    horizon_s: float = 0.0
     mean_mm_per_s: float = 0.0
     window_s: float = 0.0
     due_s: float = 0.0

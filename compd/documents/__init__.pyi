@@ -4,6 +4,7 @@ from .document import Document as Document
 from .document import read_document as read_document
 from .document import read_entries as read_entries
 from .edited_text import Value as Value
+from .edited_text import with_entries as with_entries
 from .edited_text import with_values as with_values
 from .section import AbsolutePath as AbsolutePath
 from .section import Finite as Finite

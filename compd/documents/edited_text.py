@@ -1,7 +1,7 @@
-"""The text of a YAML file with other numbers; comments, order and all other text stay unchanged.
+"""The one editor of YAML text: values and entries change; comments, order and all other text stay.
 
 The text is cut where the parser says that a value begins and ends. A round trip through ruamel.yaml would write long
-flow collections with other line breaks.
+flow collections with other line breaks, and lose the comment before an entry that is deleted.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -19,9 +20,12 @@ import yaml
 from compd.documents.yaml_reader import Location, dotted, parse_yaml
 from compd.errors import ConfigurationError
 
-# A number, a vector, or a word that needs no quotes.
+# A number, a vector, or a text.
 Value: TypeAlias = float | Sequence[float] | str
-_PLAIN = re.compile(r"[\w./-]+")
+# Texts without quotes; PyYAML adds them to words such as `yes`.
+_PLAIN = re.compile(r"[A-Za-z_/][\w./-]*", re.ASCII)
+# Longest line of an entry in block style.
+_WIDTH = 110
 
 
 @dataclass
@@ -57,15 +61,92 @@ def with_values(text: str, path: Path, values: Mapping[Location, Value], remark:
         old = _found(parent, location[-1])
         said = f"{_key(location)} {'not stated' if old is None else _before(text, old)}" if remark else ""
         if old is None:
-            _add(cuts, parent, str(location[-1]), value, (remark, said) if remark else (), where)
+            _add(cuts, text, parent, str(location[-1]), value, (remark, said) if remark else (), where)
         else:
             _replace(cuts, _child(parent, location[-1:], uses, where), value, where)
-            cuts.remarks[_end(old).line] += [said] * bool(said)
+            cuts.remarks[text.count("\n", 0, _end(text, old))] += [said] * bool(said)
         _set(wanted, location, value)
+    return _edited(text, path, cuts, wanted, remark)
+
+
+def with_entries(text: str, path: Path, key: str, entries: Sequence[Any]) -> str:
+    """The text with these entries in the list under `key`; entries that stay keep their text.
+
+    key : of the top level; "" for a text that is the list itself. It is added where it is missing, and removed with
+        its last entry. Comments in an entry that is replaced go above it.
+
+    Raises ConfigurationError where the text is written so that its entries cannot be cut out.
+    """
+    data, _ = parse_yaml(text, path)
+    wanted = {**(data or {}), key: list(entries)} if key else list(entries)
+    if key and not entries:
+        del wanted[key]  # type: ignore[arg-type]
+    root, cuts = yaml.compose(text, Loader=yaml.SafeLoader), _Cuts()
+    if root is None:
+        return f"{text}{chr(10) * (text[-1:] not in ('', chr(10)))}{_block(wanted)}\n"
+    found = ((name, value) for name, value in root.value if name.value == key) if key else ()
+    name, node = next(iter(found), (None, None if key else root))
+    if node is None:
+        _add(cuts, text, root, key, list(entries), (), str(path))
+    elif isinstance(root, yaml.MappingNode) and name is not None and not entries and not root.flow_style:
+        cuts.parts.append((name.start_mark.index - name.start_mark.column, _line_end(text, _end(text, node)) + 1, ""))
+    elif name is not None and isinstance(node, yaml.ScalarNode) and node.value in ("", "~", "null"):
+        indent = " " * (name.start_mark.column + 2)
+        cuts.parts.append((node.start_mark.index, node.end_mark.index, f"\n{_block(entries, indent)}"))
+    elif isinstance(node, yaml.SequenceNode):
+        _change_entries(cuts, text, node, data[key] if key else data, entries, str(path))
+    else:
+        raise _unusual(str(path))
+    return _edited(text, path, cuts, wanted)
+
+
+def _edited(text: str, path: Path, cuts: _Cuts, wanted: Any, remark: str = "") -> str:
+    """The text with all parts put in. Raises ConfigurationError unless it has the data that are wanted."""
     edited = _cut(text, cuts, remark)
-    if parse_yaml(edited, path)[0] != wanted:
+    try:
+        data, _ = parse_yaml(edited, path)
+    except ConfigurationError as error:
+        raise _unusual(str(path)) from error
+    if (data or None) != (wanted or None):
         raise _unusual(str(path))
     return edited
+
+
+def _change_entries(
+    cuts: _Cuts, text: str, node: yaml.SequenceNode, before: Sequence[Any], after: Sequence[Any], where: str
+) -> None:
+    """Make a list's entries those of `after`, each as one part; a list in one line is written anew around them."""
+    steps = SequenceMatcher(None, list(map(repr, before)), list(map(repr, after)), autojunk=False).get_opcodes()
+    if node.flow_style:
+        if _comments(text[node.start_mark.index : node.end_mark.index]):
+            raise _unusual(where)
+        texts = [text[child.start_mark.index : child.end_mark.index] for child in node.value]
+        kept = [texts[i1:i2] if tag == "equal" else map(_flow, after[j1:j2]) for tag, i1, i2, j1, j2 in steps]
+        written = ", ".join(entry for part in kept for entry in part)
+        cuts.parts.append((node.start_mark.index, node.end_mark.index, f"[{written}]"))
+        return
+    indent = " " * node.start_mark.column
+    begins = [text.rfind(f"\n{indent}-", 0, child.start_mark.index) + 1 for child in node.value]
+    ends = [_line_end(text, _end(text, child)) for child in node.value]
+    for tag, i1, i2, j1, j2 in steps:
+        both = 0 if tag == "equal" else min(i2 - i1, j2 - j1)
+        for i, entry in zip(range(i1, i1 + both), after[j1:j2], strict=False):
+            comments = "".join(f"{indent}{comment}\n" for comment in _comments(text[begins[i] : ends[i]]))
+            cuts.parts.append((begins[i], ends[i], comments + _block([entry], indent)))
+        if tag != "equal":
+            cuts.parts += [(begins[i], ends[i] + 1, "") for i in range(i1 + both, i2)]
+        if tag != "equal" and (added := after[j1 + both : j2]):
+            at, new = (ends[i2 - 1], f"\n{_block(added, indent)}") if i2 else (begins[0], f"{_block(added, indent)}\n")
+            cuts.parts.append((at, at, new))
+
+
+def _comments(part: str) -> list[str]:
+    """The comments in a part of a text."""
+    begin, comments = 0, []
+    for token in yaml.scan(part, Loader=yaml.SafeLoader):
+        comments += re.findall(r"#[^\n]*", part[begin : token.start_mark.index])
+        begin = token.end_mark.index
+    return [*comments, *re.findall(r"#[^\n]*", part[begin:])]
 
 
 def _uses(root: yaml.Node) -> Mapping[int, int]:
@@ -103,7 +184,7 @@ def _found(node: yaml.Node, part: str | int) -> yaml.Node | None:
 def _replace(cuts: _Cuts, node: yaml.Node, value: Value, where: str) -> None:
     """Number by number, so that comments between the numbers of a vector stay."""
     if isinstance(node, yaml.ScalarNode):
-        cuts.parts.append((node.start_mark.index, node.end_mark.index, value_as_yaml(value)))
+        cuts.parts.append((node.start_mark.index, node.end_mark.index, _flow(value)))
         return
     children = node.value if isinstance(node, yaml.SequenceNode) else []
     if isinstance(value, float | int | str) or len(children) != len(value):
@@ -112,28 +193,56 @@ def _replace(cuts: _Cuts, node: yaml.Node, value: Value, where: str) -> None:
         _replace(cuts, child, number, where)
 
 
-def _add(cuts: _Cuts, parent: yaml.Node, key: str, value: Value, comment: Sequence[str], where: str) -> None:
+def _add(cuts: _Cuts, text: str, parent: yaml.Node, key: str, value: Any, comment: Sequence[str], where: str) -> None:
     """The key at the end of its mapping. comment : how it begins, and what it says; empty for none."""
     if not isinstance(parent, yaml.MappingNode) or not parent.value:
         raise _unusual(where)
-    entry, end = f"{key}: {value_as_yaml(value)}", _end(parent.value[-1][1])
+    end = _end(text, parent.value[-1][1])
+    line = text.count("\n", 0, end)
     if parent.flow_style:
-        cuts.parts.append((end.index, end.index, f", {entry}"))
-        cuts.remarks[end.line] += comment[1:]
+        cuts.parts.append((end, end, f", {key}: {_flow(value)}"))
+        cuts.remarks[line] += comment[1:]
     else:
         indent = " " * parent.value[0][0].start_mark.column
-        cuts.added.append((end.line, f"\n{indent}{entry}{'  # ' * bool(comment)}{' '.join(comment)}"))
+        entries = isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value)
+        entry = f"{key}:\n{_block(value, indent)}" if entries else f"{key}: {_flow(value)}"
+        cuts.added.append((line, f"\n{indent}{entry}{'  # ' * bool(comment)}{' '.join(comment)}"))
 
 
-def value_as_yaml(value: Value) -> str:
-    """A value as YAML in one line, with as many digits as it has."""
-    if isinstance(value, str):
-        return value if _PLAIN.fullmatch(value) else yaml.safe_dump(value, default_style='"', width=10_000).strip()
-    if isinstance(value, float | int):
-        text = repr(float(value) + 0.0).removesuffix(".0")
-        # 1e-06 is a number of YAML 1.1 only with a point
-        return text if "e" not in text or "." in text else text.replace("e", ".0e")
-    return f"[{', '.join(map(value_as_yaml, value))}]"
+class _Dumper(yaml.SafeDumper):
+    """Texts in quotes except plain words, so that no YAML reader takes them for numbers; no anchors."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = None if _PLAIN.fullmatch(text) else '"'
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+def _represent_number(dumper: yaml.SafeDumper, number: float) -> yaml.ScalarNode:
+    """As many digits as it has, and 10 for 10.0."""
+    whole = repr(float(number) + 0.0).removesuffix(".0")
+    return dumper.represent_int(int(whole)) if whole.lstrip("-").isdigit() else dumper.represent_float(float(number))
+
+
+_Dumper.add_representer(str, _represent_text)
+_Dumper.add_multi_representer(float, _represent_number)
+_Dumper.add_representer(float, _represent_number)
+
+
+def _flow(value: Any) -> str:
+    """A value as YAML in one line."""
+    return yaml.dump(
+        [value], Dumper=_Dumper, sort_keys=False, allow_unicode=True, default_flow_style=True, width=10**9
+    )[1:-2]
+
+
+def _block(data: Any, indent: str = "") -> str:
+    """Entries as YAML, each from a line of its own, without the last line's end."""
+    options: dict[str, Any] = {"sort_keys": False, "allow_unicode": True, "default_flow_style": None, "width": _WIDTH}
+    return "\n".join(f"{indent}{line}" for line in yaml.dump(data, Dumper=_Dumper, **options).splitlines())
 
 
 def _set(data: Any, location: Location, value: Value) -> None:
@@ -153,13 +262,19 @@ def _before(text: str, node: yaml.Node) -> str:
     return text[node.start_mark.index : node.end_mark.index]
 
 
-def _end(node: yaml.Node) -> yaml.Mark:
+def _end(text: str, node: yaml.Node) -> int:
     """End of a node; a collection in block style ends with its last value, and not where the next one starts."""
     if isinstance(node, yaml.CollectionNode) and node.value and not node.flow_style:
         last = node.value[-1]
-        return _end(last[1] if isinstance(last, tuple) else last)
+        return _end(text, last[1] if isinstance(last, tuple) else last)
     assert node.end_mark is not None
-    return node.end_mark
+    return len(text[: node.end_mark.index].rstrip())
+
+
+def _line_end(text: str, index: int) -> int:
+    """Where the line ends that has this character."""
+    end = text.find("\n", index)
+    return len(text) if end < 0 else end
 
 
 def _cut(text: str, cuts: _Cuts, remark: str) -> str:
@@ -188,7 +303,7 @@ def _commented_lines(text: str) -> set[int]:
 def _unusual(where: str) -> ConfigurationError:
     return ConfigurationError.of(
         where,
-        "is written so that its numbers cannot be replaced one by one",
-        allowed="numbers, and vectors as [x, y, z]",
-        next_step="write it so",
+        "is written so that one part of it cannot be changed alone",
+        allowed="numbers, vectors as [x, y, z], and a list with `- ` before each entry, without anchors",
+        next_step="write it so, or change it in an editor",
     )

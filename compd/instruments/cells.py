@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.instruments.export_problems import ExportProblems
 from compd.reading import stands_for_no_number
+from compd.tables import ProblemList, plain_numbers
 
 NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 _WITH_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[.,' ]\d{3})+(?:[.,]\d+)?", re.ASCII)
@@ -38,7 +38,7 @@ def is_number_column(cells: Sequence[str]) -> bool:
 
 
 def decimal_mark(
-    columns: Sequence[Sequence[str]], line: IntArray, wanted: str | None, problems: ExportProblems
+    columns: Sequence[Sequence[str]], line: IntArray, wanted: str | None, problems: ProblemList
 ) -> tuple[str, str]:
     """The decimal mark, "." or ",", of columns of numbers, and in words how it is known.
 
@@ -105,9 +105,7 @@ def _first_with(marks: re.Pattern[str], joined: str) -> tuple[int, str]:
     return row, joined[begin:].partition("\n")[0]
 
 
-def _refuse_other_marks(
-    columns: Sequence[Sequence[str]], line: IntArray, decimal: str, problems: ExportProblems
-) -> None:
+def _refuse_other_marks(columns: Sequence[Sequence[str]], line: IntArray, decimal: str, problems: ProblemList) -> None:
     """Add a problem for the first number in which the mark that is not the decimal one is no mark of thousands."""
     other = "." if decimal == "," else ","
     grouped = re.compile(rf"[-+]?\d{{1,3}}(?:\{other}\d{{3}})+(?:\{decimal}\d*)?", re.ASCII)
@@ -133,20 +131,15 @@ def with_points(cells: Sequence[str], decimal: str) -> list[str]:
     return "\n".join(cells).replace(other, "").replace(decimal, ".").split("\n")
 
 
-def numbers(cells: Sequence[str], line: IntArray, what: str, problems: ExportProblems) -> FloatArray:
+def numbers(cells: Sequence[str], line: IntArray, what: str, problems: ProblemList) -> FloatArray:
     """(N,) the cells as floats, nan for empty ones. Adds a problem for each that is no number.
 
     line : (N,) of the cells. what : the column's content in words.
     """
-    if not OTHER_CHARACTERS.search("".join(cells)):
-        try:
-            filled = cells if "" not in cells else [cell or "nan" for cell in cells]
-            values = np.array(list(map(float, filled)), dtype=np.float64)
-        except ValueError:
-            pass  # below, with the line
-        else:
-            _check_size(values, cells, line, what, problems)
-            return values
+    values = plain_numbers(cells)
+    if values is not None:
+        _check_size(values, cells, line, what, problems)
+        return values
     wrong = [i for i, cell in enumerate(cells) if cell and not (NUMBER.fullmatch(cell) and "," not in cell)]
     for i in wrong[:3]:
         last = f" ({len(wrong)} cells like this)" if len(wrong) > 1 else ""
@@ -161,7 +154,7 @@ def numbers(cells: Sequence[str], line: IntArray, what: str, problems: ExportPro
     return values
 
 
-def _check_size(values: FloatArray, cells: Sequence[str], line: IntArray, what: str, problems: ExportProblems) -> None:
+def _check_size(values: FloatArray, cells: Sequence[str], line: IntArray, what: str, problems: ProblemList) -> None:
     """Empty the cells that stand for no number, such as 9.9E37. Add a problem for other numbers that are too large."""
     large = np.flatnonzero(np.abs(values) > LARGEST)
     values[[i for i in large.tolist() if stands_for_no_number(values[i])]] = np.nan

@@ -12,10 +12,10 @@ from compd.arrays import rms
 from compd.instruments.axes import ATTITUDE_AXES, LENGTH_AXES, POSITION_AXES
 from compd.instruments.cells import is_number_column, numbers
 from compd.instruments.export import ReadOptions
-from compd.instruments.export_problems import ExportProblems
 from compd.instruments.header_names import is_not_measured, split_unit, turn_axis, understand
 from compd.instruments.raw_table import RawTable
 from compd.instruments.time_stamps import is_clock, is_date, is_stamp
+from compd.tables import ProblemList
 from compd.units import unit_named
 
 AXES = (*POSITION_AXES, *ATTITUDE_AXES, *LENGTH_AXES)
@@ -48,7 +48,7 @@ class Roles:
         self.why[role] = why
 
 
-def find_roles(table: RawTable, options: ReadOptions, problems: ExportProblems) -> Roles:
+def find_roles(table: RawTable, options: ReadOptions, problems: ProblemList) -> Roles:
     """The roles of a table's columns. Problems are added for what cannot be told, with the options that settle it."""
     roles = Roles()
     if options.columns:
@@ -81,7 +81,7 @@ def _header_unit(table: RawTable, column: int) -> str:
     return split_unit(table.header[column])[1] if table.header else ""
 
 
-def _take_columns(table: RawTable, columns: Sequence[str], roles: Roles, problems: ExportProblems) -> None:
+def _take_columns(table: RawTable, columns: Sequence[str], roles: Roles, problems: ProblemList) -> None:
     """The roles of `--columns`: one for each column, with a unit behind where a person writes one, "x[inch]"."""
     if len(columns) != len(table.columns):
         problems.add(
@@ -103,7 +103,7 @@ def _take_columns(table: RawTable, columns: Sequence[str], roles: Roles, problem
             roles.take(role, k, known or _header_unit(table, k), "as --columns says")
 
 
-def _take_names(table: RawTable, names: Mapping[str, str], roles: Roles, problems: ExportProblems) -> None:
+def _take_names(table: RawTable, names: Mapping[str, str], roles: Roles, problems: ProblemList) -> None:
     """The columns that a person names, by the header's words or by their number."""
     for role, name in names.items():
         places = _columns_named(table, name)
@@ -128,7 +128,7 @@ def _columns_named(table: RawTable, name: str) -> list[int]:
     return [int(name) - 1] if name.isdecimal() and 1 <= int(name[:6]) <= len(table.columns) else []
 
 
-def _take_header(table: RawTable, options: ReadOptions, roles: Roles, problems: ExportProblems) -> None:
+def _take_header(table: RawTable, options: ReadOptions, roles: Roles, problems: ProblemList) -> None:
     """The roles that the header's names suggest, where no person has named them."""
     understood = [understand(name) for name in table.header or ()]
     by_role: dict[str, list[int]] = {}
@@ -193,7 +193,7 @@ def _first(cells: Sequence[str]) -> str:
     return next((cell for cell in cells if cell), "")
 
 
-def _take_numbers(table: RawTable, options: ReadOptions, roles: Roles, problems: ExportProblems) -> None:
+def _take_numbers(table: RawTable, options: ReadOptions, roles: Roles, problems: ProblemList) -> None:
     """The roles of columns without names, where what is in them allows one reading alone; else the readings."""
     kinds = [_kind(cells) for cells in table.columns]
     numeric = [k for k, kind in enumerate(kinds) if kind == "number"]
@@ -220,7 +220,7 @@ def _take_numbers(table: RawTable, options: ReadOptions, roles: Roles, problems:
 
 
 def _readings(
-    table: RawTable, numeric: Sequence[int], timed: bool, named: bool, problems: ExportProblems
+    table: RawTable, numeric: Sequence[int], timed: bool, named: bool, problems: ProblemList
 ) -> list[dict[str, int]]:
     """What columns of numbers may be: role -> column, for each possible reading."""
     positions = dict(zip(POSITION_AXES, numeric[-3:], strict=True)) if len(numeric) in (3, 4) else {}
@@ -282,7 +282,7 @@ def _example(kinds: Sequence[str]) -> str:
     return ",".join(next(axes, "-") if kind == "number" else names.get(kind, "-") for kind in kinds)
 
 
-def _ask_for_one_triple(table: RawTable, roles: Roles, problems: ExportProblems) -> None:
+def _ask_for_one_triple(table: RawTable, roles: Roles, problems: ProblemList) -> None:
     """Ask where three columns that are not used may be the position as well: nominal and measured, for instance.
 
     Their names are those of x, y, z with the same letters before or behind, and from row to row they change as the
@@ -323,7 +323,7 @@ def _ask_for_one_triple(table: RawTable, roles: Roles, problems: ExportProblems)
 
 def _change_alike(table: RawTable, one: Sequence[int], other: Sequence[int]) -> bool:
     """Whether the distances between successive rows are nearly the same in both triples of columns."""
-    ignored = ExportProblems(table.path)
+    ignored = ProblemList(table.path)
     steps = []
     for columns in (one, other):
         values = np.column_stack([numbers(table.columns[k], table.line, "", ignored) for k in columns])
@@ -334,7 +334,7 @@ def _change_alike(table: RawTable, one: Sequence[int], other: Sequence[int]) -> 
     return bool(rms(steps[1][both] - steps[0][both]) <= _ALIKE * rms(steps[0][both]))
 
 
-def _check(table: RawTable, roles: Roles, problems: ExportProblems) -> None:
+def _check(table: RawTable, roles: Roles, problems: ProblemList) -> None:
     """Refuse a table without a position or a length, and an attitude that is not whole."""
     axes = [axis for axis in AXES if axis in roles.column]
     shown = ", ".join(table.header) if table.header else f"{len(table.columns)} columns"

@@ -15,7 +15,6 @@ from compd.instruments.axes import ATTITUDE_AXES
 from compd.instruments.cells import numbers
 from compd.instruments.column_roles import AXES, Roles, column_text, find_roles
 from compd.instruments.export import InstrumentExport, ReadOptions
-from compd.instruments.export_problems import ExportProblems, lines_text
 from compd.instruments.marker_rows import marker_rows
 from compd.instruments.raw_table import RawTable
 from compd.instruments.time_stamps import (
@@ -28,6 +27,7 @@ from compd.instruments.time_stamps import (
     set_back_at,
     spread_within,
 )
+from compd.tables import ProblemList, rows_text
 from compd.units import unit_factor, unit_named
 
 ALL_GROUPS = "all"
@@ -47,7 +47,7 @@ _LENGTH_UNITS = "mm, um, nm, cm, m, inch, ft"
 
 def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     """The export that a table holds. Raises RecordingError with everything that is wrong or must be said."""
-    problems = ExportProblems(table.path)
+    problems = ProblemList(table.path)
     if not len(table.line):
         problems.add(table.header_line, "has no rows", allowed="rows of numbers")
         problems.check()
@@ -80,7 +80,7 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     if markers.any():
         digits = {", ".join(column[i] for column in cells) for i in np.flatnonzero(markers).tolist()}
         shown = " or ".join(sorted(digits)[:_SHOWN_MARKERS])
-        left_out[f"{shown} marks what was not measured ({lines_text(table.line[markers].tolist())})"] = int(
+        left_out[f"{shown} marks what was not measured ({rows_text(table.line[markers].tolist(), 'line')})"] = int(
             markers.sum()
         )
     if not complete.all():
@@ -107,7 +107,7 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
 
 
 def _of_group(
-    table: RawTable, roles: Roles, options: ReadOptions, assumptions: dict[str, str], problems: ExportProblems
+    table: RawTable, roles: Roles, options: ReadOptions, assumptions: dict[str, str], problems: ProblemList
 ) -> RawTable:
     """The rows of one group of points; asks where there are several and none is chosen."""
     labels = group_labels(table, roles)
@@ -187,7 +187,7 @@ def _values(
     axes: Sequence[str],
     options: ReadOptions,
     assumptions: dict[str, str],
-    problems: ExportProblems,
+    problems: ProblemList,
 ) -> FloatArray:
     """(N, d) in mm, attitude in rad."""
     raw = {
@@ -218,7 +218,7 @@ def _unit(
     raw: dict[str, FloatArray],
     wanted: str,
     options: ReadOptions,
-    problems: ExportProblems,
+    problems: ProblemList,
 ) -> _UnitOf | None:
     """The one unit of these axes, as all who name one agree; None, with a problem, where none is named or two are."""
     option, flag = (options.unit, "--unit") if wanted == "mm" else (options.angle_unit, "--angle-unit")
@@ -278,7 +278,7 @@ def _as_rotation_vectors(
     values: FloatArray,
     options: ReadOptions,
     assumptions: dict[str, str],
-    problems: ExportProblems,
+    problems: ProblemList,
 ) -> FloatArray:
     """The values (N, d) with the attitude as a rotation vector, as rx, ry, rz are where nobody says another order."""
     turned = [k for k, axis in enumerate(axes) if axis in ATTITUDE_AXES]
@@ -299,7 +299,7 @@ def read_time(
     table: RawTable,
     roles: Roles,
     options: ReadOptions,
-    problems: ExportProblems,
+    problems: ProblemList,
     unit_option: str = "--columns with time[{unit}] for {what}",
 ) -> StampedTime | None:
     """The times of the rows; None if they have none.
@@ -311,7 +311,7 @@ def read_time(
 
 
 def _time(
-    table: RawTable, roles: Roles, options: ReadOptions, problems: ExportProblems, unit_option: str
+    table: RawTable, roles: Roles, options: ReadOptions, problems: ProblemList, unit_option: str
 ) -> StampedTime | None:
     column = roles.column.get("time")
     if column is None:
@@ -334,7 +334,7 @@ def _time(
     )
 
 
-def _with_the_hour(time: StampedTime, table: RawTable, problems: ExportProblems) -> StampedTime:
+def _with_the_hour(time: StampedTime, table: RawTable, problems: ProblemList) -> StampedTime:
     """The times with an hour added from where the clock was set back."""
     row = set_back_at(time.time_s)
     if row is None:
@@ -381,7 +381,7 @@ def _time_of_numbers(
     roles: Roles,
     cells: Sequence[str],
     line: IntArray,
-    problems: ExportProblems,
+    problems: ProblemList,
     unit_option: str,
 ) -> StampedTime | None:
     """Times that are numbers: in the unit of the column, or else seconds where they have decimals."""

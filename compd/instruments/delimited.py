@@ -13,11 +13,11 @@ from compd.arrays import IntArray
 from compd.instruments.cells import OTHER_CHARACTERS, decimal_mark, is_number, is_number_column, with_points
 from compd.instruments.delimiter import BLANKS, NAMES, WIDE_BLANKS, find_delimiter, split_cells, split_header
 from compd.instruments.export import ReadOptions
-from compd.instruments.export_problems import ExportProblems
 from compd.instruments.raw_table import RawTable
 from compd.instruments.read_limits import ReadLimits
 from compd.instruments.text_file import TextFile
 from compd.instruments.time_stamps import is_stamp
+from compd.tables import ProblemList
 from compd.units import unit_named
 
 _COMMENT = ("#", "%", "//")
@@ -40,7 +40,7 @@ def read_delimited(text: TextFile, options: ReadOptions, shape: str | None = Non
 
     shape : of the table; None for "csv" or "blanks", as the delimiter is.
     """
-    problems = ExportProblems(text.path)
+    problems = ProblemList(text.path)
     file_rows = _rows_and_comments(text.lines)
     delimiter = _take_delimiter(file_rows, options)
     if not file_rows.rows:
@@ -141,7 +141,7 @@ def _drop(file_rows: _Rows, indices: Sequence[int]) -> None:
         file_rows.number = [number for i, number in enumerate(file_rows.number) if i not in gone]
 
 
-def _count_cells(file_rows: _Rows, delimiter: str, problems: ExportProblems) -> tuple[int, int]:
+def _count_cells(file_rows: _Rows, delimiter: str, problems: ProblemList) -> tuple[int, int]:
     """Number of cells that most rows have, and how many lines of prose stand above the table."""
     if delimiter in (BLANKS, WIDE_BLANKS) or '"' in "".join(file_rows.rows):
         counts = [len(split_cells(row, delimiter)) for row in file_rows.rows]
@@ -168,7 +168,7 @@ def _count_cells(file_rows: _Rows, delimiter: str, problems: ExportProblems) -> 
     return count, above
 
 
-def _check_size(file_rows: _Rows, count: int, limits: ReadLimits, problems: ExportProblems) -> None:
+def _check_size(file_rows: _Rows, count: int, limits: ReadLimits, problems: ProblemList) -> None:
     """Raise RecordingError for more than a list may have, before it is split into cells."""
     rows = len(file_rows.rows)
     if count > limits.columns:
@@ -208,7 +208,7 @@ def _take_header(
     delimiter: str,
     count: int,
     above: int,
-    problems: ExportProblems,
+    problems: ProblemList,
 ) -> _Header:
     """The header among the rows without a number at the top, in the line above them, or in the last comment."""
     top = 0
@@ -235,7 +235,7 @@ def _take_header(
 
 
 def _header_above(
-    file_rows: _Rows, line: IntArray, delimiter: str, count: int, above: int, problems: ExportProblems
+    file_rows: _Rows, line: IntArray, delimiter: str, count: int, above: int, problems: ProblemList
 ) -> _Header:
     """A header between other marks than the rows: with blanks in its names, or in a comment. None is refused, if it
     has another number of names than the rows have cells."""
@@ -271,7 +271,7 @@ def _is_unit_row(cells: Sequence[str]) -> bool:
 
 
 def _drop_headers(
-    columns: list[list[str]], line: IntArray, header: _Header, problems: ExportProblems
+    columns: list[list[str]], line: IntArray, header: _Header, problems: ProblemList
 ) -> tuple[list[list[str]], IntArray, dict[str, int]]:
     """The rows below the header, without its repeats; another header between them is refused."""
     columns, line = [cells[header.rows :] for cells in columns], line[header.rows :]
@@ -304,7 +304,7 @@ def _check_last_cell(
     columns: Sequence[Sequence[str]],
     line: IntArray,
     number_columns: Sequence[int],
-    problems: ExportProblems,
+    problems: ProblemList,
 ) -> None:
     """Refuse a last line without an end whose last number has fewer decimals than every other: it is cut off."""
     last = len(columns) - 1
@@ -325,7 +325,7 @@ def _check_last_cell(
         )
 
 
-def _unit_in_comments(file_rows: _Rows, problems: ExportProblems) -> str:
+def _unit_in_comments(file_rows: _Rows, problems: ProblemList) -> str:
     """The unit of lengths that a comment names; "" for none. Two that differ are refused."""
     units: dict[str, int] = {}
     for number, text in file_rows.comments:

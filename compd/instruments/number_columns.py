@@ -14,10 +14,10 @@ from compd.instruments.cells import is_number_column, numbers
 from compd.instruments.column_roles import Roles, column_text
 from compd.instruments.columns import read_time
 from compd.instruments.export import InstrumentExport, ReadOptions
-from compd.instruments.export_problems import ExportProblems
 from compd.instruments.raw_table import RawTable
 from compd.instruments.read import read_table
 from compd.instruments.time_stamps import StampedTime, check_rising
+from compd.tables import ProblemList
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +37,13 @@ class NumberColumns:
     line: IntArray
     shape: str
     taken: Mapping[str, str]
-    problems: ExportProblems
+    problems: ProblemList
     _table: RawTable = field(repr=False)
 
     @classmethod
     def of(cls, table: RawTable) -> NumberColumns:
         """Those of a table. Raises RecordingError where it has no rows of numbers."""
-        problems = ExportProblems(table.path)
+        problems = ProblemList(table.path)
         names = table.header or ("",) * len(table.columns)
         header = tuple(
             name if name and names.count(name) == 1 else f"column {k}" for k, name in enumerate(names, start=1)
@@ -92,7 +92,7 @@ def read_number_columns(path: Path, options: ReadOptions | None = None) -> Numbe
     """
     table = read_table(path, options or ReadOptions())
     if isinstance(table, InstrumentExport):
-        problems = ExportProblems(path)
+        problems = ProblemList(path)
         problems.add(0, "is no table of columns", allowed="a workbook, or text with a delimiter")
         raise RecordingError(problems.problems)
     return NumberColumns.of(table)

@@ -11,13 +11,13 @@ from compd.errors import Problem, RecordingError
 from compd.instruments.column_roles import find_roles
 from compd.instruments.columns import group_labels, to_export
 from compd.instruments.export import InstrumentExport, ReadOptions
-from compd.instruments.export_problems import ExportProblems
 from compd.instruments.formats import instrument_formats
 from compd.instruments.instrument_format import BinaryFormat, InstrumentFormat
 from compd.instruments.raw_table import RawTable
 from compd.instruments.read import binary_format_of, read_table
 from compd.instruments.read_limits import ReadLimits
 from compd.instruments.text_file import decode_text, read_content
+from compd.tables import ProblemList
 
 SHOWN_ROWS = 20
 # Longer lines and cells, more columns and groups than these are not shown whole.
@@ -57,7 +57,7 @@ def preview_export(path: Path, options: ReadOptions) -> ExportPreview:
     preview, table = preview_table(path, options)
     if table is None:
         return preview
-    roles = find_roles(table, options, ExportProblems(path))
+    roles = find_roles(table, options, ProblemList(path))
     export, problems = None, tuple[Problem, ...]()
     try:
         export = to_export(table, options)

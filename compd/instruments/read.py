@@ -9,12 +9,12 @@ from compd.errors import RecordingError
 from compd.files import without_values
 from compd.instruments.columns import to_export
 from compd.instruments.export import InstrumentExport, ReadOptions
-from compd.instruments.export_problems import ExportProblems
 from compd.instruments.formats import instrument_formats
 from compd.instruments.instrument_format import BinaryFormat, TextFormat
 from compd.instruments.raw_table import RawTable
 from compd.instruments.recognition import is_of_numbers, is_table, no_table
 from compd.instruments.text_file import TextFile, decode_text, read_content
+from compd.tables import ProblemList
 
 # Lines at the top of a text among which the mark of a format stands.
 _LOOKED_AT = 50
@@ -44,7 +44,7 @@ def read_table(path: Path, options: ReadOptions) -> RawTable | InstrumentExport:
     """As `read_export`, before it is known which column is what; a file without columns of text is read whole."""
     formats = instrument_formats()
     if options.shape is not None and options.shape not in formats:
-        problems = ExportProblems(path)
+        problems = ProblemList(path)
         problems.add(0, "--as names no shape", options.shape, ", ".join(formats))
         raise RecordingError(problems.problems)
     content = read_content(path)
@@ -70,7 +70,7 @@ def binary_format_of(path: Path, content: bytes) -> BinaryFormat | None:
             return known
         for magic, outdated in known.outdated.items():
             if content.startswith(magic):
-                problems = ExportProblems(path)
+                problems = ProblemList(path)
                 problems.add(0, outdated.what, next_step=outdated.next_step)
                 raise RecordingError(problems.problems)
     return None

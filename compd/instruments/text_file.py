@@ -8,8 +8,8 @@ from pathlib import Path
 
 from compd.errors import RecordingError
 from compd.files import read_small_file
-from compd.instruments.export_problems import ExportProblems
 from compd.instruments.read_limits import ReadLimits
+from compd.tables import ProblemList
 
 # Largest file (bytes): some four million rows, a day of a tracker with 50 samples a second.
 MAX_BYTES = 256 * 2**20
@@ -36,7 +36,7 @@ class TextFile:
 
 def read_content(path: Path) -> bytes:
     """The bytes of a regular file. Raises RecordingError if it cannot be read, is empty or too long."""
-    problems = ExportProblems(path)
+    problems = ProblemList(path)
     try:
         content = read_small_file(path, MAX_BYTES)
     except OSError as error:
@@ -53,7 +53,7 @@ def decode_text(path: Path, content: bytes, limits: ReadLimits) -> TextFile:
 
     Raises RecordingError, with the line, for what is no text, has more lines than `limits` allow, or a longer line.
     """
-    problems = ExportProblems(path)
+    problems = ProblemList(path)
     if content.startswith(_UTF16_MARKS):
         text, encoding = _decoded(content, "utf-16", problems), "UTF-16"
     else:
@@ -88,7 +88,7 @@ def decode_text(path: Path, content: bytes, limits: ReadLimits) -> TextFile:
     return TextFile(path, lines[:-1] if complete else lines, encoding, complete)
 
 
-def _check_length(lines: list[str], limits: ReadLimits, problems: ExportProblems) -> None:
+def _check_length(lines: list[str], limits: ReadLimits, problems: ProblemList) -> None:
     longest = max(range(len(lines)), key=lambda k: len(lines[k]))
     if len(lines[longest]) > limits.line_characters:
         problems.add(
@@ -101,7 +101,7 @@ def _check_length(lines: list[str], limits: ReadLimits, problems: ExportProblems
     problems.check()
 
 
-def _decoded(content: bytes, encoding: str, problems: ExportProblems) -> str:
+def _decoded(content: bytes, encoding: str, problems: ProblemList) -> str:
     try:
         return content.decode(encoding)
     except UnicodeDecodeError as error:

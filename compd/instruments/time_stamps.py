@@ -14,7 +14,7 @@ from datetime import date
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray
-from compd.instruments.export_problems import ExportProblems, lines_text
+from compd.tables import ProblemList, rows_text
 
 DATE_ORDERS = ("dmy", "mdy", "ymd")
 DAY_S = 86400.0
@@ -66,7 +66,7 @@ def is_clock(cell: str) -> bool:
 
 
 def read_stamps(
-    cells: Sequence[str], line: IntArray, dates: str | None, what: str, problems: ExportProblems
+    cells: Sequence[str], line: IntArray, dates: str | None, what: str, problems: ProblemList
 ) -> StampedTime:
     """The times that stamps say, from the midnight before the first of them, or of the day where they have no date.
 
@@ -145,7 +145,7 @@ def set_back_at(time_s: FloatArray) -> int | None:
     return int(rows[falls[0] + 1])
 
 
-def check_rising(time_s: FloatArray, line: IntArray, next_step: str, problems: ExportProblems) -> bool:
+def check_rising(time_s: FloatArray, line: IntArray, next_step: str, problems: ProblemList) -> bool:
     """Whether times (N,), without nan, rise; else a problem or a question is added.  line : (N,)."""
     not_rising = 1 + np.flatnonzero(np.diff(time_s) <= 0)
     set_back = set_back_at(time_s)
@@ -158,7 +158,7 @@ def check_rising(time_s: FloatArray, line: IntArray, next_step: str, problems: E
         )
     elif len(not_rising):
         lines = line[not_rising].tolist()
-        what = f"time does not rise ({lines_text(lines)})"
+        what = f"time does not rise ({rows_text(lines, 'line')})"
         problems.add(lines[0], what, allowed="later than the row above", next_step=next_step)
     return set_back is None and not len(not_rising)
 
@@ -172,7 +172,7 @@ class _Parsed:
     where there are zones. decimals : of the seconds, the most. failed : whether a problem was added.
     """
 
-    def __init__(self, cells: Sequence[str], line: IntArray, what: str, problems: ExportProblems) -> None:
+    def __init__(self, cells: Sequence[str], line: IntArray, what: str, problems: ProblemList) -> None:
         self.dates: dict[DateKey, int] = {}
         self.line_of_date: list[int] = []
         self.decimals = 0
@@ -295,7 +295,7 @@ def _ordinal(key: DateKey, order: str) -> int | None:
         return None
 
 
-def _order(parsed: _Parsed, wanted: str | None, problems: ExportProblems) -> tuple[str, str]:
+def _order(parsed: _Parsed, wanted: str | None, problems: ProblemList) -> tuple[str, str]:
     """(order, how it is known); ("", "") where it cannot be told, with a problem."""
     keys = list(parsed.dates)
     possible = [order for order in DATE_ORDERS if all(_ordinal(key, order) is not None for key in keys)]

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from compd.arrays import FloatArray
 from compd.instruments.axes import ATTITUDE_AXES
 from compd.instruments.export import InstrumentExport
-from compd.instruments.export_problems import ExportProblems
 from compd.instruments.time_stamps import check_rising
+from compd.tables import ProblemList
 
 LENGTH = "length"
 # 1 / 0.6745: the standard deviation of a normal distribution over its median absolute deviation.
@@ -84,7 +84,7 @@ def track_of(export: InstrumentExport) -> Track:
 
     Raises RecordingError if they have none, fall or stand still, or are fewer than three.
     """
-    problems = ExportProblems(export.path)
+    problems = ProblemList(export.path)
     if export.time_s is None:
         problems.add(
             0,

@@ -146,8 +146,8 @@ def _blocks(source: Path) -> Iterator[Table]:
     """
     next_row = FIRST_ROW
     for table, problems in table_blocks(source, TEXT_ID_COLUMNS, ROW_GROUP_ROWS):
-        if problems.problems or table is None:
-            raise RecordingError(problems.problems)
+        problems.check()
+        assert table is not None, "a table without a problem"
         row = np.arange(next_row, table.row[-1] + 1 if len(table.row) else next_row)
         columns = {name: np.full(len(row), np.nan) for name in table.columns}
         for name, values in table.columns.items():

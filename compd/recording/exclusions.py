@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-
 from compd.data_fault import row_stretches
+from compd.documents import parse_yaml, read_text, with_entries
 from compd.errors import CompdError, Problem, RecordingError
 from compd.files import write_files
-from compd.recording.sidecar import Sidecar, read_sidecar
+from compd.recording.sidecar import read_sidecar
 
 _KEY = "excluded_rows"
 
@@ -31,10 +28,7 @@ def exclude_rows(recording: Path, rows: Collection[int], reason: str) -> None:
     if not reason.strip() or not rows:
         what = "needs a reason" if rows else "needs a row"
         raise RecordingError.of("exclusion", what, allowed='rows and a reason, as in "the beam was cut"')
-    document, text = _with_rows_free(recording, rows)
-    entries = document.setdefault(_KEY, CommentedSeq())
-    entries.append(_entry(sorted(rows), reason.strip()))
-    _write(recording, document, text)
+    _write(recording, rows, [_entry(sorted(rows), reason.strip())])
 
 
 def include_rows(recording: Path, rows: Collection[int]) -> None:
@@ -42,7 +36,7 @@ def include_rows(recording: Path, rows: Collection[int]) -> None:
 
     Raises RecordingError if the sidecar cannot be used.
     """
-    _write(recording, *_with_rows_free(recording, rows))
+    _write(recording, rows)
 
 
 def rows_text(rows: Collection[int]) -> str:
@@ -67,29 +61,29 @@ def rows_of_text(text: str, where: str) -> list[int]:
     return sorted(rows)
 
 
-def _with_rows_free(recording: Path, rows: Collection[int]) -> tuple[CommentedMap, str]:
-    """The sidecar's document with these rows in no exclusion, and the text as it was."""
+def _write(recording: Path, rows: Collection[int], added: Sequence[Mapping[str, Any]] = ()) -> None:
+    """Write the sidecar with these rows in no exclusion but those that are added.
+
+    It is restored if it cannot be read afterwards.
+    """
     path = recording.with_suffix(".yaml")
-    sidecar = _checked(path)
-    text = path.read_text(encoding="utf-8")
-    document: CommentedMap = _yaml().load(text)
-    entries = document.get(_KEY) or CommentedSeq()
-    kept = CommentedSeq()
-    for entry in entries:
+    _check(path)
+    before = read_text(path, "a sidecar")
+    entries: list[Any] = []
+    for entry in parse_yaml(before, path)[0].get(_KEY) or ():
         own = _rows_of(entry)
         left = [row for row in own if row not in rows]
-        if left == own:
-            kept.append(entry)
-        elif left:
-            kept.append(_entry(left, sidecar.excluded[left[0]]))
-    if kept:
-        document[_KEY] = kept
-    else:
-        document.pop(_KEY, None)
-    return document, text
+        if left:
+            entries.append(entry if left == own else _entry(left, entry["reason"]))
+    try:
+        write_files({path: with_entries(before, path, _KEY, [*entries, *added])})
+        _check(path)
+    except (OSError, CompdError) as error:
+        write_files({path: before})
+        raise RecordingError.of(str(path), f"cannot be changed: {error}") from error
 
 
-def _rows_of(entry: Any) -> list[int]:
+def _rows_of(entry: Mapping[str, Any]) -> list[int]:
     """The rows of an entry that has been checked: 17, [17, 20] or "17-20" under `row` or `rows`."""
     rows: list[int] = []
     for value in (entry.get("row"), entry.get("rows")):
@@ -101,44 +95,13 @@ def _rows_of(entry: Any) -> list[int]:
     return rows
 
 
-def _entry(rows: Sequence[int], reason: str) -> CommentedMap:
-    stretches = row_stretches(rows)
-    entry = CommentedMap()
+def _entry(rows: Sequence[int], reason: str) -> dict[str, Any]:
     if len(rows) == 1:
-        entry["row"] = rows[0]
-    elif len(stretches) == 1:
-        entry["rows"] = rows_text(rows)
-    else:
-        entry["rows"] = CommentedSeq(rows)
-        entry["rows"].fa.set_flow_style()
-    entry["reason"] = reason
-    entry.fa.set_flow_style()
-    return entry
+        return {"row": rows[0], "reason": reason}
+    return {"rows": rows_text(rows) if len(row_stretches(rows)) == 1 else list(rows), "reason": reason}
 
 
-def _write(recording: Path, document: CommentedMap, before: str) -> None:
-    """Write the sidecar; restore it if it cannot be read afterwards."""
-    path = recording.with_suffix(".yaml")
-    text = io.StringIO()
-    _yaml().dump(document, text)
-    try:
-        write_files({path: text.getvalue()})
-        _checked(path)
-    except (OSError, CompdError) as error:
-        write_files({path: before})
-        raise RecordingError.of(str(path), f"cannot be changed: {error}") from error
-
-
-def _checked(path: Path) -> Sidecar:
+def _check(path: Path) -> None:
     problems: list[Problem] = []
-    sidecar = read_sidecar(path, problems)
-    if problems or sidecar is None:
+    if read_sidecar(path, problems) is None or problems:
         raise RecordingError(problems)
-    return sidecar
-
-
-def _yaml() -> YAML:
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = 110
-    return yaml

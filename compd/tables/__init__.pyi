@@ -1,5 +1,6 @@
 from .csv_in_blocks import csv_blocks as csv_blocks
 from .csv_in_blocks import csv_row_count as csv_row_count
+from .csv_table import plain_numbers as plain_numbers
 from .csv_table import read_table as read_table
 from .parquet_table import ParquetTable as ParquetTable
 from .parquet_table import arrow_modules as arrow_modules

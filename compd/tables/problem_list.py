@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from compd.errors import Problem
+from compd.errors import Problem, RecordingError
 
 # Most rows, and different values, listed in a message.
 SHOWN_ROWS = 3
+# Longest part of a line of text that is quoted.
+_LINE_WIDTH = 60
 
 
 class ProblemList:
@@ -17,6 +19,8 @@ class ProblemList:
     Attributes
     ----------
     problems : with these the file cannot be used. warnings : it can, but a person should look.
+
+    A place is a line of a text file, from 1, or "row 5", "column scale_1_mm (E)"; 0 or "" is the file as a whole.
     """
 
     def __init__(self, path: Path) -> None:
@@ -24,25 +28,36 @@ class ProblemList:
         self.problems: list[Problem] = []
         self.warnings: list[Problem] = []
 
-    def add(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
-        """Add a problem at `place` in this file: "row 5", "column scale_1_mm (E)", or "" for the whole file."""
+    def add(self, place: str | int, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
+        """Add a problem at a place in this file."""
+        if isinstance(place, int) and len(value) > _LINE_WIDTH:
+            value = value[: _LINE_WIDTH - 3] + "..."
         self.problems.append(Problem(self._where(place), what, value=value, allowed=allowed, next_step=next_step))
+
+    def ask(self, what: str, value: str, answers: Sequence[str], line: int = 0) -> None:
+        """Add a question: several readings are possible, and each of `answers` settles it."""
+        self.add(line, what, value, " or ".join(answers), "say which")
 
     def warn(self, place: str, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
         """Add a warning, as `add` a problem."""
         self.warnings.append(Problem(self._where(place), what, value=value, allowed=allowed, next_step=next_step))
 
-    def _where(self, place: str) -> str:
-        return f"{self.path}: {place}" if place else str(self.path)
+    def check(self) -> None:
+        """Raise RecordingError if there is a problem."""
+        if self.problems:
+            raise RecordingError(self.problems)
+
+    def _where(self, place: str | int) -> str:
+        return f"{self.path}:{' ' * isinstance(place, str)}{place}" if place else str(self.path)
 
 
-def rows_text(rows: Sequence[int]) -> str:
-    """Spreadsheet row numbers for a person: "row 5", "rows 5, 9 and 12", "rows 5, 9, 12 and 412 more rows"."""
+def rows_text(rows: Sequence[int], noun: str = "row") -> str:
+    """Rows, or lines, for a person: "row 5", "rows 5, 9 and 12", "rows 5, 9, 12 and 412 more rows"."""
     shown = [str(row) for row in rows[:SHOWN_ROWS]]
     more = len(rows) - len(shown)
     if more:
-        return f"rows {', '.join(shown)} and {more} more row{'s' * (more != 1)}"
-    return f"row {shown[0]}" if len(shown) == 1 else f"rows {', '.join(shown[:-1])} and {shown[-1]}"
+        return f"{noun}s {', '.join(shown)} and {more} more {noun}{'s' * (more != 1)}"
+    return f"{noun} {shown[0]}" if len(shown) == 1 else f"{noun}s {', '.join(shown[:-1])} and {shown[-1]}"
 
 
 def values_text(values: Iterable[str]) -> str:

@@ -41,6 +41,14 @@ class Table:
         """A column for a person: its name and the letters over it."""
         return f"column {name} ({self.letters[name]})" if self.letters.get(name) else f"column {name}"
 
+    def texts(self, name: str) -> Sequence[str]:
+        """(N,) a column as text, "" where it is empty or missing."""
+        if name not in self.columns:
+            return [""] * len(self.row)
+        if name in self.labels:
+            return list(id_texts(self.columns[name], self.labels[name]))
+        return ["" if np.isnan(value) else f"{value:.15g}" for value in self.columns[name]]
+
 
 class TableBlock(NamedTuple):
     """Some rows of a table with the faults found while reading. table : None without any table."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -14,6 +15,8 @@ from docs.generate.markdown import code, codes, escape
 Schema = Mapping[str, Any]
 # How units are written, where that is not how a name ends in them.
 _SHOWN_UNITS = {"mm_per_s": "mm/s", "hz": "Hz", "pct": "%", "mb": "MB"}
+# An attribute in a docstring, `name : text`, with its further lines.
+_ATTRIBUTE = re.compile(r"^(\w+(?:, \w+)*) : (.*(?:\n    .*)*)", re.MULTILINE)
 _FRAME_LETTERS = ("_B", "_P", "_M", "_B0")
 
 
@@ -36,7 +39,8 @@ class ModelSchema:
     def __init__(self, kind: Any, refer: Callable[[str], str] = code) -> None:
         """`refer`: how another model is referred to by its name, for instance by a link."""
         self.schema: Schema = TypeAdapter(kind).json_schema(by_alias=True)
-        self.definitions: Mapping[str, Schema] = self.schema.get("$defs", {})
+        definitions: Mapping[str, Schema] = self.schema.get("$defs", {})
+        self.definitions = {name: _with_attributes(definition) for name, definition in definitions.items()}
         self._refer = refer
 
     def keys(self, definition: str = "") -> list[Key]:
@@ -124,6 +128,19 @@ class ModelSchema:
         if most is not None:
             return f"{least} {item}" if least == most else f"{least} to {most} {item}"
         return f"list of {item}" + (f", {least} or more" if least else "")
+
+
+def _with_attributes(definition: Schema) -> Schema:
+    """The schema of a class whose docstring describes its attributes, with these descriptions at its keys."""
+    text, keys = definition.get("description", ""), dict(definition.get("properties", {}))
+    for names, meaning in _ATTRIBUTE.findall(text):
+        for name in names.split(", "):
+            if name in keys and "description" not in keys[name]:
+                keys[name] = {**keys[name], "description": re.sub(r"\s+", " ", meaning).removesuffix(".")}
+    if keys == definition.get("properties", {}):
+        return definition
+    about = re.split(r"\n+(?:Attributes\n-+\n)?(?=\w+(?:, \w+)* : )", text, maxsplit=1)[0]
+    return {**definition, "description": about, "properties": keys}
 
 
 def key_unit(name: str) -> str:

@@ -199,7 +199,7 @@ def test_a_wrong_plan_is_said_before_the_machine_starts(tmp_path: Path) -> None:
         compd("simulate", TRIPOD, "--directory", tmp_path / "machine", "--plan", path)
     assert [one.what for one in caught.value.problems] == [
         "no gauge of this machine measures it: no recording will tell",
-        "is no number",
+        "text where a number belongs",
     ]
     assert not (tmp_path / "machine").exists()
 

@@ -17,12 +17,12 @@ class Target:
     """Where a controller wants the tip.
 
     tip_mm : (3), in {B0}; with the tool on the plate the place on the work, in {P}.
-    rotation_B0_rad : (3), rotation vector of {P} in {B0}; None for the attitude at machine zero. The attitude of a
-        tripod follows from its tip.
-    valid_until_s : monotonic time (s) after which it is too old to be used; inf for never.
-    time_s : monotonic time (s) at which it was made or, where the controller does not say, came; nan where it was
+    rotation_B0_rad : (3), rotation vector of {P} in {B0}; without it the attitude is that at machine zero. The attitude
+        of a tripod follows from its tip.
+    valid_until_s : monotonic time (s) after which it is too old to be used; never without it.
+    time_s : monotonic time (s) at which it was made or, where the controller does not say, came; unknown where it was
         recorded before targets had times.
-    id : what the controller calls it; None for nothing.
+    id : what the controller calls it.
     tip_by_scale : with `machine: external`, 3 or 6 rows of n numbers, by how much each scale moves the tip, mm per mm,
         and turns what carries it, rad per mm.
     """

@@ -11,7 +11,7 @@ from compd.live.loop import Target
 from compd.live.service.client_session import ClientSession, Place, Stream
 from compd.live.service.message_keys.budget import BudgetKeys
 from compd.live.service.message_keys.machine import MachineKeys
-from compd.live.service.message_keys.message import Keys, SentMessage, VersionKeys
+from compd.live.service.message_keys.message import Keys, SentMessage, VersionKeys, absent, present
 from compd.live.service.message_keys.status import StatusKeys
 from compd.live.service.messages import MAX_NUMBER, ErrorCode, ProtocolError, line, unknown_key
 from compd.live.service.order import OrderRequest
@@ -30,25 +30,24 @@ TipByScale = Annotated[
 class ColumnKeys(Keys):
     """One column of a recording: sign * (value - machine zero) for a length, the value itself for anything else."""
 
-    column: str = Field(description="the column's name, which ends in its unit")
-    channel: str = Field(description='the gauge\'s channel, "gauge.channel", as in READINGS')
-    sign: Literal[1, -1] | None = Field(default=None, description="lengths: -1 where the display falls as it grows")
-    stale_after_s: float = Field(description="a reading older than this is stale, s")
+    column: str = present("the column's name, which ends in its unit")
+    channel: str = present('the gauge\'s channel, "gauge.channel", as in READINGS')
+    sign: Literal[1, -1] | None = absent("lengths: -1 where the display falls as it grows")
+    stale_after_s: float = present("a reading older than this is stale, s")
 
 
 class WatchKeys(SentMessage):
     """Answers WATCH, with the keys of the request."""
 
     wire_name = "WATCH"
-    what: Literal["setpoints", "readings"] | None = Field(default=None, description="as in the request")
-    rate_hz: float | None = Field(default=None, description="as in the request, Hz")
-    columns: list[ColumnKeys] | None = Field(default=None, description="of readings: which channel is which column")
-    model_columns: list[str] | None = Field(
-        default=None,
-        description="of readings, with `machine: external` and without scales: columns that are made of the setpoints",
+    what: Literal["setpoints", "readings"] | None = absent("as in the request")
+    rate_hz: float | None = absent("as in the request, Hz")
+    columns: list[ColumnKeys] | None = absent("of readings: which channel is which column")
+    model_columns: list[str] | None = absent(
+        "of readings, with `machine: external` and without scales: columns that are made of the setpoints"
     )
-    rotation_B0_in_M_rad: list[float] | None = Field(
-        default=None, description="of readings, without scales: the attitude of {B0} in {M}, as a rotation vector, rad"
+    rotation_B0_in_M_rad: list[float] | None = absent(
+        "of readings, without scales: the attitude of {B0} in {M}, as a rotation vector, rad"
     )
 
 
@@ -92,26 +91,21 @@ class TargetRequest(Request):
 
     wire_name = "TARGET"
     place = Place.NEWEST
-    tip_B0_mm: Vector | None = Field(default=None, description="the tip in {B0}, mm: [x, y, z]; tool on the platform")
-    tip_P_mm: Vector | None = Field(
-        default=None, description="the touched place in {P}, mm: [x, y, z]; tool on the surface plate"
+    tip_B0_mm: Vector | None = absent("the tip in {B0}, mm: [x, y, z]; tool on the platform")
+    tip_P_mm: Vector | None = absent("the touched place in {P}, mm: [x, y, z]; tool on the surface plate")
+    rotation_B0_rad: Vector | None = absent(
+        "hexapod: rotation vector of {P} in {B0}, rad; left out: the attitude at machine zero"
     )
-    rotation_B0_rad: Vector | None = Field(
-        default=None,
-        description="hexapod: rotation vector of {P} in {B0}, rad; left out: the attitude at machine zero",
+    tip_by_scale: TipByScale | None = absent(
+        "`machine: external` with scales: how much each scale moves the tip, in {M}, mm per mm: 3 rows, x y z, of one "
+        "number for each scale; 3 more rows turn what carries the tip about x y z, rad per mm"
     )
-    tip_by_scale: TipByScale | None = Field(
-        default=None,
-        description="`machine: external` with scales: how much each scale moves the tip, in {M}, mm per mm: 3 rows, x "
-        "y z, of one number for each scale; 3 more rows turn what carries the tip about x y z, rad per mm",
+    time_s: Coordinate | None = absent(
+        "when it was made, s on the daemon's monotonic clock, as in SETPOINT; left out, or later than it comes: when "
+        "it comes"
     )
-    time_s: Coordinate | None = Field(
-        default=None,
-        description="when it was made, s on the daemon's monotonic clock, as in SETPOINT; left out, or later than it "
-        "comes: when it comes",
-    )
-    id: Annotated[int, Field(ge=0, le=MAX_ID)] | None = Field(
-        default=None, description="a number of your own; `target_id` of the setpoints that answer it"
+    id: Annotated[int, Field(ge=0, le=MAX_ID)] | None = absent(
+        "a number of your own; `target_id` of the setpoints that answer it"
     )
 
     @classmethod

@@ -8,7 +8,7 @@ import structlog
 from pydantic import Field, field_validator, model_validator
 
 from compd.live.service.client_session import ClientSession
-from compd.live.service.message_keys.message import ModelsKeys, SentMessage
+from compd.live.service.message_keys.message import ModelsKeys, SentMessage, absent, present
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 from compd.live.service.model_switch import ModelWish
 from compd.live.service.order import OrderRequest
@@ -22,13 +22,11 @@ class AcceptKeys(SentMessage):
     """Answers ACCEPT."""
 
     wire_name = "ACCEPT"
-    gauges: list[str] = Field(description="channels that are believed again by it; empty where all were already")
-    believed_for_s: dict[str, float] | None = Field(
-        default=None, description="of each of them, for how long it has been believed when this is sent, s"
+    gauges: list[str] = present("channels that are believed again by it; empty where all were already")
+    believed_for_s: dict[str, float] | None = absent(
+        "of each of them, for how long it has been believed when this is sent, s"
     )
-    not_believed: dict[str, str] | None = Field(
-        default=None, description="channels that are not believed after it either, each with the reason"
-    )
+    not_believed: dict[str, str] | None = absent("channels that are not believed after it either, each with the reason")
 
 
 class AcceptRequest(OrderRequest):
@@ -43,7 +41,7 @@ class AcceptRequest(OrderRequest):
     reply = AcceptKeys
     asker = Asker.LOCAL
     refusal = "gauges are accepted over the Unix socket only"
-    gauge: Annotated[str, Field(min_length=1)] = Field(description='a gauge, one channel as "gauge.channel", or "all"')
+    gauge: Annotated[str, Field(min_length=1)] = present('a gauge, one channel as "gauge.channel", or "all"')
 
     @property
     def subject(self) -> str:
@@ -73,7 +71,7 @@ class PollRequest(OrderRequest):
     reply = PollKeys
     asker = Asker.LOCAL
     refusal = "gauges are polled at once over the Unix socket only"
-    gauge: Annotated[str, Field(min_length=1)] = Field(description="a gauge that is polled, by its name")
+    gauge: Annotated[str, Field(min_length=1)] = present("a gauge that is polled, by its name")
 
     @property
     def subject(self) -> str:
@@ -92,19 +90,14 @@ class ZeroKeys(SentMessage):
     """Answers ZERO when machine zero has been taken."""
 
     wire_name = "ZERO"
-    taken_at: str = Field(description="when, UTC, ISO 8601")
-    path: str = Field(description="the file in which it is kept")
-    readings_mm: dict[str, float] = Field(description="mean raw reading of every length gauge, by channel, mm")
-    changed_mm: dict[str, float] | None = Field(
-        default=None,
-        description="by how much each gauge differs from the machine zero before, mm; absent where there was none",
+    taken_at: str = present("when, UTC, ISO 8601")
+    path: str = present("the file in which it is kept")
+    readings_mm: dict[str, float] = present("mean raw reading of every length gauge, by channel, mm")
+    changed_mm: dict[str, float] | None = absent(
+        "by how much each gauge differs from the machine zero before, mm; absent where there was none"
     )
-    quantities: dict[str, float] | None = Field(
-        default=None, description="mean of every other quantity, by name: from these effects count"
-    )
-    without: list[str] | None = Field(
-        default=None, description="quantities that could not be read; models with effects of these are refused"
-    )
+    quantities: dict[str, float] | None = absent("mean of every other quantity, by name: from these effects count")
+    without: list[str] | None = absent("quantities that could not be read; models with effects of these are refused")
 
 
 class ZeroRequest(OrderRequest):
@@ -133,10 +126,8 @@ class ModelKeys(SentMessage, ModelsKeys):
     """Answers MODEL."""
 
     wire_name = "MODEL"
-    kept: bool = Field(
-        description="whether the daemon starts with the applied model again, by its configuration as it was read"
-    )
-    kept_text: str = Field(description="the same for people, with what keeps it where it is not kept")
+    kept: bool = present("whether the daemon starts with the applied model again, by its configuration as it was read")
+    kept_text: str = present("the same for people, with what keeps it where it is not kept")
 
 
 class ModelRequest(OrderRequest):

@@ -7,6 +7,7 @@ from typing import Any
 
 from compd.configuration import Configuration
 from compd.live.machine import MachineWires, Wire
+from compd.operation_settings import LoopBasics
 from compd.text import omit_unknown
 
 
@@ -19,7 +20,7 @@ def machine_message(configuration: Configuration, wires: MachineWires) -> dict[s
         "geometry": _geometry(configuration),
         **_mechanism(configuration),
         "limits": configuration.limits.model_dump(mode="json"),
-        "loop": configuration.loop.model_dump(mode="json", include={"rate_hz", "stale_after_s", "on_stale", "hold_s"}),
+        "loop": configuration.loop.model_dump(mode="json", include=set(LoopBasics.model_fields)),
         "wiring": _wiring(configuration, wires),
     }
     known: dict[str, Any] = omit_unknown(message)

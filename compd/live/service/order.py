@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 
 from compd.clock import Clock
 from compd.live.service.client_session import ClientSession
-from compd.live.service.message_keys.message import SentMessage
+from compd.live.service.message_keys.message import SentMessage, absent, present
 from compd.live.service.messages import line
 from compd.live.service.request import Request
 
@@ -60,12 +60,12 @@ class OrderKeys(SentMessage):
     """An order that a client gave, once it is done or refused. Sent to whoever watches `READINGS`, in between."""
 
     wire_name = "ORDER"
-    time_s: float = Field(description="when, s of the daemon's monotonic clock")
-    order: str = Field(description="class of the request: ZERO, ACCEPT, POLL, MODEL or RELEASE")
-    subject: str | None = Field(default=None, description="the gauge, the model file, the controller")
-    client: str = Field(description='who gave it: "unix, user 1000", or address and port over TCP')
-    by: str | None = Field(default=None, description="for whom, as the client says")
-    done: bool = Field(description="false: it was refused, and nothing has changed")
+    time_s: float = present("when, s of the daemon's monotonic clock")
+    order: str = present("class of the request: ZERO, ACCEPT, POLL, MODEL or RELEASE")
+    subject: str | None = absent("the gauge, the model file, the controller")
+    client: str = present('who gave it: "unix, user 1000", or address and port over TCP')
+    by: str | None = absent("for whom, as the client says")
+    done: bool = present("false: it was refused, and nothing has changed")
 
 
 class OrderBook:

@@ -80,7 +80,7 @@ class ReadingsMessage:
             problem = inputs.zero.problems[0]
             message["no_zero"] = {"where": problem.where, "what": problem.what, "next_step": problem.next_step}
         if inputs.target is not None:
-            message["target"] = _target(inputs.target)
+            message["target"] = omit_unknown(vars(inputs.target))
         if inputs.ending:
             message["ending"] = inputs.ending
         message |= cycle.models.hashes
@@ -120,7 +120,7 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
         message["seq"],
         Snapshot(message["time_s"], readings),
         zero,
-        None if target is None else _parsed_target(target),
+        None if target is None else Target(**{key: from_plain(part) for key, part in target.items()}),
         ending=message.get("ending", ""),
     )
     # up to 0.3.0 a bound of the tip's error that was not known was null
@@ -146,33 +146,5 @@ def _parsed_reading(data: Mapping[str, Any]) -> Reading:
         data["time_s"],
         quality,
         data.get("detail", ""),
-        None if motion is None else ReadingMotion(**{"u_mm_per_s": math.nan, **motion}),
-    )
-
-
-def _target(target: Target) -> dict[str, Any]:
-    message: dict[str, Any] = {"tip_mm": target.tip_mm}
-    if target.rotation_B0_rad is not None:
-        message["rotation_B0_rad"] = target.rotation_B0_rad
-    if target.valid_until_s < math.inf:
-        message["valid_until_s"] = target.valid_until_s
-    if math.isfinite(target.time_s):
-        message["time_s"] = target.time_s
-    if target.id is not None:
-        message["id"] = target.id
-    if target.tip_by_scale is not None:
-        message["tip_by_scale"] = target.tip_by_scale
-    return message
-
-
-def _parsed_target(data: Mapping[str, Any]) -> Target:
-    """The target; one that was recorded before targets grew old is never too old."""
-    rotation, rows = data.get("rotation_B0_rad"), data.get("tip_by_scale")
-    return Target(
-        tuple(data["tip_mm"]),
-        None if rotation is None else tuple(rotation),
-        data.get("valid_until_s", math.inf),
-        data.get("time_s", math.nan),
-        data.get("id"),
-        None if rows is None else tuple(map(tuple, rows)),
+        None if motion is None else ReadingMotion(**motion),
     )

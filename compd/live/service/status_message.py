@@ -86,7 +86,7 @@ class StatusReport:
         if isinstance(zero, StateError):
             return {"taken": False, "reason": str(zero)}
         changed = changed_ports(zero.ports, self.ports)
-        return {"taken": True, "taken_at": zero.taken_at, **({"ports_changed": changed} if changed else {})}
+        return {"taken": True, "taken_at": zero.taken_at, "ports_changed": changed or None}
 
     def _model(self) -> dict[str, Any]:
         """The applied model and, if there is one, the shadow; without their paths, which no remote client needs."""
@@ -102,7 +102,7 @@ class StatusReport:
         return round(skew_of(r for r, stale_after_s in wired if r.ok and now_s - r.time_s <= stale_after_s), 6)
 
     def _gauges(self, now_s: float) -> list[dict[str, Any]]:
-        """Every channel: its raw value, before sign and machine zero, and its age (s); or why there is no value."""
+        """Every channel: its raw value, before sign and machine zero, and its age (s); None for what is unknown."""
         gauges: list[dict[str, Any]] = []
         stale_after_s = {wire.channel: wire.stale_after_s for wire in self.wires.all_wires}
         meanings = {wire.channel: wire.meaning for wire in self.wires.all_wires}
@@ -111,22 +111,20 @@ class StatusReport:
         for channel, reading in zip(self.latest.channels, self.latest.snapshot(now_s).readings, strict=True):
             age_s = now_s - reading.time_s
             stale = reading.ok and age_s > stale_after_s.get(channel, math.inf)
-            entry: dict[str, Any] = {"channel": channel, "quality": Quality.STALE if stale else reading.quality}
-            if channel in meanings:
-                entry["measures"] = meanings[channel]
-            if channel in noises:
-                entry["noise_um"], entry["noise_from"] = noises[channel].um, noises[channel].source or None
-            if reading.quality is not Quality.NEVER_READ:
-                entry["age_s"] = round(age_s, 4)
-            if reading.ok and not stale:
-                entry["value"] = round(reading.value, 7)
-            if reading.detail:
-                entry["detail"] = reading.detail
-            if reading.motion is not None and not math.isnan(reading.motion.scatter_mm):
-                entry["scatter_um"] = round(reading.motion.scatter_mm * UM_PER_MM, 4)
-            if channel in warnings:
-                entry["warning"] = warnings[channel]
-            if channel in self.trust.index and self.trust.needs_person(self.trust.index[channel]):
-                entry["needs_person"] = True
-            gauges.append(entry)
+            noise, motion, slot = noises.get(channel), reading.motion, self.trust.index.get(channel)
+            gauges.append(
+                {
+                    "channel": channel,
+                    "quality": Quality.STALE if stale else reading.quality,
+                    "measures": meanings.get(channel),
+                    "noise_um": noise and noise.um,
+                    "noise_from": (noise and noise.source) or None,
+                    "age_s": None if reading.quality is Quality.NEVER_READ else round(age_s, 4),
+                    "value": round(reading.value, 7) if reading.ok and not stale else None,
+                    "detail": reading.detail or None,
+                    "scatter_um": motion and round(motion.scatter_mm * UM_PER_MM, 4),
+                    "warning": warnings.get(channel),
+                    "needs_person": (slot is not None and self.trust.needs_person(slot)) or None,
+                }
+            )
         return gauges

@@ -6,14 +6,16 @@ import math
 import threading
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from compd.documents import read_text
+from compd.documents import parse_yaml, read_text, with_entries
 from compd.errors import CompdError, Problem, StateError
 from compd.files import file_stamp, write_files
 from compd.model.effects import Effect
 from compd.model.formula import formula_effect
-from compd.model.library import gather_effects
-from compd.page.workbench.effects_text import Declaration, entries_of, with_entry, without_entry
+from compd.model.library import EFFECTS_FILE, gather_effects
+
+Declaration = Mapping[str, Any]
 
 # Most combinations of searched constants, and most numbers, of an effect: more would take too long in a page.
 MAX_COMBINATIONS = 100
@@ -66,7 +68,7 @@ class OwnEffects:
 
         replace : whether one that has its id may be replaced.
         Raises CompdError with every problem of the declaration; StateError where the id is in the file already, where
-        the file has a mistake, or where the disk refuses.
+        the file has a mistake, or where the disk refuses; ConfigurationError where its text cannot be changed in part.
         """
         effect = formula_effect(declaration, "effect")
         with _WRITING:
@@ -74,13 +76,16 @@ class OwnEffects:
             if effect.id in self.declarations and not replace:
                 what, step = "has an effect of this id", "replace it, or give this one another id"
                 raise StateError.of(str(self.path), what, value=effect.id, next_step=step)
-            self._write(with_entry(self._text(), declaration, self.path))
+            self._write({**self.declarations, effect.id: declaration})
 
     def delete(self, effect: str) -> None:
         """Remove an effect from the file, and the file if it is empty then. Raises StateError as `save`."""
         with _WRITING:
             self._refuse_faulty()
-            self._write(without_entry(self._text(), effect, self.path))
+            if effect not in self.declarations:
+                allowed = ", ".join(self.declarations)
+                raise StateError.of(str(self.path), "has no such effect", value=effect, allowed=allowed)
+            self._write({name: declared for name, declared in self.declarations.items() if name != effect})
 
     def _refuse_faulty(self) -> None:
         """Raise StateError for a faulty file, which this page must not overwrite."""
@@ -88,7 +93,11 @@ class OwnEffects:
         if self.problems and not self.declarations:
             raise StateError(self.problems)
 
-    def _write(self, text: str) -> None:
+    def _write(self, declarations: Mapping[str, Declaration]) -> None:
+        before = self._text()
+        key, data = EFFECTS_FILE.listed_under, parse_yaml(before, self.path)[0]
+        listed = isinstance(data, dict) and key in data
+        text = with_entries(before, self.path, key * listed, list(map(dict, declarations.values())))
         try:
             if text.strip():
                 write_files({self.path: text})
@@ -100,6 +109,18 @@ class OwnEffects:
 
     def _text(self) -> str:
         return read_text(self.path, "a file of effects") if self.path.exists() else ""
+
+
+def entries_of(text: str, path: Path) -> list[Declaration]:
+    """The effects declared by a text; none for comments alone.
+
+    path : of the file, for messages. Raises ConfigurationError if it is no YAML.
+    """
+    data, _ = parse_yaml(text, path, EFFECTS_FILE)
+    entries = data.get(EFFECTS_FILE.listed_under, data) if isinstance(data, dict) else data
+    if isinstance(entries, list):
+        return entries
+    return [] if entries is None else [entries]
 
 
 def too_large(effect: Effect, where: str) -> list[Problem]:

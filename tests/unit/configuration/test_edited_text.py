@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.documents import with_values
+from compd.documents import parse_yaml, with_entries, with_values
 from compd.errors import ConfigurationError
 
 HERE = Path("machine.yaml")
@@ -55,3 +55,37 @@ def test_a_number_for_several_places_is_refused() -> None:
 def test_another_number_of_coordinates_is_refused() -> None:
     with pytest.raises(ConfigurationError, match=r"machine.yaml:3 rods\[1\].base_B_mm: is written so"):
         with_values(TEXT, HERE, {("rods", 0, "base_B_mm"): (1.0, 2.0)})
+
+
+ONE, TWO = {"row": 17, "reason": "the tracker's beam"}, {"rows": [3, 9], "reason": "1e5"}
+LISTS = {
+    "block": "a: 1\nlist:   # why\n- {row: 17, reason: 'the tracker''s beam'}  # own\n# next\nb: 2  # last\n",
+    "indented": "list:\n  - row: 17\n    reason: the tracker's beam\nb: [1, 2]\n",
+    "one line": "a: 1\nlist: [{row: 17, reason: the tracker's beam}]  # own\n",
+    "all in one line": "{a: 1, list: [{row: 17, reason: the tracker's beam}], b: 2}\n",
+}
+
+
+@pytest.mark.parametrize("text", LISTS.values(), ids=LISTS)
+def test_an_entry_is_added_and_removed_and_all_other_text_stays(text: str) -> None:
+    more = with_entries(text, HERE, "list", [ONE, TWO])
+    assert parse_yaml(more, HERE)[0] == {**parse_yaml(text, HERE)[0], "list": [ONE, TWO]}
+    assert with_entries(more, HERE, "list", [ONE]) == text
+    swapped = with_entries(more, HERE, "list", [TWO, ONE, TWO])
+    assert parse_yaml(swapped, HERE)[0]["list"] == [TWO, ONE, TWO]
+    assert all(line in swapped for line in ("# own", "# next", "b: 2  # last", "list:   # why") if line in text)
+
+
+@pytest.mark.parametrize("text", ["a: 1\nlist:\nb: 2\n", "list: null\n", "list: []\na: 1\n", "a: |\n  text\n\n# end\n"])
+def test_a_section_is_inserted_where_there_is_none(text: str) -> None:
+    more = with_entries(text, HERE, "list", [ONE, TWO])
+    assert parse_yaml(more, HERE)[0] == {**parse_yaml(text, HERE)[0], "list": [ONE, TWO]}
+    fewer = with_entries(more, HERE, "list", [])
+    assert "list" not in fewer
+    assert ("# end" in fewer) == ("# end" in text)
+
+
+def test_what_cannot_be_cut_is_refused() -> None:
+    for text in ("list: {row: 17}\n", "- &one {row: 1}\n- *one\n", "list: [{row: 1}, # one\n {row: 2}]\n"):
+        with pytest.raises(ConfigurationError, match="cannot be changed alone"):
+            with_entries(text, HERE, "list" * ("list" in text), [TWO, {"row": 1}])

@@ -289,3 +289,10 @@ def test_every_function_of_a_formula() -> None:
 def test_a_key_shows_the_unit_in_which_its_name_ends() -> None:
     assert (key_unit("weight_N"), key_unit("slew_mm_per_s"), key_unit("rate_hz")) == ("N", "mm/s", "Hz")
     assert (key_unit("supports_B_mm"), key_unit("support_of_joint"), key_unit("low_latency")) == ("mm", "", "")
+
+
+def test_a_class_that_holds_a_part_of_a_message_describes_its_keys() -> None:
+    keys = described(SENT_MESSAGES["READINGS"])
+    assert keys["Target.tip_by_scale"].startswith("with `machine: external`, 3 or 6 rows of n numbers")
+    assert keys["ReadingMotion.late_s"].endswith("the device may have sampled, s")
+    assert ModelSchema(SENT_MESSAGES["READINGS"]).definitions["Target"]["description"].count("\n") == 0

@@ -40,7 +40,7 @@ from compd.model.library import load_effects
 from compd.model_file import read_stored
 from compd.model_file.model_document import read_document as read_model_document
 from compd.page import read_tokens
-from compd.page.workbench.effects_text import entries_of
+from compd.page.workbench.own_effects import entries_of
 from compd.plan_file import read_plan_file
 from compd.recording import OpenPart, exclude_rows, read_recording, read_sidecar
 from compd.recording.ball_plate import read_plate

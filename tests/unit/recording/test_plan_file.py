@@ -54,6 +54,18 @@ def test_a_wrong_cell_is_a_problem_and_not_a_number(tmp_path: Path) -> None:
     assert line.values["tip_x_mm"] == 1.235
 
 
+def test_a_spreadsheets_number_is_told_as_in_a_recording(tmp_path: Path) -> None:
+    path = tmp_path / "next.csv"
+    rows = 'purpose,time_s,tip_x_mm,tip_y_mm,tip_z_mm\n7,0,"1,25",0,190\n,1,#N/A,0,190\n'
+    write_text_file(path, rows)
+    problems: list[Problem] = []
+    lines = read_plan_file(path, 3, LIMITS, problems).lines
+    assert [(line.line, line.purpose) for line in lines] == [(2, "7"), (3, "")]
+    whats = {problem.what: problem.where for problem in problems}
+    assert whats["decimal comma"] == f"{path}: column tip_x_mm (C), row 2"
+    assert whats["a spreadsheet's error"] == f"{path}: column tip_x_mm (C), row 3"
+
+
 def test_a_column_of_another_machine_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "next.csv"
     write_text_file(path, plan_text(ROWS))

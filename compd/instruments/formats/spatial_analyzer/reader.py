@@ -16,11 +16,11 @@ from dataclasses import replace
 from compd.instruments.cells import is_number_column
 from compd.instruments.delimited import read_delimited
 from compd.instruments.export import ReadOptions
-from compd.instruments.export_problems import ExportProblems
 from compd.instruments.formats.spatial_analyzer import AXES
 from compd.instruments.raw_table import RawTable
 from compd.instruments.text_file import TextFile
 from compd.instruments.time_stamps import is_stamp
+from compd.tables import ProblemList
 from compd.units import unit_named
 
 _FRAME = re.compile(r"coordinate\s+frame\s*:?\s*'?([^']*?)'?\s*$", re.IGNORECASE)
@@ -30,7 +30,7 @@ _NAMES_BEFORE = {1: ("name",), 2: ("group", "name"), 3: ("collection", "group", 
 
 def read_spatial_analyzer(text: TextFile, options: ReadOptions) -> RawTable:
     """The table of such an export; without comments too (`number, x, y, z`). Raises RecordingError."""
-    problems = ExportProblems(text.path)
+    problems = ProblemList(text.path)
     assumed: dict[str, str] = {}
     unit = ""
     for i in [i for i, line in enumerate(map(str.lstrip, text.lines)) if line[:2] == "//"]:

@@ -6,8 +6,7 @@ import pytest
 
 from compd.errors import CompdError, StateError
 from compd.model.library import load_effects
-from compd.page.workbench.effects_text import entries_of, with_entry
-from compd.page.workbench.own_effects import OwnEffects
+from compd.page.workbench.own_effects import OwnEffects, entries_of
 
 HAND = """# found in March
 - id: first   # the oldest
@@ -130,9 +129,12 @@ def test_a_file_with_a_mistake_is_told_and_not_written_over(own, text):
     assert own.path.read_text() == text
 
 
-def test_a_file_in_one_line_is_left_to_its_writer(own):
-    with pytest.raises(StateError, match="cannot change one entry alone"):
-        with_entry("[{id: a, port: link}]\n", declared(), own.path)
+def test_a_single_effect_without_a_list_is_left_to_its_writer(own):
+    own.path.write_text(HAND.partition("\n\n")[0].replace("- id", "  id"))
+    own.reload()
+    assert list(own.effects) == ["first"]
+    with pytest.raises(CompdError, match="one part of it cannot be changed alone"):
+        own.save(declared(), replace=False)
 
 
 def test_a_mistake_is_refused_and_an_id_of_the_library_is_not(own):
