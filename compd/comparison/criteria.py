@@ -242,7 +242,7 @@ class ComparisonCriteria:
     sample_rows: int = threshold(
         20_000,
         unit="rows",
-        meaning="so many rows of a recording that is compared block by block fix its noise floor, frame and outliers",
+        meaning="so many rows of a recording that is too long for the memory are compared",
         reason="they know a standard deviation within 0.5 %, and a comparison of them takes 0.2 GB",
     )
     trends_per_coordinate: int = threshold(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -40,6 +40,18 @@ class Table:
     def place(self, name: str) -> str:
         """A column for a person: its name and the letters over it."""
         return f"column {name} ({self.letters[name]})" if self.letters.get(name) else f"column {name}"
+
+    def select(self, index: IntArray) -> Table:
+        """The rows of this index (R,), copied."""
+        return replace(
+            self, columns={name: values[index] for name, values in self.columns.items()}, row=self.row[index]
+        )
+
+    def extended_by(self, *later: Table) -> Table:
+        """These rows followed by those of later blocks of the same file."""
+        parts = (self, *later)
+        columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in self.columns}
+        return replace(self, columns=columns, row=np.concatenate([part.row for part in parts]))
 
 
 class TableBlock(NamedTuple):
